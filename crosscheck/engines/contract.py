@@ -1,0 +1,145 @@
+"""What an engine must offer, and the only data engines exchange.
+
+Everything crosses this boundary in World axes, SI, at named markers and hinges; quaternions are scalar-first and map body
+components to World components; spatial vectors are angular first. Native coordinates never leave an engine.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Literal, Protocol, runtime_checkable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+Status = Literal["finished", "diverged", "failed"]
+
+
+@dataclass(frozen=True)
+class Support:
+    """How an engine can represent a scene: "exact", "surrogate" (an approximation, named in `reason`) or "no"."""
+
+    kind: Literal["exact", "surrogate", "no"]
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class Run:
+    """What to simulate: from t = 0 to the last of `times` (s, strictly increasing, first is 0)."""
+
+    times: Array
+
+
+@dataclass(frozen=True)
+class Effort:
+    """One setting of an engine's accuracy: a relative tolerance or a fixed step (s); `method` names the integrator."""
+
+    kind: Literal["tolerance", "step"]
+    value: float
+    method: str
+
+    @property
+    def label(self) -> str:
+        return f"{self.method} {'rtol' if self.kind == 'tolerance' else 'h'}={self.value:g}"
+
+
+@dataclass(frozen=True)
+class MarkerSnapshot:
+    """Motion of one marker: position (3,) m, quaternion (4,), spatial velocity and acceleration (6,) [angular; linear].
+
+    The linear acceleration is the classical one of the marker point (not the spatial acceleration's linear part).
+    """
+
+    position: Array
+    quaternion: Array
+    velocity: Array
+    acceleration: Array
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Pointwise results at the scene's initial state and t = 0.
+
+    `loads[hinge]` (6,) [torque; force]: total load across the hinge on the outboard body about the outboard hinge
+    point. `wheel_loads[wheel]` (6,): on the wheel about its centre. `drives[name]` (n,): generalised drive load of each
+    prescribed coordinate of a hinge or wheel, beyond springs and motors. `energy`: "kinetic", "strain", "spring",
+    "gravity" (J), as far as the engine knows them. `momentum` (6,): [angular about the World origin; linear].
+    """
+
+    markers: dict[str, MarkerSnapshot]
+    loads: dict[str, Array]
+    wheel_loads: dict[str, Array]
+    drives: dict[str, Array]
+    energy: dict[str, float]
+    momentum: Array | None
+
+
+@dataclass(frozen=True)
+class MarkerPath:
+    """Marker motion over time: position (T,3), quaternion (T,4), spatial velocity (T,6) [angular; linear]."""
+
+    position: Array
+    quaternion: Array
+    velocity: Array
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
+
+    `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
+    done so far by drives, motors, dampers and loads, where the engine integrates it. `wall_s` times only the solve.
+    """
+
+    status: Status
+    message: str
+    times: Array
+    markers: dict[str, MarkerPath]
+    loads: dict[str, Array] = field(default_factory=dict)
+    wheel_loads: dict[str, Array] = field(default_factory=dict)
+    drives: dict[str, Array] = field(default_factory=dict)
+    energy: dict[str, Array] = field(default_factory=dict)
+    momentum: Array | None = None
+    work: Array | None = None
+    wall_s: float = 0.0
+    evaluations: int = 0
+
+
+@runtime_checkable
+class Model(Protocol):
+    """A scene compiled by one engine."""
+
+    def warm_up(self) -> None:
+        """Compile or cache whatever must not be timed."""
+
+    def evaluate(self) -> Snapshot:
+        """Accelerations, energies and loads at the scene's initial state, t = 0."""
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        """Integrate; the only timed part. Never raises for a diverging run: that is a status."""
+
+
+@runtime_checkable
+class Engine(Protocol):
+    """An independent multibody code behind one adapter. Entry-point group: `crosscheck.engines`."""
+
+    name: str
+
+    def version(self) -> str:
+        """Version of the library; raises `EngineMissing` when it is not installed."""
+
+    def supports(self, scene: Scene) -> Support:
+        """Whether, and how exactly, this engine can represent the scene."""
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        """A ladder of at least three efforts, coarse to fine, suitable for this scene's work-precision chart."""
+
+    def compile(self, scene: Scene) -> Model:
+        """Convert the scene; every conversion of conventions happens here."""
+
+
+class EngineMissing(RuntimeError):
+    """The engine's library is not installed; the message names the extra that installs it."""

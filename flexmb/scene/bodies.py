@@ -1,0 +1,170 @@
+"""Bodies of a scene: rigid, beam, raw points and modes, SID file; their nodes; wheels and point masses."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+Vector = tuple[float, float, float]
+Matrix3 = tuple[Vector, Vector, Vector]
+Quaternion = tuple[float, float, float, float]
+Level = Literal["rigid", "ruthless", "linear", "full", "stiffened"]
+
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Every struct of the schema refuses unknown keys and is frozen."""
+
+
+class Node(_Strict, frozen=True, kw_only=True):
+    """A named frame on a rigid body, in the undeformed body frame.
+
+    Every body also has the implicit node "origin": the body frame itself.
+    """
+
+    name: str
+    position_m: Vector = ZERO
+    quaternion: Quaternion = IDENTITY
+
+
+class RigidBody(_Strict, frozen=True, kw_only=True, tag="rigid", tag_field="kind"):
+    """A rigid body: mass, centre of mass in the body frame, inertia about the centre of mass in body axes."""
+
+    name: str
+    mass_kg: float
+    com_m: Vector = ZERO
+    inertia_kg_m2: Matrix3
+    nodes: tuple[Node, ...] = ()
+
+
+class BeamStation(_Strict, frozen=True, kw_only=True):
+    """Section properties at one station; between stations they vary linearly.
+
+    x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
+    Shear stiffnesses are used by Timoshenko beams only; rotary inertias per length are rho*Iy, rho*Iz, and the
+    torsional one is their sum.
+    """
+
+    x_m: float
+    EA_N: float
+    EIy_Nm2: float
+    EIz_Nm2: float
+    GJ_Nm2: float
+    mass_per_length_kg_m: float
+    rotary_y_kg_m: float = 0.0
+    rotary_z_kg_m: float = 0.0
+    GAy_N: float | None = None
+    GAz_N: float | None = None
+
+
+class TipMass(_Strict, frozen=True, kw_only=True):
+    """A rigid lump fixed to the beam section at `x_m`; part of the body, hence of its modes."""
+
+    x_m: float
+    mass_kg: float
+    com_m: Vector = ZERO
+    inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
+
+
+class BeamNode(_Strict, frozen=True, kw_only=True):
+    """A named node at station `x_m`. "root" (x = 0) and "tip" (x = length) exist without being listed."""
+
+    name: str
+    x_m: float
+    quaternion: Quaternion = IDENTITY
+
+
+class Modes(_Strict, frozen=True, kw_only=True):
+    """Which modes represent the body: the `count` lowest of the wanted families, clamped at the root or free-free.
+
+    `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes.
+    """
+
+    count: int
+    boundary: Literal["clamped-free", "free-free"] = "clamped-free"
+    families: tuple[Literal["axial", "torsion", "bending_y", "bending_z"], ...] = (
+        "axial",
+        "torsion",
+        "bending_y",
+        "bending_z",
+    )
+    static: bool = False
+    damping_ratio: float | tuple[float, ...] = 0.0
+
+
+class BeamBody(_Strict, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
+    """A straight beam along +x of the body frame, root at the origin.
+
+    `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` says how the section's inertia is
+    carried: "line" drops rotary inertia of bending and of torsion in the inertia points, "rotary" gives each point a
+    rotating inertia tensor, "section" puts four massy points on each section (no rotating tensor, exactly polynomial).
+    """
+
+    name: str
+    length_m: float
+    elements: int
+    stations: tuple[BeamStation, ...]
+    modes: Modes
+    level: Level = "full"
+    theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli"
+    mass: Literal["consistent", "lumped"] = "consistent"
+    points: Literal["line", "rotary", "section"] = "section"
+    tip_masses: tuple[TipMass, ...] = ()
+    nodes: tuple[BeamNode, ...] = ()
+
+
+class InertiaPoint(_Strict, frozen=True, kw_only=True):
+    """One inertia point of a raw modal body (FORMULATION of the modal field: docs/notation.md).
+
+    `translation_modes[n]` and `rotation_modes[n]` are the point's displacement and rotation for unit modal
+    coordinate n. `com_offset_m` is the mass centre's offset from the point, turning with it.
+    """
+
+    mass_kg: float
+    position_m: Vector
+    translation_modes: tuple[Vector, ...]
+    rotation_modes: tuple[Vector, ...] = ()
+    inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
+    com_offset_m: Vector = ZERO
+
+
+class ModalNode(_Strict, frozen=True, kw_only=True):
+    """A node of a raw modal body with its mode shapes."""
+
+    name: str
+    position_m: Vector
+    translation_modes: tuple[Vector, ...]
+    rotation_modes: tuple[Vector, ...]
+    quaternion: Quaternion = IDENTITY
+
+
+class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
+    """Raw points and modes, inline (`points`) or in an `.npz` beside the scene file (`file`).
+
+    The `.npz` holds mass (n,), position (n,3), translation_modes (n,3,m), and optionally rotation_modes (n,3,m),
+    inertia (n,3,3), com_offset (n,3), stiffness (m,m), damping (m,m).
+    `boundary` "clamped-free" asserts that the modes vanish at the body origin.
+    """
+
+    name: str
+    points: tuple[InertiaPoint, ...] = ()
+    file: str | None = None
+    stiffness: tuple[tuple[float, ...], ...] = ()
+    damping: tuple[tuple[float, ...], ...] = ()
+    boundary: Literal["clamped-free", "free-free"] = "clamped-free"
+    level: Level = "full"
+    nodes: tuple[ModalNode, ...] = ()
+
+
+class SidBody(_Strict, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
+    """A body from a Standard Input Data file (Wallrapp 1994). Expressible; not supported by `compile` yet."""
+
+    name: str
+    file: str
+    level: Level = "full"
+
+
+Body = RigidBody | BeamBody | ModalBody | SidBody

@@ -1,0 +1,80 @@
+"""Named functions of time: the closed list a scene may use for prescribed motion and for loads.
+
+Every function is twice continuously differentiable where a prescribed motion needs it. `value` is in the unit of the
+key it is used under (rad, m, N, Nm). A scene file stores them as tables with a `kind`, for example
+``{kind = "spin_up", rate = 4.0, duration_s = 15.0}``.
+"""
+
+from __future__ import annotations
+
+import msgspec
+
+
+class _Function(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="kind"):
+    """Base of all functions of time."""
+
+
+class Constant(_Function, frozen=True, tag="constant", kw_only=True):
+    """f(t) = value."""
+
+    value: float
+
+
+class Ramp(_Function, frozen=True, tag="ramp", kw_only=True):
+    """f(t) = value + rate * (t - start_s): constant rate, no acceleration."""
+
+    value: float = 0.0
+    rate: float
+    start_s: float = 0.0
+
+
+class Sine(_Function, frozen=True, tag="sine", kw_only=True):
+    """f(t) = offset + amplitude * sin(angular_frequency * t + phase)."""
+
+    amplitude: float
+    angular_frequency_rad_s: float
+    phase_rad: float = 0.0
+    offset: float = 0.0
+
+
+class SmoothStep(_Function, frozen=True, tag="smooth_step", kw_only=True):
+    """Septic blend from `start_value` to `end_value` over [start_s, start_s + duration_s], constant outside.
+
+    s(x) = 35 x^4 - 84 x^5 + 70 x^6 - 20 x^7: rate, acceleration and jerk vanish at both ends.
+    """
+
+    start_value: float
+    end_value: float
+    start_s: float
+    duration_s: float
+
+
+class SpinUp(_Function, frozen=True, tag="spin_up", kw_only=True):
+    """Spin-up manoeuvre of Kane, Ryan and Banerjee (1987), as an angle.
+
+    For t <= T: (rate/T) [t^2/2 + (T/2 pi)^2 (cos(2 pi t/T) - 1)], then rate*T/2 + rate*(t - T).
+    """
+
+    rate: float
+    duration_s: float
+
+
+class Pulse(_Function, frozen=True, tag="pulse", kw_only=True):
+    """`value` for start_s <= t < start_s + duration_s, else 0 (a load only: it is not differentiable)."""
+
+    value: float
+    start_s: float
+    duration_s: float
+
+
+class Table(_Function, frozen=True, tag="table", kw_only=True):
+    """Quintic spline through samples; defined on [times_s[0], times_s[-1]] only.
+
+    The run must lie inside that interval: it is checked before the run starts.
+    """
+
+    times_s: tuple[float, ...]
+    values: tuple[float, ...]
+
+
+Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table

@@ -1,0 +1,140 @@
+"""Hinges of a scene: one struct per kind, with its coordinates, springs, torques and prescribed motion.
+
+A hinge connects a node of `parent` ("ground" for the inertial frame) to a node of `child`. The inboard hinge frame is
+the parent's node frame displaced by `parent_position_m`, `parent_quaternion` (fixed offsets in node axes); likewise the
+outboard hinge frame on the child. Coordinates vanish when both frames coincide.
+Angles follow the right-hand rule of the outboard frame relative to the inboard one.
+Springs act between coordinate and its rest value; `torque`/`force` is a motor acting between the two bodies.
+A coordinate with `prescribed` follows that function of time; its drive load is an output.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector, _Strict
+from flexmb.scene.functions import Function
+
+Z_AXIS: Vector = (0.0, 0.0, 1.0)
+
+
+class _Hinge(_Strict, frozen=True, kw_only=True, tag_field="kind"):
+    name: str
+    parent: str
+    child: str
+    parent_node: str = "origin"
+    child_node: str = "origin"
+    parent_position_m: Vector = ZERO
+    parent_quaternion: Quaternion = IDENTITY
+    child_position_m: Vector = ZERO
+    child_quaternion: Quaternion = IDENTITY
+
+
+class AngularCoordinate(_Strict, frozen=True, kw_only=True):
+    """One angle: initial value and rate, spring, damper, motor, or prescribed motion."""
+
+    angle_rad: float = 0.0
+    rate_rad_s: float = 0.0
+    stiffness_Nm_rad: float = 0.0
+    damping_Nms_rad: float = 0.0
+    rest_rad: float = 0.0
+    torque_Nm: Function | None = None
+    prescribed_rad: Function | None = None
+
+
+class LinearCoordinate(_Strict, frozen=True, kw_only=True):
+    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion."""
+
+    position_m: float = 0.0
+    rate_m_s: float = 0.0
+    stiffness_N_m: float = 0.0
+    damping_Ns_m: float = 0.0
+    rest_m: float = 0.0
+    force_N: Function | None = None
+    prescribed_m: Function | None = None
+
+
+class Weld(_Hinge, frozen=True, kw_only=True, tag="weld"):
+    """No freedom."""
+
+
+class Revolute(_Hinge, frozen=True, kw_only=True, tag="revolute"):
+    """One rotation about `axis` (inboard hinge axes)."""
+
+    axis: Vector = Z_AXIS
+    rotation: AngularCoordinate = AngularCoordinate()
+
+
+class Prismatic(_Hinge, frozen=True, kw_only=True, tag="prismatic"):
+    """One translation along `axis`."""
+
+    axis: Vector = Z_AXIS
+    translation: LinearCoordinate = LinearCoordinate()
+
+
+class Cylindrical(_Hinge, frozen=True, kw_only=True, tag="cylindrical"):
+    """Rotation about and translation along `axis`. Speeds: [rotation, translation]."""
+
+    axis: Vector = Z_AXIS
+    rotation: AngularCoordinate = AngularCoordinate()
+    translation: LinearCoordinate = LinearCoordinate()
+
+
+class Universal(_Hinge, frozen=True, kw_only=True, tag="universal"):
+    """Rotation about x of the inboard frame, then about the carried y."""
+
+    first: AngularCoordinate = AngularCoordinate()
+    second: AngularCoordinate = AngularCoordinate()
+
+
+class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
+    """Two or three successive rotations about carried axes (Frisch's free coordinate vectors), e.g. "zxz", "xyz".
+
+    Singular where the first and last of three axes align.
+    """
+
+    sequence: str = "xyz"
+    rotations: tuple[AngularCoordinate, ...] = (AngularCoordinate(), AngularCoordinate(), AngularCoordinate())
+
+
+class Spherical(_Hinge, frozen=True, kw_only=True, tag="spherical"):
+    """Three rotations; coordinate: quaternion (scalar first) of outboard relative to inboard axes; speeds: relative
+    angular velocity in outboard axes. The spring torque is -stiffness * rotation vector."""
+
+    quaternion: Quaternion = IDENTITY
+    angular_velocity_rad_s: Vector = ZERO
+    stiffness_Nm_rad: float = 0.0
+    damping_Nms_rad: float = 0.0
+
+
+class Planar(_Hinge, frozen=True, kw_only=True, tag="planar"):
+    """Translation in the x-y plane of the inboard frame, then rotation about z. Speeds: [xdot, ydot, angle rate]."""
+
+    x: LinearCoordinate = LinearCoordinate()
+    y: LinearCoordinate = LinearCoordinate()
+    rotation: AngularCoordinate = AngularCoordinate()
+
+
+class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
+    """Six freedoms. Coordinates: position of the outboard origin in inboard axes, quaternion.
+    Speeds: [angular velocity; velocity of the outboard origin], both relative to the inboard frame, in outboard axes."""
+
+    position_m: Vector = ZERO
+    quaternion: Quaternion = IDENTITY
+    angular_velocity_rad_s: Vector = ZERO
+    velocity_m_s: Vector = ZERO
+
+
+Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
+
+
+class Closure(_Strict, frozen=True, kw_only=True):
+    """A loop closure on top of the tree. Expressible; not supported by `compile` yet."""
+
+    name: str
+    type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"]
+    body_a: str
+    node_a: str = "origin"
+    body_b: str
+    node_b: str = "origin"
+    axis: Vector = Z_AXIS

@@ -1,0 +1,138 @@
+"""THE schema of a scene: frozen typed structs. TOML, JSON Schema and the reference table are generated from them.
+
+Conventions: SI; quaternions scalar-first, unit, mapping outboard (child) components to inboard components; names, never
+indices; keys carry units. Frames, signs and orders: docs/notation.md.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from flexmb.scene.bodies import (
+    ZERO,
+    BeamBody,
+    BeamNode,
+    BeamStation,
+    Body,
+    InertiaPoint,
+    Level,
+    Matrix3,
+    ModalBody,
+    ModalNode,
+    Modes,
+    Node,
+    Quaternion,
+    RigidBody,
+    SidBody,
+    TipMass,
+    Vector,
+    _Strict,
+)
+from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.hinges import (
+    AngularCoordinate,
+    Closure,
+    Cylindrical,
+    Free,
+    Gimbal,
+    Hinge,
+    LinearCoordinate,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+    Weld,
+)
+
+
+class Wheel(_Strict, frozen=True, kw_only=True):
+    """A symmetric, balanced wheel on a node of a body; `axis` in node axes, centre at the node plus `offset_m`.
+
+    The scene's body does NOT include the wheel: `compile` adds the despun wheel (mass, axial and transverse inertia) to
+    the body, as Frisch does. The spin is relative to the node. `torque_Nm` is the motor torque on the wheel,
+    `friction_Nms_rad` viscous bearing friction, `prescribed_rad` a prescribed relative spin angle.
+    """
+
+    name: str
+    body: str
+    node: str = "origin"
+    offset_m: Vector = ZERO
+    axis: Vector
+    mass_kg: float
+    axial_inertia_kg_m2: float
+    transverse_inertia_kg_m2: float
+    angle_rad: float = 0.0
+    speed_rad_s: float = 0.0
+    friction_Nms_rad: float = 0.0
+    torque_Nm: Function | None = None
+    prescribed_rad: Function | None = None
+
+
+class PointMass(_Strict, frozen=True, kw_only=True):
+    """A point mass on a node of a body, free along 0 to 3 orthonormal `directions` (node axes)."""
+
+    name: str
+    body: str
+    node: str = "origin"
+    offset_m: Vector = ZERO
+    mass_kg: float
+    directions: tuple[Vector, ...] = ()
+    coordinates: tuple[LinearCoordinate, ...] = ()
+
+
+class Load(_Strict, frozen=True, kw_only=True):
+    """A force or torque at a node: `direction` (unit vector, in World or in turning node axes) times `function`.
+
+    Unit: N for type "force", Nm for type "torque".
+    """
+
+    name: str
+    body: str
+    node: str = "origin"
+    type: Literal["force", "torque"]
+    direction: Vector
+    frame: Literal["world", "node"] = "world"
+    function: Function
+
+
+class Marker(_Strict, frozen=True, kw_only=True):
+    """A named frame whose motion is an output, at a node plus a fixed offset in node axes."""
+
+    name: str
+    body: str
+    node: str = "origin"
+    offset_m: Vector = ZERO
+
+
+class ModalState(_Strict, frozen=True, kw_only=True):
+    """Initial modal coordinates and rates of one flexible body (zero where not listed)."""
+
+    body: str
+    coordinates: tuple[float, ...]
+    rates: tuple[float, ...] = ()
+
+
+class Scene(_Strict, frozen=True, kw_only=True):
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
+
+    name: str
+    description: str = ""
+    gravity_m_s2: Vector = ZERO
+    bodies: tuple[Body, ...]
+    hinges: tuple[Hinge, ...]
+    closures: tuple[Closure, ...] = ()
+    wheels: tuple[Wheel, ...] = ()
+    point_masses: tuple[PointMass, ...] = ()
+    loads: tuple[Load, ...] = ()
+    markers: tuple[Marker, ...] = ()
+    modal_states: tuple[ModalState, ...] = ()
+
+
+__all__ = [
+    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
+    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody",
+    "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp",
+    "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass",
+    "Universal", "Vector", "Weld", "Wheel",
+]  # fmt: skip
