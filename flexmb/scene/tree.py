@@ -1,0 +1,101 @@
+"""Reading a scene as a tree: bodies base to tip, rest frames of nodes, scalar coordinates of hinges by name."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
+from flexmb.scene.schema import PointMass, Scene
+
+GROUND = "ground"
+
+Coordinate = AngularCoordinate | LinearCoordinate
+
+
+class Branch(NamedTuple):
+    """A body and the hinge that joins it to its parent."""
+
+    body: Body
+    hinge: Hinge
+
+
+class NodeFrame(NamedTuple):
+    """Rest frame of a node in the body frame: `position` (m), `quaternion` maps node components to body components."""
+
+    position: Vector
+    quaternion: Quaternion
+
+
+class NamedCoordinate(NamedTuple):
+    """A scalar coordinate of a hinge or point mass under its schema key: "rotation", "rotations[1]", "x"."""
+
+    name: str
+    coordinate: Coordinate
+
+
+def ordered(scene: Scene) -> tuple[Branch, ...]:
+    """Bodies depth-first from the ground, each with its inboard hinge; siblings in the order of the scene's hinges.
+
+    Every parent precedes its children and every subtree is contiguous. Raises ValueError where the scene is no tree.
+    """
+    bodies = {body.name: body for body in scene.bodies}
+    outboard: dict[str, list[Hinge]] = {GROUND: []} | {name: [] for name in bodies}
+    for hinge in scene.hinges:
+        if hinge.parent not in outboard or hinge.child not in bodies:
+            raise ValueError(f'hinge "{hinge.name}" joins an unknown body: run check_scene for the details')
+        outboard[hinge.parent].append(hinge)
+
+    branches: list[Branch] = []
+    waiting = outboard[GROUND][::-1]
+    while waiting and len(branches) <= len(bodies):
+        hinge = waiting.pop()
+        branches.append(Branch(bodies[hinge.child], hinge))
+        waiting.extend(reversed(outboard[hinge.child]))
+    if sorted(branch.body.name for branch in branches) != sorted(body.name for body in scene.bodies):
+        raise ValueError(f'scene "{scene.name}" is not a tree rooted at "ground": run check_scene for the details')
+    return tuple(branches)
+
+
+def rest_frames(body: Body) -> dict[str, NodeFrame]:
+    """Rest frames of all nodes of a body by name, implicit ones included.
+
+    Implicit are "origin" (rigid, beam, clamped modal: the body frame), and "root" and "tip" of a beam. A free-free
+    modal body has "origin" only where it lists one. The nodes of a SID body are in its file: ValueError.
+    """
+    origin = {"origin": NodeFrame(ZERO, IDENTITY)}
+    match body:
+        case RigidBody():
+            return origin | {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
+        case BeamBody():
+            ends = {"root": origin["origin"], "tip": NodeFrame((body.length_m, 0.0, 0.0), IDENTITY)}
+            return origin | ends | {n.name: NodeFrame((n.x_m, 0.0, 0.0), n.quaternion) for n in body.nodes}
+        case ModalBody():
+            listed = {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
+            return (origin if body.boundary == "clamped-free" else {}) | listed
+    raise ValueError(f'the nodes of body "{body.name}" are in the SID file "{body.file}", which is not supported yet')
+
+
+def node_frame(body: Body, node: str) -> NodeFrame:
+    """Rest frame of `node` on `body`; ValueError names the nodes there are."""
+    frames = rest_frames(body)
+    if node not in frames:
+        raise ValueError(f'body "{body.name}" has no node "{node}"; its nodes are {", ".join(frames)}')
+    return frames[node]
+
+
+def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
+    """Scalar coordinates of a hinge (or point mass) in the order of its speeds; none for weld, spherical and free.
+
+    A point mass that lists directions only has default coordinates: at rest, without spring.
+    """
+    if isinstance(item, PointMass) and not item.coordinates:
+        return tuple(NamedCoordinate(f"coordinates[{i}]", LinearCoordinate()) for i in range(len(item.directions)))
+    found: list[NamedCoordinate] = []
+    for key in item.__struct_fields__:
+        match getattr(item, key):
+            case AngularCoordinate() | LinearCoordinate() as coordinate:
+                found.append(NamedCoordinate(key, coordinate))
+            case (AngularCoordinate() | LinearCoordinate(), *_) as several:
+                found.extend(NamedCoordinate(f"{key}[{i}]", each) for i, each in enumerate(several))
+    return tuple(found)
