@@ -1,0 +1,44 @@
+"""Status codes of a run: what a kernel returns instead of raising, and what to do about it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Why a run, or one evaluation of its right-hand side, ended. Kernels return the plain integers."""
+
+    OK = 0
+    NOT_POSITIVE_DEFINITE = 1
+    NONFINITE = 2
+    STEP_TOO_SMALL = 3
+    MAX_STEPS = 4
+
+    @property
+    def advice(self) -> str:
+        """What happened and what to try."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    Status.OK: "finished",
+    Status.NOT_POSITIVE_DEFINITE: (
+        "the articulated inertia of body {body} is not positive definite: it moves without mass, or its first-order "
+        'mass matrix left its range of validity; give it mass or use level "full"'
+    ),
+    Status.NONFINITE: (
+        "the state is no longer finite: the motion diverged; look for an instability (level, negative stiffness or "
+        "damping, loads), or use a smaller step"
+    ),
+    Status.STEP_TOO_SMALL: (
+        "the step became too small to advance time: the motion is singular or diverging there (a gimbal at its "
+        "singular angle, a flexible body beyond its range), or rtol and atol ask for more than double precision gives"
+    ),
+    Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
+}
+
+OK = int(Status.OK)
+NOT_POSITIVE_DEFINITE = int(Status.NOT_POSITIVE_DEFINITE)
+NONFINITE = int(Status.NONFINITE)
+STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
+MAX_STEPS = int(Status.MAX_STEPS)
