@@ -1,0 +1,102 @@
+"""The case library: finding case folders, shipped or the user's own, and reading them."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TypeVar
+
+import msgspec
+
+from crosscheck.case import CaseError, Provenance, RunFile, Variant, check_run_file
+from flexmb.scene.files import load_scene
+from flexmb.scene.schema import Scene
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case folder that was read and checked. `name` is "<family>/<case>"."""
+
+    name: str
+    folder: Path
+    run: RunFile
+    provenance: Provenance | None
+    readme: str
+
+    def scene(self, variant: Variant) -> Scene:
+        """The variant's scene as its file says, before any transformation."""
+        return load_scene(self.folder / variant.scene)
+
+
+def shipped_folder() -> Path:
+    """Folder of the shipped cases: package data of an installed wheel, or `cases/` beside the package in a checkout."""
+    packaged = files("crosscheck") / "cases"
+    if packaged.is_dir():
+        with as_file(packaged) as folder:
+            return folder
+    return Path(__file__).resolve().parent.parent / "cases"
+
+
+def shipped_cases() -> tuple[Case, ...]:
+    """Every shipped case, by name."""
+    return tuple(load_case(path.parent) for path in sorted(shipped_folder().glob("*/*/run.toml")))
+
+
+def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
+    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder."""
+    found: dict[str, Case] = {}
+    for word in words:
+        for case in _resolve_one(word):
+            found[case.name] = case
+    return tuple(found.values())
+
+
+def _resolve_one(word: str) -> tuple[Case, ...]:
+    folder = Path(word)
+    if (folder / "run.toml").is_file():
+        return (load_case(folder),)
+    cases = shipped_cases()
+    named = tuple(case for case in cases if word in (case.name, case.name.partition("/")[2]))
+    chosen = named or tuple(case for case in cases if word == "all" or word in case.run.tags)
+    if not chosen:
+        known = ", ".join(case.name for case in cases) or "none"
+        raise CaseError(
+            f'"{word}" is no case, no tag and no folder with a run.toml. Shipped cases: {known}. '
+            "`crosscheck list` shows them all."
+        )
+    return chosen
+
+
+def load_case(folder: Path) -> Case:
+    """Read and check a case folder; CaseError names file, place and remedy."""
+    folder = folder.resolve()
+    run = _read(folder / "run.toml", RunFile)
+    try:
+        check_run_file(run)
+    except CaseError as error:
+        raise CaseError(f"{folder / 'run.toml'}: {error}") from None
+    for variant in run.variants:
+        if not (folder / variant.scene).is_file():
+            missing = f'variant "{variant.name}" needs {variant.scene}, which is not there'
+            raise CaseError(f"{folder / 'run.toml'}: {missing}")
+    provenance_file, readme = folder / "provenance.toml", folder / "README.md"
+    return Case(
+        name=f"{folder.parent.name}/{folder.name}",
+        folder=folder,
+        run=run,
+        provenance=_read(provenance_file, Provenance) if provenance_file.is_file() else None,
+        readme=readme.read_text(encoding="utf-8") if readme.is_file() else "",
+    )
+
+
+def _read(file: Path, kind: type[T]) -> T:
+    try:
+        return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), kind)
+    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        raise CaseError(f"{file}: {error}") from None
+    except OSError as error:
+        raise CaseError(f"{file}: {error.strerror}") from None
