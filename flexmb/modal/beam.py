@@ -1,0 +1,165 @@
+"""Finite-element model of a straight beam: stiffness and mass of axial motion, torsion and two bending planes.
+
+The four families of motion are uncoupled in the beam itself (principal section axes, centroidal axis); a rigid lump
+with an offset mass centre or a product of inertia may couple them. A point of the axis moves by
+[displacement; rotation], the rotation about y being -w' and about z v' (without shear).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.interpolation import BendingField, LineField, Mesh
+from flexmb.modal.section import SectionTable, section_table
+from flexmb.modal.stations import Lump, Stations, quadrature
+from flexmb.scene.bodies import BeamBody
+
+Array = NDArray[np.float64]
+
+# Rows of [ux, uy, uz, rx, ry, rz] that a family moves: translation row, rotation row, sign of the rotation.
+_BENDING_ROWS = {"bending_y": (1, 5, 1.0), "bending_z": (2, 4, -1.0)}
+_LINE_ROWS = {"axial": 0, "torsion": 3}
+FAMILIES = ("axial", "torsion", "bending_y", "bending_z")
+
+
+@dataclass(frozen=True)
+class BeamElements:
+    """Fields of the chosen families over one mesh; the coordinates of all families follow one another.
+
+    `fields` maps family to its field, in the canonical order of `FAMILIES`.
+    """
+
+    mesh: Mesh
+    table: SectionTable
+    fields: dict[str, LineField | BendingField]
+
+    @property
+    def size(self) -> int:
+        return sum(field.size for field in self.fields.values())
+
+    def coordinates(self, family: str) -> slice:
+        """Where the coordinates of one family stand."""
+        start = 0
+        for name, field in self.fields.items():
+            if name == family:
+                return slice(start, start + field.size)
+            start += field.size
+        raise KeyError(family)
+
+    def clamped_coordinates(self) -> list[int]:
+        """Coordinates that a clamp at x = 0 fixes."""
+        return [
+            self.coordinates(name).start + k for name, field in self.fields.items() for k in field.clamped_coordinates
+        ]
+
+    def rigid(self) -> Array:
+        """Rigid motions (size, r) that the chosen families can make: one of axial and torsion, two of each bending."""
+        columns = []
+        for name, field in self.fields.items():
+            motion = np.zeros((self.size, field.rigid().shape[1]))
+            motion[self.coordinates(name)] = field.rigid()
+            columns.append(motion)
+        return np.hstack(columns)
+
+    def motion(self, x: Array, coefficients: Array) -> Array:
+        """[displacement; rotation] (n, 6, m) of the axis points x (n,) for coordinate columns (size, m)."""
+        x = np.asarray(x, dtype=float)
+        moved = np.zeros((len(x), 6, coefficients.shape[1]))
+        for name, field in self.fields.items():
+            part = coefficients[self.coordinates(name)]
+            if isinstance(field, LineField):
+                moved[:, _LINE_ROWS[name]] = field.at(x).value @ part
+            else:
+                translation, rotation, sign = _BENDING_ROWS[name]
+                rows = field.at(x)
+                moved[:, translation] = rows.deflection @ part
+                moved[:, rotation] = sign * (rows.rotation @ part)
+        return moved
+
+    def stiffness(self) -> Array:
+        """Stiffness matrix (size, size): the sum of EA e^2, GJ twist^2, EI curvature^2 and GA shear^2 over the beam."""
+        x, weight = quadrature(self.mesh, self.table)
+        K = np.zeros((self.size, self.size))
+        for name, field in self.fields.items():
+            own = self.coordinates(name)
+            if isinstance(field, LineField):
+                rigidity = self.table.EA if name == "axial" else self.table.GJ
+                K[own, own] = _weighted(field.at(x).slope, weight * self.table.at(rigidity, x))
+            else:
+                EI, GA = _plane_stiffness(self.table, name)
+                rows = field.at(x)
+                K[own, own] = _weighted(rows.curvature, weight * self.table.at(EI, x))
+                if GA is not None:
+                    K[own, own] += _weighted(rows.shear, weight * self.table.at(GA, x))
+        return K
+
+    def mass(self, stations: Stations, lumps: tuple[Lump, ...]) -> Array:
+        """Mass matrix (size, size) of the stations and the lumps."""
+        M = np.zeros((self.size, self.size))
+        turning = {
+            "torsion": stations.inertia_y + stations.inertia_z,
+            "bending_y": stations.inertia_z,
+            "bending_z": stations.inertia_y,
+        }
+        for name, field in self.fields.items():
+            own = self.coordinates(name)
+            if isinstance(field, LineField):
+                M[own, own] = _weighted(field.at(stations.x).value, turning.get(name, stations.mass))
+            else:
+                rows = field.at(stations.x)
+                M[own, own] = _weighted(rows.deflection, stations.mass) + _weighted(rows.rotation, turning[name])
+        for lump in lumps:
+            U = self.motion(np.array([lump.x]), np.eye(self.size))[0]
+            M += U.T @ lump_mass(lump) @ U
+        return M
+
+
+def beam_elements(body: BeamBody) -> BeamElements:
+    """Mesh and fields of `body` for the families its modes want. Raises ValueError for bad mesh data."""
+    if body.elements < 1 or body.length_m <= 0.0:
+        raise ValueError(f"beam '{body.name}': needs elements >= 1 and length_m > 0")
+    if not body.modes.families:
+        raise ValueError(f"beam '{body.name}': modes.families is empty; name at least one of {', '.join(FAMILIES)}")
+    table = section_table(body)
+    mesh = Mesh(np.linspace(0.0, body.length_m, body.elements + 1))
+    fields: dict[str, LineField | BendingField] = {}
+    for name in FAMILIES:
+        if name not in body.modes.families:
+            continue
+        if name in _LINE_ROWS:
+            fields[name] = LineField(mesh)
+        else:
+            fields[name] = BendingField(mesh, _shear_parameter(mesh, table, name))
+    return BeamElements(mesh, table, fields)
+
+
+def lump_mass(lump: Lump) -> Array:
+    """Mass matrix (6,6) of a lump for [displacement; rotation] of its axis point."""
+    c = skew(lump.com)
+    return np.block([[lump.mass * np.eye(3), -lump.mass * c], [lump.mass * c, lump.inertia - lump.mass * c @ c]])
+
+
+def skew(a: Array) -> Array:
+    """Cross-product matrix: skew(a) b = a x b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def _plane_stiffness(table: SectionTable, family: str) -> tuple[Array, Array | None]:
+    return (table.EIz, table.GAy) if family == "bending_y" else (table.EIy, table.GAz)
+
+
+def _shear_parameter(mesh: Mesh, table: SectionTable, family: str) -> Array | None:
+    """12 EI / (GA h^2) of each element at its middle; None without shear."""
+    EI, GA = _plane_stiffness(table, family)
+    if GA is None:
+        return None
+    middle = (mesh.nodes[1:] + mesh.nodes[:-1]) / 2.0
+    return 12.0 * table.at(EI, middle) / (table.at(GA, middle) * np.diff(mesh.nodes) ** 2)
+
+
+def _weighted(rows: Array, weight: Array) -> Array:
+    """rows' diag(weight) rows."""
+    return rows.T @ (weight[:, None] * rows)

@@ -1,0 +1,78 @@
+"""From a flexible body of a scene to the modal data of the dynamics: beam or raw modal body to `FlexibleModel`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flexmb.modal.beam import BeamElements, beam_elements
+from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.points import Points, axis_points, join, massy_lump, section_points, turning_lump
+from flexmb.modal.raw import raw_model
+from flexmb.modal.reduce import beam_modes, damping_matrix
+from flexmb.modal.stations import Lump, Stations, inertia_stations, lumps
+from flexmb.scene.bodies import IDENTITY, BeamBody, ModalBody, Quaternion
+
+Array = NDArray[np.float64]
+
+
+def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> FlexibleModel:
+    """Inertia points, modes, stiffness, damping and nodes of one flexible body.
+
+    `folder` is where a modal body's `.npz` lies (the scene file's folder). Node "origin" is the body frame, which does
+    not deform; a beam also has "root" and "tip". Raises ValueError for data no model can be made of.
+    """
+    if isinstance(body, ModalBody):
+        return raw_model(body, folder)
+    return beam_model(body)
+
+
+def beam_model(body: BeamBody) -> FlexibleModel:
+    """Finite elements, modes and inertia points of a beam; unit modal masses, stiffness diag(omega^2)."""
+    elements = beam_elements(body)
+    stations = inertia_stations(body, elements.mesh, elements.table)
+    rigid_lumps = lumps(body)
+    try:
+        modes = beam_modes(elements, elements.stiffness(), elements.mass(stations, rigid_lumps), body.modes)
+        damping = damping_matrix(modes.frequencies, body.modes.damping_ratio)
+    except ValueError as error:
+        raise ValueError(f"beam '{body.name}': {error}") from error
+    points = _points(body, elements, modes.columns, stations, rigid_lumps)
+    return FlexibleModel(
+        mass=points.mass,
+        position=points.position,
+        com_offset=points.com_offset,
+        inertia=points.inertia,
+        translation=points.translation,
+        rotation=points.rotation,
+        stiffness=np.diag(modes.frequencies**2),
+        damping=damping,
+        nodes=_nodes(body, elements, modes.columns),
+        clamped=body.modes.boundary == "clamped-free",
+    )
+
+
+def _points(
+    body: BeamBody, elements: BeamElements, columns: Array, stations: Stations, rigid_lumps: tuple[Lump, ...]
+) -> Points:
+    """Stations and lumps in the form that `body.points` asks for."""
+    along, at_lump = (section_points, massy_lump) if body.points == "section" else (axis_points, turning_lump)
+    return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
+
+
+def _nodes(body: BeamBody, elements: BeamElements, columns: Array) -> dict[str, ModalNode]:
+    """Nodes by name: origin, root, tip and the listed ones."""
+    modes = columns.shape[1]
+    nodes = {"origin": ModalNode(np.zeros(3), np.eye(3), np.zeros((3, modes)), np.zeros((3, modes)))}
+    listed: list[tuple[str, float, Quaternion]] = [("root", 0.0, IDENTITY), ("tip", body.length_m, IDENTITY)]
+    listed += [(node.name, node.x_m, node.quaternion) for node in body.nodes]
+    for name, x, quaternion in listed:
+        if not 0.0 <= x <= body.length_m:
+            raise ValueError(f"beam '{body.name}': node '{name}' at x = {x:g} m is not on [0, {body.length_m:g}] m")
+        moved = elements.motion(np.array([x]), columns)[0]
+        turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+        nodes[name] = ModalNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:])
+    return nodes

@@ -1,0 +1,131 @@
+"""Modal integrals: everything the dynamics needs of one flexible body, summed once over its inertia points.
+
+Body frame throughout; eta are modal coordinates, rho(eta) = r + phi eta a point's position, w and v angular velocity
+and velocity of the body frame. Masses at points without `com_offset` have the kinetic energy
+
+    T = 1/2 etadot' M_ff etadot + etadot' C(eta)' w + etadot' s1' v + 1/2 w' J(eta) w + v' (w x s(eta)) + 1/2 m v'v,
+
+exactly polynomial in eta. What turns with a point (inertia tensors, offset masses) is not polynomial; it is kept apart
+as a set of points to be summed when the dynamics runs.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.model import FlexibleModel
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TurningPoints:
+    """Inertia that turns with its point by exp(skew(theta)), theta = rotation eta; k points, m modes.
+
+    mass (k,) kg, zero where the mass is already in the polynomial integrals; position (k,3) m; com_offset (k,3) m and
+    inertia (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m).
+    """
+
+    mass: Array
+    position: Array
+    com_offset: Array
+    inertia: Array
+    translation: Array
+    rotation: Array
+
+
+@dataclass(frozen=True)
+class ModalIntegrals:
+    """Sums over the masses without offset, with m modes; ~ is the cross-product matrix.
+
+    mass           kg          sum m
+    s0             (3,)        sum m r
+    s1             (3,m)       sum m phi                      s(eta) = s0 + s1 eta
+    J0             (3,3)       sum m r~' r~
+    J1             (m,3,3)     sum m phi_n~' r~               J(eta) = J0 + sum_n eta_n (J1_n + J1_n')
+    J2             (m,m,3,3)   sum m phi_n~' phi_k~                    + sum_nk eta_n eta_k J2_nk
+    C0             (3,m)       sum m r x phi_n                C(eta)_n = C0_n + sum_k eta_k C1_kn
+    C1             (m,3,m)     sum m phi_k x phi_n            (first index k, last n; antisymmetric in k, n)
+    M_ff           (m,m)       sum m phi_n . phi_k
+    turning        what is left to sum at run time (see `TurningPoints`)
+    spatial_mass   (m+6,m+6)   mass matrix at eta = 0 of the whole body, turning points included,
+                               order [modes; angular; linear] about the body origin
+    stiffness, damping (m,m)   as in the model
+    """
+
+    mass: float
+    s0: Array
+    s1: Array
+    J0: Array
+    J1: Array
+    J2: Array
+    C0: Array
+    C1: Array
+    M_ff: Array
+    turning: TurningPoints
+    spatial_mass: Array
+    stiffness: Array
+    damping: Array
+
+    @property
+    def mode_count(self) -> int:
+        return self.M_ff.shape[0]
+
+
+def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
+    """All integrals of one flexible body."""
+    offset = np.any(model.com_offset != 0.0, axis=1)
+    m = np.where(offset, 0.0, model.mass)
+    r, phi = model.position, model.translation
+    r_cross, phi_cross = cross_matrix(r), cross_matrix(np.swapaxes(phi, 1, 2))
+    return ModalIntegrals(
+        mass=float(m.sum()),
+        s0=m @ r,
+        s1=np.einsum("p,pan->an", m, phi),
+        J0=np.einsum("p,pca,pcb->ab", m, r_cross, r_cross),
+        J1=np.einsum("p,pnca,pcb->nab", m, phi_cross, r_cross),
+        J2=np.einsum("p,pnca,pkcb->nkab", m, phi_cross, phi_cross, optimize=True),
+        C0=np.einsum("p,pab,pbn->an", m, r_cross, phi),
+        C1=np.einsum("p,pkab,pbn->kan", m, phi_cross, phi, optimize=True),
+        M_ff=np.einsum("p,pan,pak->nk", m, phi, phi, optimize=True),
+        turning=_turning(model, offset),
+        spatial_mass=_spatial_mass(model),
+        stiffness=model.stiffness,
+        damping=model.damping,
+    )
+
+
+def cross_matrix(a: Array) -> Array:
+    """Cross-product matrices (..., 3, 3) of vectors (..., 3): cross_matrix(a) b = a x b."""
+    zero = np.zeros_like(a[..., 0])
+    x, y, z = a[..., 0], a[..., 1], a[..., 2]
+    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
+    """Points with an offset mass (whole) and points with an inertia tensor (the tensor only)."""
+    kept = offset | np.any(model.inertia != 0.0, axis=(1, 2))
+    return TurningPoints(
+        mass=np.where(offset, model.mass, 0.0)[kept],
+        position=model.position[kept],
+        com_offset=model.com_offset[kept],
+        inertia=model.inertia[kept],
+        translation=model.translation[kept],
+        rotation=model.rotation[kept],
+    )
+
+
+def _spatial_mass(model: FlexibleModel) -> Array:
+    """sum m U'U + W' J W at eta = 0: U = [phi + psi x c, -(r + c)~, 1] and W = [psi, 1, 0] map [etadot; w; v] to the
+    mass centre's velocity and the point's angular velocity."""
+    count, _, modes = model.translation.shape
+    one = np.broadcast_to(np.eye(3), (count, 3, 3))
+    c = cross_matrix(model.com_offset)
+    U = np.concatenate([model.translation - c @ model.rotation, -cross_matrix(model.position) - c, one], axis=2)
+    W = np.concatenate([model.rotation, one, np.zeros((count, 3, 3))], axis=2)
+    weighted = np.einsum("p,pai,paj->ij", model.mass, U, U, optimize=True)
+    return weighted + np.einsum("pai,pab,pbj->ij", W, model.inertia, W, optimize=True)

@@ -1,0 +1,100 @@
+"""Inertia points of a beam with its modes: how stations and lumps become what the dynamics sums over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.beam import BeamElements
+from flexmb.modal.stations import Lump, Stations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Points:
+    """Inertia points with modes; the arrays of `FlexibleModel` (which says units and frames) of the same names."""
+
+    mass: Array
+    position: Array
+    com_offset: Array
+    inertia: Array
+    translation: Array
+    rotation: Array
+
+
+def join(groups: list[Points]) -> Points:
+    """One set out of several."""
+    return Points(*(np.concatenate([getattr(g, name) for g in groups]) for name in Points.__dataclass_fields__))
+
+
+def axis_points(elements: BeamElements, columns: Array, stations: Stations) -> Points:
+    """One point per station, its section inertia as a tensor that turns with it."""
+    moved = elements.motion(stations.x, columns)
+    inertia = np.zeros((len(stations.x), 3, 3))
+    inertia[:, 0, 0] = stations.inertia_y + stations.inertia_z
+    inertia[:, 1, 1] = stations.inertia_y
+    inertia[:, 2, 2] = stations.inertia_z
+    offset = np.zeros((len(stations.x), 3))
+    return Points(stations.mass, _on_axis(stations.x), offset, inertia, moved[:, :3], moved[:, 3:])
+
+
+def section_points(elements: BeamElements, columns: Array, stations: Stations) -> Points:
+    """Four massy points per station at (+-a, +-b), a^2 = inertia_z / mass, b^2 = inertia_y / mass; none turns.
+
+    Their second moments are those of the section, so the mass matrix is that of `axis_points`, while the kinetic energy
+    is a polynomial in the modal coordinates. Sections without inertia keep their one point.
+    """
+    if not (np.any(stations.inertia_y) or np.any(stations.inertia_z)):
+        return axis_points(elements, columns, stations)
+    a = np.sqrt(stations.inertia_z / stations.mass)
+    b = np.sqrt(stations.inertia_y / stations.mass)
+    corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)]
+    return join([
+        _massy(elements, columns, stations.x, np.column_stack([0.0 * a, sy * a, sz * b]), stations.mass / 4.0)
+        for sy, sz in corners
+    ])  # fmt: skip
+
+
+def turning_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
+    """A lump as one point of the axis with mass-centre offset and turning inertia."""
+    x = np.array([lump.x])
+    moved = elements.motion(x, columns)
+    return Points(
+        np.array([lump.mass]), _on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:]
+    )  # fmt: skip
+
+
+def massy_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
+    """A lump as six equal masses on its principal axes, at +-sqrt(3 s_k / mass) from the mass centre.
+
+    s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J, so mass, mass centre and inertia are exact.
+    A lump without inertia is one mass.
+    """
+    if not np.any(lump.inertia):
+        return _massy(elements, columns, np.array([lump.x]), lump.com[None], np.array([lump.mass]))
+    second_moment, axes = np.linalg.eigh(np.trace(lump.inertia) / 2.0 * np.eye(3) - lump.inertia)
+    floor = -8.0 * np.finfo(float).eps * np.trace(lump.inertia)
+    if second_moment.min() < floor:
+        raise ValueError(
+            f"tip mass at x = {lump.x:g} m: impossible inertia (principal moments break the triangle inequality); "
+            "check inertia_kg_m2"
+        )
+    arms = (axes * np.sqrt(3.0 * np.maximum(second_moment, 0.0) / lump.mass)).T
+    offset = lump.com + np.concatenate([arms, -arms])
+    return _massy(elements, columns, np.full(6, lump.x), offset, np.full(6, lump.mass / 6.0))
+
+
+def _massy(elements: BeamElements, columns: Array, x: Array, offset: Array, mass: Array) -> Points:
+    """Masses (n,) at `offset` (n,3) from the axis points x (n,), displaced by the axis point plus rotation x offset."""
+    moved = elements.motion(x, columns)
+    translation = moved[:, :3] + np.cross(moved[:, 3:], offset[:, :, None], axis=1)
+    nothing = np.zeros((len(x), 3))
+    return Points(mass, _on_axis(x) + offset, nothing, np.zeros((len(x), 3, 3)), translation, moved[:, 3:])
+
+
+def _on_axis(x: Array) -> Array:
+    """Positions (n,3) of axis points."""
+    return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])

@@ -1,0 +1,169 @@
+"""Modes of a beam: eigenmodes of the wanted families, attachment modes, deterministic order and sign."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
+from scipy.sparse.csgraph import connected_components
+
+from flexmb.modal.beam import BeamElements
+from flexmb.scene.bodies import Modes
+
+Array = NDArray[np.float64]
+
+# A direction whose share of the mass is below this many round-offs of the largest has no inertia: its frequency is
+# infinite, so it is never among the lowest.
+_MASSLESS = 64 * np.finfo(float).eps
+
+
+@dataclass(frozen=True)
+class BeamModes:
+    """Coordinate columns (size, m) with unit modal mass and angular frequencies (m,) rad/s, ascending."""
+
+    columns: Array
+    frequencies: Array
+
+
+@dataclass(frozen=True)
+class _Part:
+    """Families coupled with one another: stiffness K and mass M over their free coordinates `index`.
+
+    `rigid` (n, r): M-orthonormal rigid motions (none for a clamped beam). `A` is K made positive definite on them,
+    `M_elastic` is M without them: (A, M_elastic) has the elastic eigenpairs of (K, M), and rigid motions have no mass.
+    """
+
+    index: NDArray[np.intp]
+    rigid: Array
+    A: Array
+    M: Array
+    M_elastic: Array
+
+
+def beam_modes(elements: BeamElements, K: Array, M: Array, modes: Modes) -> BeamModes:
+    """The `modes.count` lowest eigenmodes of the chosen families, with attachment modes if `modes.static`.
+
+    Families that nothing couples are solved apart, so degenerate bending pairs come out as pure planes; modes are
+    merged by frequency, then by the order axial, torsion, bending_y, bending_z. Families that a lump couples are solved
+    together; families that are not chosen are held fixed. Families without inertia have no modes. Free-free modes are
+    orthogonal to the rigid motions of the chosen families, so their frame is a mean-axis (Buckens) frame of those.
+    Raises ValueError if the finite-element model has fewer modes than asked for.
+    """
+    found: list[tuple[float, int, Array]] = []
+    parts = _parts(elements, K, M, modes.boundary == "clamped-free")
+    for rank, part in enumerate(parts):
+        found += [(omega, rank, column) for omega, column in _eigenmodes(part, modes.count)]
+    found.sort(key=_order)
+    if len(found) < modes.count:
+        raise ValueError(
+            f"{modes.count} modes wanted, but the finite-element model has only {len(found)} with inertia; use more "
+            "elements, more families, or fewer modes"
+        )
+    chosen = found[: modes.count]
+    if modes.static:
+        chosen = [
+            (omega, rank, column)
+            for rank, part in enumerate(parts)
+            for omega, column in _with_attachment(elements, part, [(w, c) for w, r, c in chosen if r == rank])
+        ]
+        chosen.sort(key=_order)
+    columns = np.zeros((elements.size, len(chosen)))
+    for n, (_, rank, column) in enumerate(chosen):
+        columns[parts[rank].index, n] = column
+    return BeamModes(columns * _tip_signs(elements, columns), np.array([omega for omega, _, _ in chosen]))
+
+
+def damping_matrix(frequencies: Array, ratio: float | tuple[float, ...]) -> Array:
+    """Modal damping diag(2 zeta_n omega_n) (m,m) in N s/m for unit modal mass; one ratio for all modes or one each."""
+    if isinstance(ratio, tuple) and len(ratio) != len(frequencies):
+        raise ValueError(f"damping_ratio has {len(ratio)} entries for {len(frequencies)} modes")
+    return np.diag(2.0 * np.broadcast_to(np.asarray(ratio, dtype=float), frequencies.shape) * frequencies)
+
+
+def _order(mode: tuple[float, int, Array]) -> tuple[float, int]:
+    """Frequencies equal to nine digits count as equal: a degenerate pair keeps the order of its families."""
+    return float(f"{mode[0]:.8e}"), mode[1]
+
+
+def _parts(elements: BeamElements, K: Array, M: Array, clamped: bool) -> list[_Part]:
+    """Groups of families coupled by K or M, in the order of their first family; those without inertia are left out."""
+    names = list(elements.fields)
+    blocks = [elements.coordinates(name) for name in names]
+    coupled = np.array([[bool(np.any(M[a, b])) for b in blocks] for a in blocks])
+    _, label = connected_components(coupled, directed=False)
+    free = np.ones(elements.size, dtype=bool)
+    if clamped:
+        free[elements.clamped_coordinates()] = False
+    parts = []
+    for group in dict.fromkeys(label):
+        member = np.zeros(elements.size, dtype=bool)
+        for block, its in zip(blocks, label, strict=True):
+            member[block] = its == group
+        index = np.flatnonzero(member & free)
+        k, m = K[np.ix_(index, index)], M[np.ix_(index, index)]
+        if not np.any(m):
+            continue
+        rigid = np.zeros((len(index), 0)) if clamped else elements.rigid()[index]
+        parts.append(_part(index, k, m, rigid[:, np.any(rigid, axis=0)]))
+    return parts
+
+
+def _part(index: NDArray[np.intp], K: Array, M: Array, rigid: Array) -> _Part:
+    """Deflate the rigid motions (n, r): with M-orthonormal R, A = K + s M R R' M and M_elastic = M - M R R' M."""
+    if rigid.shape[1] == 0:
+        return _Part(index, rigid, K, M, M)
+    MR = M @ rigid
+    R = np.linalg.solve(cholesky(rigid.T @ MR, lower=True), rigid.T).T
+    deflation = M @ R @ R.T @ M
+    return _Part(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
+
+
+def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Array]]:
+    """Lowest eigenpairs from M phi = omega^-2 K phi: accurate for low modes, and massless coordinates do no harm."""
+    size = len(part.index)
+    wanted = min(count, size)
+    if wanted == 0:
+        return []
+    compliance, columns = eigh(part.M_elastic, part.A, subset_by_index=[size - wanted, size - 1])
+    return _mass_normalised(compliance[::-1], columns[:, ::-1], part.M)
+
+
+def _with_attachment(
+    elements: BeamElements, part: _Part, eigenmodes: list[tuple[float, Array]]
+) -> list[tuple[float, Array]]:
+    """Eigenmodes and the deflections under unit tip forces and moments, orthonormalised by the reduced eigenproblem.
+
+    Free-free: the load is balanced by the inertia of the rigid motion it causes (inertia relief).
+    """
+    tip = np.array([elements.mesh.nodes[-1]])
+    load = elements.motion(tip, np.eye(elements.size))[0][:, part.index].T
+    load = load[:, np.any(load, axis=0)]
+    static = cho_solve(cho_factor(part.A), load)
+    # Eigenmodes are orthogonal to what they leave over of the static answers, so only that remainder needs reducing.
+    known = np.column_stack([part.rigid, *(column for _, column in eigenmodes)])
+    for _ in range(2):  # twice is enough (Parlett): the second pass removes the round-off of the first
+        static = static - known @ (known.T @ part.M @ static)
+    static = static / np.sqrt(np.einsum("im,ij,jm->m", static, part.A, static))
+    compliance, mix = eigh(static.T @ part.M_elastic @ static, static.T @ part.A @ static)
+    return eigenmodes + _mass_normalised(compliance[::-1], static @ mix[:, ::-1], part.M)
+
+
+def _mass_normalised(compliance: Array, columns: Array, M: Array) -> list[tuple[float, Array]]:
+    """(omega, column with unit modal mass) for each compliance 1/omega^2 that is not round-off."""
+    kept = compliance > _MASSLESS * max(compliance.max(), 0.0)
+    columns = columns[:, kept]
+    scale = 1.0 / np.sqrt(np.einsum("im,ij,jm->m", columns, M, columns))
+    return [(float(1.0 / np.sqrt(c)), column) for c, column in zip(compliance[kept], (columns * scale).T, strict=True)]
+
+
+def _tip_signs(elements: BeamElements, columns: Array) -> Array:
+    """Signs (m,) that make the tip's largest displacement positive, or its largest rotation where it only turns."""
+    length = elements.mesh.nodes[-1]
+    tip = elements.motion(np.array([length]), columns)[0]
+    displacement, turn = tip[:3], length * tip[3:]
+    moves = np.abs(displacement).max(axis=0) > 1e-6 * np.abs(turn).max(axis=0)
+    rows = np.where(moves, displacement, turn)
+    largest = np.argmax(np.abs(rows), axis=0)
+    return np.where(rows[largest, np.arange(columns.shape[1])] < 0.0, -1.0, 1.0)
