@@ -1,0 +1,126 @@
+"""Plain data to typed structs, with errors that name the place and the remedy."""
+
+from __future__ import annotations
+
+import re
+from typing import Any, TypeVar
+
+import msgspec
+from msgspec import inspect
+
+from flexmb.scene.problems import Place, Problem, SceneError, closest
+from flexmb.scene.units import split_unit
+
+Struct = TypeVar("Struct", bound=msgspec.Struct)
+
+ROOT = Place()
+KINDS = {
+    "bodies": "body", "hinges": "hinge", "closures": "closure", "wheels": "wheel", "point_masses": "point mass",
+    "loads": "load", "markers": "marker", "modal_states": "modal state of body", "nodes": "node",
+}  # fmt: skip
+
+
+def plain(value: Any) -> Any:
+    """Structs, arrays and numpy scalars as dicts, lists and numbers."""
+    return msgspec.to_builtins(value, enc_hook=_array_to_list)
+
+
+def to_struct(data: Any, kind: type[Struct], scene: str = "", place: Place = ROOT) -> Struct:
+    """`data` (plain) as a `kind`: every type, key and length is checked; `place` is where it stands in the scene.
+
+    Raises SceneError with the path, the names on it, and the remedy: for an unknown key the nearest one, and the unit
+    expected where only the unit is wrong.
+    """
+    try:
+        return msgspec.convert(data, kind)
+    except msgspec.ValidationError as error:
+        raise SceneError(scene or _name_of(data), [_explain(str(error), data, kind, place)]) from None
+
+
+def label(collection: str, item: Any) -> str:
+    """How messages name an item of a collection: `hinge "pivot"`; "" for items without a name."""
+    field = "body" if collection == "modal_states" else "name"
+    name = item.get(field) if isinstance(item, dict) else getattr(item, field, None)
+    return f'{KINDS[collection]} "{name}"' if collection in KINDS and isinstance(name, str) else ""
+
+
+def _array_to_list(value: Any) -> Any:
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"a scene cannot hold a {type(value).__name__}")
+
+
+def _name_of(data: Any) -> str:
+    return str(data.get("name", "")) if isinstance(data, dict) else ""
+
+
+def _explain(message: str, data: Any, kind: type[msgspec.Struct], place: Place) -> Problem:
+    """One msgspec message ("what - at `$.path`") as a Problem."""
+    what, _, path = message.partition(" - at ")
+    steps: list[str | int] = [
+        int(index) if index else key for key, index in re.findall(r"\.(\w+)|\[(\d+)\]", path.strip("`"))
+    ]
+    value = data
+    node: inspect.Type = inspect.type_info(kind)
+    for i, step in enumerate(steps):
+        value = value[step] if not isinstance(value, dict) or step in value else None
+        place, node = place.key(step), _below(node, step, value)
+        collection = steps[i - 1] if i else None
+        if isinstance(step, int) and isinstance(collection, str) and (name := label(collection, value)):
+            place = place.named(name)
+    return Problem(str(place), what, _remedy(what, place, value, node))
+
+
+def _below(node: inspect.Type, step: str | int, value: Any) -> inspect.Type:
+    """The type one step below `node`; of a union, the alternative that `value` announces with its `kind`."""
+    below: inspect.Type = node
+    if isinstance(node, inspect.StructType):
+        below = next((field.type for field in node.fields if field.encode_name == step), node)
+    elif isinstance(node, inspect.VarTupleType):
+        below = node.item_type
+    elif isinstance(node, inspect.TupleType) and isinstance(step, int):
+        below = node.item_types[min(step, len(node.item_types) - 1)]
+    if isinstance(below, inspect.UnionType):
+        structs = [each for each in below.types if isinstance(each, inspect.StructType)]
+        tag = value.get("kind") if isinstance(value, dict) else None
+        chosen = [each for each in structs if each.tag == tag or len(structs) == 1]
+        return chosen[0] if chosen else below
+    return below
+
+
+def _remedy(what: str, place: Place, value: Any, node: inspect.Type) -> str:
+    quoted = re.search(r"`(\w+)`|'([^']*)'", what)
+    word = (quoted[1] or quoted[2] or "") if quoted else ""
+    if "unknown field" in what and isinstance(node, inspect.StructType):
+        return _unknown_key(word, node)
+    if "missing required field" in what:
+        if word == "kind":
+            return f"say which kind it is: {_tags(node)}"
+        unit = split_unit(word)[1]
+        return f'add "{word}"' + (f" (in {unit})" if unit else "")
+    if place.path.endswith(".kind"):
+        return closest(word, _tags(node).split(", "))
+    if isinstance(node, inspect.LiteralType):
+        return closest(word, map(str, node.values))
+    key = place.path.rpartition(".")[2].partition("[")[0]
+    unit = split_unit(key)[1]
+    return f"give {key} {'in ' + unit + ' ' if unit else ''}as the reference table of the scene file says"
+
+
+def _tags(node: inspect.Type) -> str:
+    types = node.types if isinstance(node, inspect.UnionType) else (node,)
+    return ", ".join(str(each.tag) for each in types if isinstance(each, inspect.StructType) and each.tag)
+
+
+def _unknown_key(word: str, node: inspect.StructType) -> str:
+    """A wrong unit, a key that lives one table deeper, or a misspelling."""
+    keys = [field.encode_name for field in node.fields]
+    stems = {split_unit(key)[0]: key for key in keys if split_unit(key)[1]}
+    same = [stem for stem in stems if word == stem or word.startswith(stem + "_")]
+    if same:
+        key = stems[max(same, key=len)]
+        return f'the unit expected is {split_unit(key)[1]}: write "{key}"'
+    for field in node.fields:
+        if isinstance(field.type, inspect.StructType) and word in (each.encode_name for each in field.type.fields):
+            return f'"{word}" belongs one level deeper: {field.encode_name} = {{ {word} = ... }}'
+    return closest(word, keys)

@@ -1,0 +1,127 @@
+"""Scenes as TOML files: build -> file -> build is the identity.
+
+Keys at their default are left out, floats are written so that they read back bit for bit. A body that refers to a file
+(`.npz`, SID) names it relative to the scene's folder in TOML, and by its absolute path in a loaded `Scene`: the folder
+may move as a whole, and whoever holds a Scene needs to know nothing about where it came from.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.problems import Problem, SceneError
+from flexmb.scene.schema import Scene
+
+LINE = 110  # characters: longer arrays are written one item a line
+
+
+def load_scene(path: str | os.PathLike[str]) -> Scene:
+    """Read a scene file; file references become absolute. Raises SceneError naming place and remedy, or OSError.
+
+    Types, keys and lengths are checked here, the physics by `check_scene`.
+    """
+    path = Path(path)
+    return loads(path.read_text(encoding="utf-8"), path.parent, name=str(path))
+
+
+def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
+    """Write a scene file; file references become relative to its folder (which must exist)."""
+    path = Path(path)
+    path.write_text(dumps(scene, path.parent), encoding="utf-8")
+
+
+def loads(text: str, folder: str | os.PathLike[str] | None = None, *, name: str = "<text>") -> Scene:
+    """A scene from TOML text; with a `folder`, file references are made absolute from there. `name` is for errors."""
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise SceneError(name, [Problem(name, f"not TOML: {error}", "correct the syntax at that line")]) from None
+    scene = to_struct(data, Scene, name)
+    return scene if folder is None else _with_files(scene, lambda file: os.path.abspath(os.path.join(folder, file)))
+
+
+def dumps(scene: Scene, folder: str | os.PathLike[str] | None = None) -> str:
+    """A scene as TOML text; with a `folder`, file references are made relative to it."""
+    if folder is not None:
+        scene = _with_files(scene, lambda file: _relative(file, folder))
+    table = _sparse(scene)
+    simple = [f"{key} = {_value(value, len(key) + 3)}" for key, value in table.items() if not _is_tables(value)]
+    tables = [
+        "\n".join([f"\n[[{key}]]", *(f"{k} = {_value(v, len(k) + 3)}" for k, v in item.items())])
+        for key, items in table.items()
+        if _is_tables(items)
+        for item in items
+    ]
+    return "\n".join([*simple, *tables]) + "\n"
+
+
+def _relative(file: str, folder: str | os.PathLike[str]) -> str:
+    try:
+        return Path(os.path.relpath(file, folder)).as_posix()
+    except ValueError:  # another drive on Windows: no relative path exists
+        return os.path.abspath(file)
+
+
+def _with_files(scene: Scene, change: Any) -> Scene:
+    bodies = tuple(
+        msgspec.structs.replace(body, file=change(body.file))
+        if isinstance(body, ModalBody | SidBody) and body.file is not None
+        else body
+        for body in scene.bodies
+    )
+    return msgspec.structs.replace(scene, bodies=bodies)
+
+
+def _sparse(value: Any) -> Any:
+    """A struct as a dict of its tag and whatever differs from the default; tuples and lists of them alike."""
+    if isinstance(value, msgspec.Struct):
+        config = value.__struct_config__
+        table: dict[str, Any] = {str(config.tag_field): config.tag} if config.tag is not None else {}
+        for field in msgspec.structs.fields(value):
+            item = getattr(value, field.name)
+            if field.required or item != field.default:
+                table[field.encode_name] = _sparse(item)
+        return table
+    if isinstance(value, list | tuple):
+        return [_sparse(item) for item in value]
+    return plain(value)
+
+
+def _is_tables(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and isinstance(value[0], dict)
+
+
+def _value(value: Any, used: int, indent: str = "") -> str:
+    """One TOML value, inline; `used` characters of its line are taken already."""
+    match value:
+        case bool():
+            return "true" if value else "false"
+        case int() | float():
+            return repr(value)
+        case str():
+            return _string(value)
+        case dict():
+            return "{ " + ", ".join(f"{key} = {_value(item, 0)}" for key, item in value.items()) + " }"
+        case list():
+            # An inline table may not hold a line break, so only arrays outside of one are broken up: used > 0 there.
+            flat = "[" + ", ".join(_value(item, 0) for item in value) + "]"
+            if used == 0 or used + len(flat) <= LINE or not any(isinstance(item, list | dict) for item in value):
+                return flat
+            deeper = indent + "  "
+            lines = [deeper + _value(item, len(deeper) if isinstance(item, list) else 0, deeper) for item in value]
+            return "[\n" + ",\n".join(lines) + ",\n" + indent + "]"
+    raise TypeError(f"TOML has no place for a {type(value).__name__}")
+
+
+def _string(text: str) -> str:
+    """A basic TOML string: JSON's escapes are TOML's, but for DEL. Several lines stay several lines."""
+    lines = [json.dumps(line, ensure_ascii=False)[1:-1].replace("\x7f", "\\u007f") for line in text.split("\n")]
+    return f'"{lines[0]}"' if len(lines) == 1 else '"""\n' + "\n".join(lines) + '"""'

@@ -1,0 +1,136 @@
+"""The arrays of a raw points-and-modes body, whether they stand in the scene or in an `.npz` beside it."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+from zipfile import BadZipFile
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flexmb.scene.bodies import InertiaPoint, ModalBody
+from flexmb.scene.convert import plain, to_struct
+
+Array = NDArray[np.float64]
+
+
+class ModalArrays(NamedTuple):
+    """n points, m modes: mass (n,) kg, position (n,3) m, translation_modes and rotation_modes (n,3,m), inertia (n,3,3)
+    kg m² about the point's mass centre, com_offset (n,3) m, stiffness and damping (m,m)."""
+
+    mass: Array
+    position: Array
+    translation_modes: Array
+    rotation_modes: Array
+    inertia: Array
+    com_offset: Array
+    stiffness: Array
+    damping: Array
+
+
+REQUIRED = ("mass", "position", "translation_modes")
+
+
+def modal_arrays(body: ModalBody) -> ModalArrays:
+    """Arrays of `body` with zeros for whatever is optional and not given.
+
+    Raises OSError where the file cannot be read, and ValueError naming an array that is missing or has a wrong shape.
+    """
+    given = _from_file(body.file) if body.file is not None else _from_points(body.points)
+    for name, matrix in (("stiffness", body.stiffness), ("damping", body.damping)):
+        if matrix:
+            if name in given:
+                raise ValueError(f'"{name}" is given in the scene and in "{body.file}"')
+            given[name] = _array(name, matrix)
+    return _shaped(given)
+
+
+def inertia_points(
+    mass: ArrayLike,
+    position: ArrayLike,
+    translation_modes: ArrayLike,
+    rotation_modes: ArrayLike | None = None,
+    inertia: ArrayLike | None = None,
+    com_offset: ArrayLike | None = None,
+) -> tuple[InertiaPoint, ...]:
+    """Inertia points of a scene from arrays in the layout of the `.npz` (see ModalArrays).
+
+    ValueError names an array with a wrong shape.
+    """
+    optional = {"rotation_modes": rotation_modes, "inertia": inertia, "com_offset": com_offset}
+    given = {"mass": mass, "position": position, "translation_modes": translation_modes}
+    given |= {name: value for name, value in optional.items() if value is not None}
+    arrays = _shaped({name: _array(name, value) for name, value in given.items()})
+    points = []
+    for j in range(len(arrays.mass)):
+        point = {
+            "mass_kg": arrays.mass[j],
+            "position_m": arrays.position[j],
+            "translation_modes": arrays.translation_modes[j].T,
+            "rotation_modes": arrays.rotation_modes[j].T if rotation_modes is not None else (),
+            "inertia_kg_m2": arrays.inertia[j],
+            "com_offset_m": arrays.com_offset[j],
+        }
+        points.append(to_struct(plain(point), InertiaPoint))
+    return tuple(points)
+
+
+def _from_file(file: str) -> dict[str, Array]:
+    try:
+        archive = np.load(file, allow_pickle=False)
+    except (BadZipFile, EOFError, ValueError):
+        raise ValueError(f'"{file}" is not an .npz archive of plain arrays') from None
+    if not isinstance(archive, np.lib.npyio.NpzFile):
+        raise ValueError(f'"{file}" holds one array: save the arrays by name with numpy.savez')
+    with archive:
+        return {name: _array(name, archive[name]) for name in archive.files}
+
+
+def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Array]:
+    if not points:
+        return {}
+    given = {
+        "mass": _array("mass_kg", [p.mass_kg for p in points]),
+        "position": _array("position_m", [p.position_m for p in points]),
+        "translation_modes": _modes("translation_modes", [p.translation_modes for p in points]),
+        "inertia": _array("inertia_kg_m2", [p.inertia_kg_m2 for p in points]),
+        "com_offset": _array("com_offset_m", [p.com_offset_m for p in points]),
+    }
+    if any(p.rotation_modes for p in points):
+        none = ((0.0, 0.0, 0.0),) * given["translation_modes"].shape[2]
+        given["rotation_modes"] = _modes("rotation_modes", [p.rotation_modes or none for p in points])
+    return given
+
+
+def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> Array:
+    """Mode shapes listed per point and mode (n,m,3) as (n,3,m)."""
+    counts = sorted({len(modes) for modes in listed})
+    if len(counts) > 1:
+        raise ValueError(f'"{name}" has {counts[0]} modes at one point and {counts[-1]} at another')
+    return np.asarray(listed, dtype=np.float64).reshape(len(listed), counts[0], 3).transpose(0, 2, 1)
+
+
+def _array(name: str, value: ArrayLike) -> Array:
+    try:
+        return np.asarray(value, dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError(f'"{name}" is not a full array of numbers: its rows differ in length') from None
+
+
+def _shaped(given: dict[str, Array]) -> ModalArrays:
+    missing = [name for name in REQUIRED if name not in given]
+    if missing:
+        raise ValueError(f'"{missing[0]}" is missing')
+    n = given["mass"].shape[0] if given["mass"].ndim else 0
+    m = given["translation_modes"].shape[-1] if given["translation_modes"].ndim else 0
+    shapes = {
+        "mass": (n,), "position": (n, 3), "translation_modes": (n, 3, m), "rotation_modes": (n, 3, m),
+        "inertia": (n, 3, 3), "com_offset": (n, 3), "stiffness": (m, m), "damping": (m, m),
+    }  # fmt: skip
+    unknown = sorted(given.keys() - shapes.keys())
+    if unknown:
+        raise ValueError(f'"{unknown[0]}" is not one of {", ".join(shapes)}')
+    for name, array in given.items():
+        if array.shape != shapes[name]:
+            raise ValueError(f'"{name}" has shape {array.shape}, expected {shapes[name]} (n={n} points, m={m} modes)')
+    return ModalArrays(*(given.get(name, np.zeros(shape)) for name, shape in shapes.items()))
