@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.modal.cross import cross_matrix
 from flexmb.modal.interpolation import BendingField, LineField, Mesh
 from flexmb.modal.section import SectionTable, section_table
 from flexmb.modal.stations import Lump, Stations, quadrature
@@ -138,13 +139,8 @@ def beam_elements(body: BeamBody) -> BeamElements:
 
 def lump_mass(lump: Lump) -> Array:
     """Mass matrix (6,6) of a lump for [displacement; rotation] of its axis point."""
-    c = skew(lump.com)
+    c = cross_matrix(lump.com)
     return np.block([[lump.mass * np.eye(3), -lump.mass * c], [lump.mass * c, lump.inertia - lump.mass * c @ c]])
-
-
-def skew(a: Array) -> Array:
-    """Cross-product matrix: skew(a) b = a x b."""
-    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
 
 
 def _plane_stiffness(table: SectionTable, family: str) -> tuple[Array, Array | None]:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.modal.cross import cross_matrix
 from flexmb.modal.model import FlexibleModel
 
 Array = NDArray[np.float64]
@@ -96,14 +97,6 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
         stiffness=model.stiffness,
         damping=model.damping,
     )
-
-
-def cross_matrix(a: Array) -> Array:
-    """Cross-product matrices (..., 3, 3) of vectors (..., 3): cross_matrix(a) b = a x b."""
-    zero = np.zeros_like(a[..., 0])
-    x, y, z = a[..., 0], a[..., 1], a[..., 2]
-    rows = [[zero, -z, y], [z, zero, -x], [-y, x, zero]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
 def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:

@@ -52,19 +52,16 @@ def section_points(elements: BeamElements, columns: Array, stations: Stations) -
     a = np.sqrt(stations.inertia_z / stations.mass)
     b = np.sqrt(stations.inertia_y / stations.mass)
     corners = [(1.0, 1.0), (1.0, -1.0), (-1.0, -1.0), (-1.0, 1.0)]
-    return join([
-        _massy(elements, columns, stations.x, np.column_stack([0.0 * a, sy * a, sz * b]), stations.mass / 4.0)
-        for sy, sz in corners
-    ])  # fmt: skip
+    offsets = [np.column_stack([np.zeros_like(a), sy * a, sz * b]) for sy, sz in corners]
+    return join([_massy(elements, columns, stations.x, offset, stations.mass / 4.0) for offset in offsets])
 
 
 def turning_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
     """A lump as one point of the axis with mass-centre offset and turning inertia."""
     x = np.array([lump.x])
     moved = elements.motion(x, columns)
-    return Points(
-        np.array([lump.mass]), _on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:]
-    )  # fmt: skip
+    mass = np.array([lump.mass])
+    return Points(mass, _on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:])
 
 
 def massy_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:

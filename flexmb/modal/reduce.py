@@ -16,7 +16,8 @@ Array = NDArray[np.float64]
 
 # A direction whose share of the mass is below this many round-offs of the largest has no inertia: its frequency is
 # infinite, so it is never among the lowest.
-_MASSLESS = 64 * np.finfo(float).eps
+# The same share of coupling between families is none.
+_ROUND_OFF = 64 * np.finfo(float).eps
 
 
 @dataclass(frozen=True)
@@ -88,10 +89,10 @@ def _order(mode: tuple[float, int, Array]) -> tuple[float, int]:
 
 
 def _parts(elements: BeamElements, K: Array, M: Array, clamped: bool) -> list[_Part]:
-    """Groups of families coupled by K or M, in the order of their first family; those without inertia are left out."""
+    """Groups of families that M couples (K couples none), in order; those without inertia are left out."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
-    coupled = np.array([[bool(np.any(M[a, b])) for b in blocks] for a in blocks])
+    coupled = np.array([[_coupled(M[a, b], M[a, a], M[b, b]) for b in blocks] for a in blocks])
     _, label = connected_components(coupled, directed=False)
     free = np.ones(elements.size, dtype=bool)
     if clamped:
@@ -108,6 +109,11 @@ def _parts(elements: BeamElements, K: Array, M: Array, clamped: bool) -> list[_P
         rigid = np.zeros((len(index), 0)) if clamped else elements.rigid()[index]
         parts.append(_part(index, k, m, rigid[:, np.any(rigid, axis=0)]))
     return parts
+
+
+def _coupled(M_ab: Array, M_aa: Array, M_bb: Array) -> bool:
+    """Whether two blocks of the mass matrix are coupled by more than the round-off of a lump's position."""
+    return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
 
 
 def _part(index: NDArray[np.intp], K: Array, M: Array, rigid: Array) -> _Part:
@@ -152,7 +158,7 @@ def _with_attachment(
 
 def _mass_normalised(compliance: Array, columns: Array, M: Array) -> list[tuple[float, Array]]:
     """(omega, column with unit modal mass) for each compliance 1/omega^2 that is not round-off."""
-    kept = compliance > _MASSLESS * max(compliance.max(), 0.0)
+    kept = compliance > _ROUND_OFF * max(compliance.max(), 0.0)
     columns = columns[:, kept]
     scale = 1.0 / np.sqrt(np.einsum("im,ij,jm->m", columns, M, columns))
     return [(float(1.0 / np.sqrt(c)), column) for c, column in zip(compliance[kept], (columns * scale).T, strict=True)]

@@ -16,7 +16,7 @@ Array = NDArray[np.float64]
 class SectionTable:
     """Stations of a beam, sorted along x (m); before the first and beyond the last the section stays constant.
 
-    EA N; EIy, EIz, GJ N m^2; GAy, GAz N (None for Euler-Bernoulli); mass kg/m; rotary_y, rotary_z (rho Iy, rho Iz) kg m.
+    EA N; EIy, EIz, GJ N m^2; GAy, GAz N (None for Euler-Bernoulli); mass kg/m; rotary (rho Iy, rho Iz) kg m.
     Two stations at the same x make a jump.
     """
 
