@@ -108,6 +108,8 @@ def _value(value: Any, used: int, indent: str = "") -> str:
             return repr(value)
         case str():
             return _string(value)
+        case dict() if not value:
+            return "{}"
         case dict():
             return "{ " + ", ".join(f"{key} = {_value(item, 0)}" for key, item in value.items()) + " }"
         case list():

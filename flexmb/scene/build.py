@@ -1,0 +1,364 @@
+"""Writing a scene in Python: a fluent builder that appends the schema's structs.
+
+Argument names are the schema's keys without their unit; every value is SI, quaternions are scalar-first, unit, and map
+outboard components to inboard ones. Arrays are welcome wherever tuples are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Self, TypedDict, Unpack, get_args, get_type_hints
+
+import msgspec
+from numpy.typing import ArrayLike
+
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import IDENTITY, ZERO
+from flexmb.scene.check import check_scene
+from flexmb.scene.convert import ROOT, label, plain, to_struct
+from flexmb.scene.hinges import Z_AXIS
+from flexmb.scene.problems import closest
+from flexmb.scene.units import split_unit
+
+AT_REST = s.AngularCoordinate()
+IN_PLACE = s.LinearCoordinate()
+
+
+class Placement(TypedDict, total=False):
+    """Where a hinge sits: nodes of parent and child, and the hinge frames' fixed offsets from them (node axes, m)."""
+
+    parent_node: str
+    child_node: str
+    parent_position: ArrayLike
+    parent_quaternion: ArrayLike
+    child_position: ArrayLike
+    child_quaternion: ArrayLike
+
+
+class Angle(TypedDict, total=False):
+    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad),
+    `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time."""
+
+    angle: float
+    rate: float
+    stiffness: float
+    damping: float
+    rest: float
+    torque: s.Function | None
+    prescribed: s.Function | None
+
+
+class Displacement(TypedDict, total=False):
+    """A linear coordinate: initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m),
+    `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of time."""
+
+    position: float
+    rate: float
+    stiffness: float
+    damping: float
+    rest: float
+    force: s.Function | None
+    prescribed: s.Function | None
+
+
+def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
+    """A schema struct from values named without units; SceneError (at `place`) where a value has a wrong type."""
+    keys = {split_unit(key)[0]: key for key in kind.__struct_fields__}
+    for name in values:
+        if name not in keys:
+            raise TypeError(f'a {kind.__name__} has no "{name}": {closest(name, keys)}')
+    return to_struct(plain({keys[name]: value for name, value in values.items()}), kind, place=place)
+
+
+def angular(**angle: Unpack[Angle]) -> s.AngularCoordinate:
+    """One angle of a hinge with several coordinates, for example ``universal(..., first=angular(rate=2.0))``."""
+    return make(s.AngularCoordinate, **angle)
+
+
+def linear(**displacement: Unpack[Displacement]) -> s.LinearCoordinate:
+    """One displacement of a hinge with several coordinates, or of a point mass."""
+    return make(s.LinearCoordinate, **displacement)
+
+
+def _collections() -> dict[type, str]:
+    """The scene's collection each kind of struct is appended to, read from the schema."""
+    table = {}
+    for key, hint in get_type_hints(s.Scene).items():
+        for item in get_args(hint):
+            for kind in get_args(item) or (item,):
+                if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+                    table[kind] = key
+    return table
+
+
+COLLECTIONS = _collections()
+
+
+class SceneBuilder:
+    """Collects bodies, hinges and what acts on them; every method returns the builder, `scene()` the checked Scene.
+
+    >>> pendulum = (
+    ...     SceneBuilder("pendulum", gravity=(0, 0, -9.81))
+    ...     .rigid_body("arm", mass=1.0, com=(0.5, 0, 0), inertia=(0.01, 0.1, 0.1))
+    ...     .revolute("pivot", "ground", "arm", axis=(0, 1, 0), angle=0.3)
+    ...     .marker("end", "arm", offset=(1, 0, 0))
+    ...     .scene()
+    ... )
+    """
+
+    def __init__(self, name: str, *, gravity: ArrayLike = ZERO, description: str = "") -> None:
+        """`gravity`: uniform acceleration (m/s²) in World axes."""
+        self._head: dict[str, Any] = {"name": name, "description": description, "gravity_m_s2": plain(gravity)}
+        self._lists: dict[str, list[msgspec.Struct]] = {key: [] for key in COLLECTIONS.values()}
+
+    def add(self, *structs: msgspec.Struct) -> Self:
+        """Append schema structs of any kind: bodies, hinges, wheels, loads, markers ..."""
+        for struct in structs:
+            if type(struct) not in COLLECTIONS:
+                names = ", ".join(sorted(kind.__name__ for kind in COLLECTIONS))
+                raise TypeError(f"a {type(struct).__name__} is not a part of a scene by itself; these are: {names}")
+            self._lists[COLLECTIONS[type(struct)]].append(struct)
+        return self
+
+    def scene(self, *, t_end: float | None = None) -> s.Scene:
+        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs."""
+        data = self._head | {key: plain(items) for key, items in self._lists.items()}
+        scene = to_struct(data, s.Scene)
+        check_scene(scene, t_end)
+        return scene
+
+    def _append(self, kind: type[msgspec.Struct], **values: Any) -> Self:
+        key = COLLECTIONS[kind]
+        place = ROOT.key(key, len(self._lists[key])).named(label(key, values))
+        return self.add(make(kind, place, **values))
+
+    # Bodies
+
+    def rigid_body(
+        self, name: str, *, mass: float, inertia: ArrayLike, com: ArrayLike = ZERO,
+        nodes: Mapping[str, ArrayLike] | Sequence[s.Node] = (),
+    ) -> Self:  # fmt: skip
+        """A rigid body of `mass` (kg) with centre of mass `com` (m, body frame).
+
+        `inertia` (kg m²): 3x3 about the centre of mass in body axes, or the three principal moments. `nodes`: names and
+        positions (m), or Node structs where a node is turned.
+        """
+        tensor = plain(inertia)
+        if len(tensor) == 3 and all(isinstance(moment, float | int) for moment in tensor):
+            tensor = [[tensor[i] if i == j else 0.0 for j in range(3)] for i in range(3)]
+        if isinstance(nodes, Mapping):
+            nodes = [make(s.Node, name=node, position=position) for node, position in nodes.items()]
+        return self._append(s.RigidBody, name=name, mass=mass, inertia=tensor, com=com, nodes=nodes)
+
+    def beam(
+        self, name: str, *, length: float, elements: int, section: s.BeamStation | Sequence[s.BeamStation],
+        modes: int | s.Modes, level: s.Level = "full",
+        theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli",
+        mass: Literal["consistent", "lumped"] = "consistent",
+        points: Literal["line", "rotary", "section"] = "section",
+        tip_masses: Sequence[s.TipMass] = (), nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
+    ) -> Self:  # fmt: skip
+        """A beam along +x of `length` (m), root at the body origin.
+
+        `section`: one BeamStation for a uniform beam (see `beam_section`), or stations from 0 to `length`. `modes`: how
+        many clamped-free modes, or a Modes struct. `nodes`: names and stations (m); "root" and "tip" exist anyway.
+        """
+        if isinstance(section, s.BeamStation):
+            section = [msgspec.structs.replace(section, x_m=x) for x in (0.0, length)]
+        if isinstance(modes, int):
+            modes = s.Modes(count=modes)
+        if isinstance(nodes, Mapping):
+            nodes = [make(s.BeamNode, name=node, x=x) for node, x in nodes.items()]
+        return self._append(
+            s.BeamBody, name=name, length=length, elements=elements, stations=section, modes=modes, level=level,
+            theory=theory, mass=mass, points=points, tip_masses=tip_masses, nodes=nodes,
+        )  # fmt: skip
+
+    def modal_body(
+        self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
+        stiffness: ArrayLike = (), damping: ArrayLike = (),
+        boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
+        nodes: Sequence[s.ModalNode] = (),
+    ) -> Self:  # fmt: skip
+        """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
+
+        `stiffness`, `damping`: modal matrices (m,m), if the file does not hold them.
+        """
+        return self._append(
+            s.ModalBody, name=name, points=points, file=file, stiffness=stiffness, damping=damping, boundary=boundary,
+            level=level, nodes=nodes,
+        )  # fmt: skip
+
+    def sid_body(self, name: str, *, file: str, level: s.Level = "full") -> Self:
+        """A flexible body from a Standard Input Data file."""
+        return self._append(s.SidBody, name=name, file=file, level=level)
+
+    # Hinges
+
+    def weld(self, name: str, parent: str, child: str, **placement: Unpack[Placement]) -> Self:
+        """No freedom between `parent` ("ground" for the inertial frame) and `child`."""
+        return self._append(s.Weld, name=name, parent=parent, child=child, **placement)
+
+    def revolute(
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, angle: float = 0.0, rate: float = 0.0,
+        stiffness: float = 0.0, damping: float = 0.0, rest: float = 0.0, torque: s.Function | None = None,
+        prescribed: s.Function | None = None, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """One rotation about the unit vector `axis` (inboard hinge axes).
+
+        Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
+        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time.
+        """
+        rotation = angular(
+            angle=angle, rate=rate, stiffness=stiffness, damping=damping, rest=rest, torque=torque,
+            prescribed=prescribed,
+        )  # fmt: skip
+        return self._append(
+            s.Revolute, name=name, parent=parent, child=child, axis=axis, rotation=rotation, **placement
+        )
+
+    def prismatic(
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, position: float = 0.0, rate: float = 0.0,
+        stiffness: float = 0.0, damping: float = 0.0, rest: float = 0.0, force: s.Function | None = None,
+        prescribed: s.Function | None = None, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """One translation along the unit vector `axis` (inboard hinge axes).
+
+        Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor
+        `force` (N) or `prescribed` displacement (m) as functions of time.
+        """
+        translation = linear(
+            position=position, rate=rate, stiffness=stiffness, damping=damping, rest=rest, force=force,
+            prescribed=prescribed,
+        )  # fmt: skip
+        return self._append(
+            s.Prismatic, name=name, parent=parent, child=child, axis=axis, translation=translation, **placement
+        )
+
+    def cylindrical(
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, rotation: s.AngularCoordinate = AT_REST,
+        translation: s.LinearCoordinate = IN_PLACE, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Rotation about and translation along the unit vector `axis`; see `angular` and `linear`."""
+        return self._append(
+            s.Cylindrical, name=name, parent=parent, child=child, axis=axis, rotation=rotation, translation=translation,
+            **placement,
+        )  # fmt: skip
+
+    def universal(
+        self, name: str, parent: str, child: str, *, first: s.AngularCoordinate = AT_REST,
+        second: s.AngularCoordinate = AT_REST, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Rotation about x of the inboard frame, then about the carried y; see `angular`."""
+        return self._append(
+            s.Universal, name=name, parent=parent, child=child, first=first, second=second, **placement
+        )
+
+    def gimbal(
+        self, name: str, parent: str, child: str, *, sequence: str = "xyz",
+        rotations: Sequence[s.AngularCoordinate] | None = None, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Two or three successive rotations about carried axes, for example "zxz"; one `angular` each."""
+        rotations = (AT_REST,) * len(sequence) if rotations is None else rotations
+        return self._append(
+            s.Gimbal, name=name, parent=parent, child=child, sequence=sequence, rotations=rotations, **placement
+        )
+
+    def spherical(
+        self, name: str, parent: str, child: str, *, quaternion: ArrayLike = IDENTITY,
+        angular_velocity: ArrayLike = ZERO, stiffness: float = 0.0, damping: float = 0.0,
+        **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Three rotations: initial `quaternion`, relative `angular_velocity` (rad/s, outboard axes), spring `stiffness`
+        (N m/rad) and `damping` (N m s/rad)."""
+        return self._append(
+            s.Spherical, name=name, parent=parent, child=child, quaternion=quaternion,
+            angular_velocity=angular_velocity, stiffness=stiffness, damping=damping, **placement,
+        )  # fmt: skip
+
+    def planar(
+        self, name: str, parent: str, child: str, *, x: s.LinearCoordinate = IN_PLACE,
+        y: s.LinearCoordinate = IN_PLACE, rotation: s.AngularCoordinate = AT_REST, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Translation in the x-y plane of the inboard frame, then rotation about z; see `linear` and `angular`."""
+        return self._append(
+            s.Planar, name=name, parent=parent, child=child, x=x, y=y, rotation=rotation, **placement
+        )
+
+    def free(
+        self, name: str, parent: str, child: str, *, position: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY,
+        angular_velocity: ArrayLike = ZERO, velocity: ArrayLike = ZERO, **placement: Unpack[Placement],
+    ) -> Self:  # fmt: skip
+        """Six freedoms: initial `position` (m, inboard axes), `quaternion`, and relative `angular_velocity` (rad/s) and
+        `velocity` (m/s) of the outboard origin, both in outboard axes."""
+        return self._append(
+            s.Free, name=name, parent=parent, child=child, position=position, quaternion=quaternion,
+            angular_velocity=angular_velocity, velocity=velocity, **placement,
+        )  # fmt: skip
+
+    # What acts on the tree, and what is asked of it
+
+    def wheel(
+        self, name: str, body: str, *, axis: ArrayLike, mass: float, axial_inertia: float, transverse_inertia: float,
+        node: str = "origin", offset: ArrayLike = ZERO, angle: float = 0.0, speed: float = 0.0, friction: float = 0.0,
+        torque: s.Function | None = None, prescribed: s.Function | None = None,
+    ) -> Self:  # fmt: skip
+        """A symmetric wheel at a node plus `offset` (m), spinning about the unit vector `axis` (node axes).
+
+        `mass` (kg), `axial_inertia` and `transverse_inertia` (kg m²), initial `angle` (rad) and `speed` (rad/s),
+        `friction` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad). The body's mass excludes the wheel.
+        """
+        return self._append(
+            s.Wheel, name=name, body=body, node=node, offset=offset, axis=axis, mass=mass, axial_inertia=axial_inertia,
+            transverse_inertia=transverse_inertia, angle=angle, speed=speed, friction=friction, torque=torque,
+            prescribed=prescribed,
+        )  # fmt: skip
+
+    def point_mass(
+        self, name: str, body: str, *, mass: float, node: str = "origin", offset: ArrayLike = ZERO,
+        directions: Sequence[ArrayLike] = (), coordinates: Sequence[s.LinearCoordinate] = (),
+    ) -> Self:  # fmt: skip
+        """A point mass (kg) at a node plus `offset` (m), free along orthonormal `directions` (node axes).
+
+        `coordinates`: one `linear` for each direction, at rest and without spring if not given.
+        """
+        return self._append(
+            s.PointMass, name=name, body=body, node=node, offset=offset, mass=mass, directions=directions,
+            coordinates=coordinates,
+        )  # fmt: skip
+
+    def force(
+        self, name: str, body: str, *, direction: ArrayLike, function: s.Function, node: str = "origin",
+        frame: Literal["world", "node"] = "world",
+    ) -> Self:  # fmt: skip
+        """A force (N) at a node: unit vector `direction`, in World or in turning node axes, times `function`."""
+        return self._append(
+            s.Load, name=name, body=body, node=node, type="force", direction=direction, frame=frame, function=function
+        )
+
+    def torque(
+        self, name: str, body: str, *, direction: ArrayLike, function: s.Function, node: str = "origin",
+        frame: Literal["world", "node"] = "world",
+    ) -> Self:  # fmt: skip
+        """A torque (N m) at a node: unit vector `direction`, in World or in turning node axes, times `function`."""
+        return self._append(
+            s.Load, name=name, body=body, node=node, type="torque", direction=direction, frame=frame, function=function
+        )
+
+    def marker(self, name: str, body: str, *, node: str = "origin", offset: ArrayLike = ZERO) -> Self:
+        """A frame whose motion is an output: a node plus `offset` (m, node axes)."""
+        return self._append(s.Marker, name=name, body=body, node=node, offset=offset)
+
+    def modal_state(self, body: str, *, coordinates: ArrayLike, rates: ArrayLike = ()) -> Self:
+        """Initial modal coordinates and rates (1/s) of a flexible body."""
+        return self._append(s.ModalState, body=body, coordinates=coordinates, rates=rates)
+
+    def closure(
+        self, name: str,
+        type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
+        body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin", axis: ArrayLike = Z_AXIS,
+    ) -> Self:  # fmt: skip
+        """A loop closure between nodes of two bodies of the tree."""
+        return self._append(
+            s.Closure, name=name, type=type, body_a=body_a, node_a=node_a, body_b=body_b, node_b=node_b, axis=axis
+        )

@@ -1,0 +1,45 @@
+"""Is a scene one that can be simulated? Every defect is found before anything runs, with its place and its remedy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import isfinite
+
+from flexmb.scene.check.beams import beams
+from flexmb.scene.check.hinges import hinges, point_masses, wheels
+from flexmb.scene.check.inertia import rigid_bodies
+from flexmb.scene.check.modal import modal_bodies, modal_states
+from flexmb.scene.check.names import references, unique_names
+from flexmb.scene.check.outboard import moved_inertia
+from flexmb.scene.check.profiles import functions
+from flexmb.scene.check.topology import tree
+from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
+from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.problems import Problem, SceneError
+from flexmb.scene.schema import Scene
+
+EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
+STRUCTURE = (unique_names, references, tree)
+PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, wheels, point_masses)
+
+
+def check_scene(scene: Scene, t_end: float | None = None) -> None:
+    """Raise SceneError with all problems of a scene, or return. With `t_end` (s) profiles must cover the run.
+
+    Loop closures, SID bodies and every fidelity level pass: whether they can be run is for `compile` to say.
+    """
+    to_struct(plain(scene), Scene)  # a struct built by hand may hold values of any type
+    problems = [*_run_time(t_end), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]
+    problems += functions(scene, t_end)
+    if not problems:  # needs sound numbers, names and a tree to stand on
+        problems += moved_inertia(scene)
+    if problems:
+        raise SceneError(scene.name, problems)
+
+
+def _run_time(t_end: float | None) -> Iterator[Problem]:
+    if t_end is not None and not (isfinite(t_end) and t_end > 0.0):
+        yield Problem("t_end", f"the run ends at {t_end} s", "give a positive, finite time")
+
+
+__all__ = ["Problem", "SceneError", "check_scene"]

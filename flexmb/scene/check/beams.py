@@ -1,0 +1,136 @@
+"""Beams: a mesh, sections that cover the length, materials that exist, and modes that the elements can provide."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import sqrt
+
+from flexmb.scene.bodies import BeamBody, Modes
+from flexmb.scene.check import inertia
+from flexmb.scene.check.walk import sound
+from flexmb.scene.problems import Place, Problem
+from flexmb.scene.schema import Scene
+
+# Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. Wider than any structure
+# that is built, and the soft benchmark beams of the literature (100 m/s) are inside.
+WAVE_SPEED = (50.0, 20_000.0)  # m/s
+STIFFNESS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
+SHEAR = ("GAy_N", "GAz_N")
+
+
+def beams(scene: Scene) -> Iterator[Problem]:
+    """Problems of every beam body."""
+    for place, body in sound(scene, "bodies"):
+        if isinstance(body, BeamBody):
+            yield from _mesh(place, body)
+            yield from _stations(place, body)
+            yield from _along(place, body)
+            yield from _modes(place.key("modes"), body)
+
+
+def mode_count(body: BeamBody) -> int:
+    """Modal coordinates of a beam: eigenmodes, and the attachment modes of the families that have inertia."""
+    return body.modes.count + (_attachments(body) if body.modes.static else 0)
+
+
+def _mesh(place: Place, body: BeamBody) -> Iterator[Problem]:
+    if body.length_m <= 0.0:
+        yield Problem(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
+    if body.elements < 1:
+        yield Problem(str(place.key("elements")), f"{body.elements} elements", "use one element at least")
+
+
+def _stations(place: Place, body: BeamBody) -> Iterator[Problem]:
+    positions = [station.x_m for station in body.stations]
+    spot = place.key("stations")
+    if any(left > right for left, right in zip(positions, positions[1:], strict=False)):
+        yield Problem(str(spot), "the stations are not in order", "sort them by x_m")
+    elif len(positions) < 2 or positions[0] != 0.0 or positions[-1] != body.length_m:
+        covered = f"{positions[0]:g} m to {positions[-1]:g} m" if positions else "nothing"
+        remedy = f"give the section at x_m = 0 and at x_m = {body.length_m!r}; a uniform beam has the same one twice"
+        yield Problem(str(spot), f"the stations cover {covered}, the beam 0 m to {body.length_m:g} m", remedy)
+    for i, station in enumerate(body.stations):
+        for key in (*STIFFNESS, "mass_per_length_kg_m"):
+            if (value := getattr(station, key)) <= 0.0:
+                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
+        for key in ("rotary_y_kg_m", "rotary_z_kg_m"):
+            if (value := getattr(station, key)) < 0.0:
+                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a rotary inertia of at least zero")
+        for key in SHEAR:
+            value = getattr(station, key)
+            if body.theory == "timoshenko" and value is None:
+                yield Problem(str(spot.key(i)), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
+            elif value is not None and value <= 0.0:
+                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
+        if station.EA_N > 0.0 and station.mass_per_length_kg_m > 0.0:
+            speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
+            if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
+                what = f"waves would run along the beam at {speed:.3g} m/s: no material does that"
+                remedy = (
+                    f"check the units of EA_N (N) and mass_per_length_kg_m (kg/m), a factor of 1000 for instance: "
+                    f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
+                )
+                yield Problem(str(spot.key(i, "EA_N")), what, remedy)
+
+
+def _along(place: Place, body: BeamBody) -> Iterator[Problem]:
+    for key in ("nodes", "tip_masses"):
+        for i, item in enumerate(getattr(body, key)):
+            if not 0.0 <= item.x_m <= body.length_m:
+                what = f"x_m = {item.x_m:g} m is not on the beam"
+                yield Problem(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
+    for i, lump in enumerate(body.tip_masses):
+        yield from inertia.mass(place.key("tip_masses", i, "mass_kg"), lump.mass_kg, zero=False)
+        yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2)
+
+
+def _modes(place: Place, body: BeamBody) -> Iterator[Problem]:
+    modes = body.modes
+    if not modes.families or len(set(modes.families)) < len(modes.families):
+        yield Problem(str(place.key("families")), f"the families are {modes.families}", "list each wanted family once")
+    if modes.count < 1:
+        yield Problem(str(place.key("count")), f"{modes.count} modes", 'give one at least, or make the level "rigid"')
+    elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
+        what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
+        yield Problem(str(place.key("count")), what, "use more elements, more families, or fewer modes")
+    if modes.static and modes.boundary == "free-free":
+        remedy = "attachment modes need a clamped root: leave static out, or use clamped-free"
+        yield Problem(str(place.key("static")), "static modes of a free-free beam", remedy)
+    yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
+
+
+def _damping(place: Place, modes: Modes, count: int) -> Iterator[Problem]:
+    ratios = modes.damping_ratio
+    if isinstance(ratios, tuple) and len(ratios) != count:
+        what = f"{len(ratios)} damping ratios for {count} modes"
+        yield Problem(str(place), what, "give one ratio for all modes, or one for each")
+    if any(ratio < 0.0 for ratio in (ratios if isinstance(ratios, tuple) else (ratios,))):
+        yield Problem(str(place), "a negative damping ratio feeds energy into the mode", "give ratios of at least zero")
+
+
+def _attachments(body: BeamBody) -> int:
+    """Unit tip loads: one for axial and torsion, force and moment for each bending plane."""
+    counts = {"axial": 1, "torsion": 1 if _twisting_points(body) else 0, "bending_y": 2, "bending_z": 2}
+    return sum(counts[family] for family in body.modes.families)
+
+
+def _available(body: BeamBody) -> int:
+    """Coordinates with inertia of the wanted families.
+
+    A free-free beam has the root's in addition, but as many rigid motions, which are no modes.
+    """
+    bending = body.elements if body.mass == "lumped" and not _has_rotary(body) else 2 * body.elements
+    counts = {"axial": body.elements, "torsion": _twisting_points(body), "bending_y": bending, "bending_z": bending}
+    return sum(counts[family] for family in body.modes.families)
+
+
+def _twisting_points(body: BeamBody) -> int:
+    """Coordinates of torsion with inertia: every element's, or without rotary inertia those of lumps off the axis."""
+    if _has_rotary(body):
+        return body.elements
+    lumps = [lump for lump in body.tip_masses if lump.inertia_kg_m2[0][0] > 0.0 or any(lump.com_m[1:])]
+    return min(len(lumps), body.elements)
+
+
+def _has_rotary(body: BeamBody) -> bool:
+    return body.points != "line" and any(s.rotary_y_kg_m > 0.0 or s.rotary_z_kg_m > 0.0 for s in body.stations)

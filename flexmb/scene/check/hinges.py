@@ -1,0 +1,110 @@
+"""Coordinates of hinges, wheels and point masses: counts, springs, motors, prescribed motions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from flexmb.scene.bodies import _Strict
+from flexmb.scene.check import inertia
+from flexmb.scene.check.profiles import initial_motion
+from flexmb.scene.check.walk import UNIT_LENGTH, sound
+from flexmb.scene.hinges import AngularCoordinate, Gimbal
+from flexmb.scene.problems import Place, Problem
+from flexmb.scene.schema import Scene, Wheel
+from flexmb.scene.tree import Coordinate, coordinates
+
+NOT_NEGATIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
+
+
+def hinges(scene: Scene) -> Iterator[Problem]:
+    """Springs and dampers that dissipate or store, motors that can act, gimbal sequences that exist."""
+    for place, hinge in sound(scene, "hinges"):
+        yield from _springs(place, hinge)
+        yield from _coordinates(place, hinge)
+        if isinstance(hinge, Gimbal):
+            yield from _gimbal(place, hinge)
+
+
+def wheels(scene: Scene) -> Iterator[Problem]:
+    """A wheel has a possible inertia and either a motor or a prescribed spin."""
+    for place, wheel in sound(scene, "wheels"):
+        yield from inertia.mass(place.key("mass_kg"), wheel.mass_kg)
+        yield from _wheel_inertia(place, wheel)
+        yield from _springs(place, wheel)
+        yield from _drive(place, wheel, ("angle_rad", "speed_rad_s"), "torque_Nm", "prescribed_rad")
+
+
+def point_masses(scene: Scene) -> Iterator[Problem]:
+    """A point mass has mass, at most three orthogonal directions, and a coordinate for each if any."""
+    for place, item in sound(scene, "point_masses"):
+        yield from inertia.mass(place.key("mass_kg"), item.mass_kg, zero=False)
+        count = len(item.directions)
+        if count > 3:
+            yield Problem(str(place.key("directions")), f"{count} directions in space", "give three at most")
+        product = np.array(item.directions).reshape(-1, 3) @ np.array(item.directions).reshape(-1, 3).T
+        skew = np.abs(np.triu(product, 1)) > UNIT_LENGTH
+        for i, j in np.argwhere(skew):
+            what = f"directions {i} and {j} are not orthogonal: their product is {product[i, j]:.3g}"
+            yield Problem(str(place.key("directions")), what, "give orthonormal directions")
+        if item.coordinates and len(item.coordinates) != count:
+            what = f"{len(item.coordinates)} coordinates for {count} directions"
+            yield Problem(str(place.key("coordinates")), what, "give one coordinate for each direction, or none")
+        yield from _coordinates(place, item)
+
+
+def _springs(place: Place, item: _Strict) -> Iterator[Problem]:
+    for key in NOT_NEGATIVE:
+        value = getattr(item, key, 0.0)
+        if value < 0.0:
+            noun = key.split("_")[0]
+            yield Problem(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
+
+
+def _coordinates(place: Place, item: Any) -> Iterator[Problem]:
+    for name, coordinate in coordinates(item):
+        spot = Place(f"{place.path}.{name}", place.names)
+        yield from _springs(spot, coordinate)
+        yield from _drive(spot, coordinate, *_keys(coordinate))
+
+
+def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
+    if isinstance(coordinate, AngularCoordinate):
+        return ("angle_rad", "rate_rad_s"), "torque_Nm", "prescribed_rad"
+    return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
+
+
+def _drive(place: Place, item: _Strict, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
+    profile = getattr(item, motion)
+    if profile is None:
+        return
+    if getattr(item, motor) is not None:
+        what = f"{motor} on a prescribed coordinate cannot change the motion"
+        yield Problem(str(place.key(motor)), what, f"leave out {motor} or {motion}; the drive load is an output")
+    yield from initial_motion(place, item, keys, profile)
+
+
+def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Problem]:
+    sequence = hinge.sequence
+    if len(sequence) not in (2, 3) or set(sequence) - set("xyz"):
+        what = f'"{sequence}" is not a sequence of two or three axes'
+        yield Problem(str(place.key("sequence")), what, 'write two or three of x, y, z, for example "zxz"')
+    elif any(first == second for first, second in zip(sequence, sequence[1:], strict=False)):
+        what = f'"{sequence}" repeats an axis: two successive rotations about it are one'
+        yield Problem(str(place.key("sequence")), what, "let neighbouring axes differ")
+    if len(hinge.rotations) != len(sequence):
+        what = f'{len(hinge.rotations)} rotations for the {len(sequence)} axes of "{sequence}"'
+        yield Problem(str(place.key("rotations")), what, "give one rotation for each axis")
+
+
+def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Problem]:
+    axial, transverse = wheel.axial_inertia_kg_m2, wheel.transverse_inertia_kg_m2
+    if axial <= 0.0:
+        what = f"the axial inertia is {axial:g} kg m²"
+        yield Problem(str(place.key("axial_inertia_kg_m2")), what, "give a positive one: a wheel stores spin")
+    elif axial > 2.0 * transverse * (1.0 + inertia.PRINTED):
+        what = f"the axial inertia {axial:g} exceeds twice the transverse inertia {transverse:g} kg m²"
+        remedy = f"no wheel has this: the transverse inertia is {axial / 2.0:g} kg m² at least (a flat disc)"
+        yield Problem(str(place.key("transverse_inertia_kg_m2")), what, remedy)

@@ -1,0 +1,199 @@
+"""Raw modal bodies: complete arrays, stiffness and modes that a structure can have; initial modal states."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import pi, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
+from flexmb.scene.check import inertia
+from flexmb.scene.check.beams import mode_count
+from flexmb.scene.check.walk import entries, sound
+from flexmb.scene.modal_data import ModalArrays, modal_arrays
+from flexmb.scene.problems import Place, Problem
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero at the clamp, this well
+# Lowest frequency times size (m/s). The upper end is the wave speed in the stiffest materials, which no body's first
+# mode reaches; the lower end is a kilometre of membrane at a microhertz.
+SPEED = (1e-3, 20_000.0)
+
+
+def modal_bodies(scene: Scene) -> Iterator[Problem]:
+    """Problems of every raw modal body."""
+    for place, body in sound(scene, "bodies"):
+        if isinstance(body, ModalBody):
+            arrays = yield from _read(place, body)
+            if arrays is not None:
+                yield from _points(place, body, arrays)
+                yield from _matrices(place, body, arrays)
+                yield from _shapes(place, body, arrays)
+
+
+def modal_states(scene: Scene) -> Iterator[Problem]:
+    """Initial modal coordinates belong to a flexible body and number as many as its modes."""
+    bodies = {body.name: body for body in scene.bodies}
+    for place, state in entries(scene, "modal_states"):
+        body = bodies.get(state.body)
+        if body is None or isinstance(body, SidBody):
+            continue
+        if isinstance(body, RigidBody) or body.level == "rigid":
+            yield Problem(str(place.key("body")), f'body "{body.name}" is rigid: it has no modes', "leave it out")
+            continue
+        count = mode_count(body) if isinstance(body, BeamBody) else _inline_modes(body)
+        for key, given, required in (("coordinates", state.coordinates, True), ("rates", state.rates, False)):
+            if count is not None and len(given) != count and (given or required):
+                what = f'{len(given)} modal {key} for the {count} modes of body "{body.name}"'
+                yield Problem(str(place.key(key)), what, f"give {count} values")
+
+
+def _inline_modes(body: ModalBody) -> int | None:
+    try:
+        return modal_arrays(body).translation_modes.shape[2]
+    except (OSError, ValueError):
+        return None  # reported with the body
+
+
+def _read(place: Place, body: ModalBody) -> Iterator[Problem]:
+    """Yields what is wrong with the data and returns its arrays, or None."""
+    if bool(body.points) == (body.file is not None):
+        what = "both points and file are given" if body.points else "neither points nor file is given"
+        yield Problem(str(place), what, "give the points inline, or the name of an .npz file")
+        return None
+    spot = place.key("file" if body.file is not None else "points")
+    try:
+        arrays = modal_arrays(body)
+    except OSError as error:
+        remedy = "put the file beside the scene file, or correct its name"
+        yield Problem(str(spot), f'cannot read "{body.file}": {error.strerror or error}', remedy)
+    except ValueError as error:
+        yield Problem(str(spot), str(error), "give arrays of the shapes that the reference of ModalBody lists")
+    else:
+        if all(np.all(np.isfinite(array)) for array in arrays):
+            return arrays
+        broken = next(name for name, array in arrays._asdict().items() if not np.all(np.isfinite(array)))
+        yield Problem(str(spot), f'"{broken}" holds a NaN or an infinity', "give finite numbers")
+    return None
+
+
+def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+    spot = place.key("file" if body.file is not None else "points")
+    for j, (mass, tensor) in enumerate(zip(arrays.mass, arrays.inertia, strict=True)):
+        point = spot.key(j) if body.file is None else spot.named(f"point {j}")
+        yield from inertia.mass(point, mass)
+        if np.any(tensor):
+            yield from inertia.tensor(point, tensor)
+    if not np.any(arrays.mass > 0.0):
+        yield Problem(str(spot), "the body has no mass", "give its points mass")
+
+
+def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+    m = arrays.translation_modes.shape[2]
+    if m == 0:
+        if body.level != "rigid":
+            yield Problem(str(place), "the body has no modes", 'make it a rigid body, or its level "rigid"')
+        return
+    if not np.any(arrays.stiffness):
+        yield Problem(str(place.key("stiffness")), "the modes have no stiffness", f"give the {m} x {m} modal stiffness")
+        return
+    for name, matrix in (("stiffness", arrays.stiffness), ("damping", arrays.damping)):
+        slack = PRINTED * float(np.max(np.abs(matrix)))
+        gap = np.abs(matrix - matrix.T)
+        if np.any(gap > slack):
+            i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
+            what = f"the {name} is not symmetric: [{i}][{j}] is {matrix[i, j]:g}, [{j}][{i}] is {matrix[j, i]:g}"
+            yield Problem(str(place.key(name)), what, "give a symmetric matrix")
+        elif (lowest := float(np.linalg.eigvalsh(matrix)[0])) < -slack:
+            what = f"the {name} is indefinite: its lowest eigenvalue is {lowest:.3g}"
+            yield Problem(str(place.key(name)), what, "give a positive semidefinite matrix: check its signs")
+
+
+def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+    m = arrays.translation_modes.shape[2]
+    for i, node in enumerate(body.nodes):
+        for key in ("translation_modes", "rotation_modes"):
+            if len(getattr(node, key)) != m:
+                what = f"{len(getattr(node, key))} shapes for {m} modes"
+                spot = place.key("nodes", i, key).named(f'node "{node.name}"')
+                yield Problem(str(spot), what, "give one vector for each mode")
+    if m == 0:
+        return
+    if body.boundary == "clamped-free":
+        yield from _clamp(place, body, arrays)
+    M, coupling, rigid = _mass_blocks(arrays)
+    d = np.diag(M)
+    # Gram matrices of n points and m modes are known to m n round-offs once scaled to unit diagonal.
+    slack = m * len(arrays.mass) * np.finfo(float).eps
+    if np.any(d <= 0.0):
+        n = int(np.argmin(d))
+        yield Problem(str(place), f"mode {n} moves no mass", "leave the mode out, or give the points it moves mass")
+        return
+    scale = 1.0 / np.sqrt(np.outer(d, d))
+    if np.linalg.eigvalsh(M * scale)[0] < slack:
+        yield Problem(str(place), "the modes are not independent: their mass matrix is singular", "drop one of them")
+        return
+    floating = M - coupling.T @ np.linalg.pinv(rigid) @ coupling
+    if body.boundary == "free-free" and np.linalg.eigvalsh(floating * scale)[0] < slack:
+        remedy = "the body frame carries the rigid-body motion: remove it from the modes"
+        yield Problem(str(place), "a combination of the free-free modes is a rigid-body motion", remedy)
+        return
+    yield from _frequency(place, arrays, M)
+
+
+def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+    """Clamped modes vanish at the body origin: at the node listed there, and at a point that sits there."""
+    remedy = 'subtract the rigid-body part from the mode, or make the boundary "free-free"'
+    size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
+    largest = float(np.max(np.abs(arrays.translation_modes)))
+    shapes = [
+        (place.key("nodes", i), np.array(node.translation_modes).T, np.array(node.rotation_modes).T)
+        for i, node in enumerate(body.nodes)
+        if node.name == "origin" and node.translation_modes and node.rotation_modes
+    ]
+    shapes += [
+        (place.key("points", j), arrays.translation_modes[j], np.zeros((3, 1)))
+        for j in np.flatnonzero(np.linalg.norm(arrays.position, axis=1) <= PRINTED * size)
+        if size > 0.0
+    ]
+    for spot, translation, rotation in shapes:
+        moved = np.max(np.abs(translation), axis=0) > PRINTED * largest
+        turned = size * np.max(np.abs(rotation), axis=0) > PRINTED * largest
+        if np.any(moved) or np.any(turned):
+            n = int(np.argmax(moved if np.any(moved) else turned))
+            yield Problem(str(spot), f"mode {n} moves the clamp: it has rigid-body content", remedy)
+
+
+def _mass_blocks(arrays: ModalArrays) -> tuple[Array, Array, Array]:
+    """Mass matrices at rest: modes (m,m), rigid motion [rotation; translation] against modes (6,m), rigid (6,6)."""
+    n, _, m = arrays.translation_modes.shape
+    centre = arrays.position + arrays.com_offset
+    modes = arrays.translation_modes - np.cross(arrays.com_offset[:, :, None], arrays.rotation_modes, axis=1)
+    arm = -np.cross(centre[:, :, None], np.broadcast_to(np.eye(3), (n, 3, 3)), axis=1)  # w x r, column by column
+    velocity = np.concatenate([arm, np.broadcast_to(np.eye(3), (n, 3, 3)), modes], axis=2)
+    turn = np.concatenate(
+        [np.broadcast_to(np.eye(3), (n, 3, 3)), np.zeros((n, 3, 3)), arrays.rotation_modes], axis=2
+    )
+    M = np.einsum("nia,n,nib->ab", velocity, arrays.mass, velocity) + np.einsum(
+        "nia,nij,njb->ab", turn, arrays.inertia, turn
+    )
+    return M[6:, 6:], M[:6, 6:], M[:6, :6]
+
+
+def _frequency(place: Place, arrays: ModalArrays, M: Array) -> Iterator[Problem]:
+    """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
+    stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
+    lowest = float(eigh(stiffness, M, eigvals_only=True, subset_by_index=[0, 0])[0])
+    size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
+    if lowest <= 0.0 or size == 0.0:
+        return
+    frequency = sqrt(lowest) / (2.0 * pi)
+    if not SPEED[0] <= frequency * size <= SPEED[1]:
+        what = f"the lowest frequency is {frequency:.3g} Hz for a body of {size:.3g} m: no structure does that"
+        remedy = "check the units of stiffness (N/m for modes without unit) against mass (kg): a factor of 1000, say?"
+        yield Problem(str(place.key("stiffness")), what, remedy)

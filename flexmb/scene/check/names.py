@@ -1,0 +1,94 @@
+"""Names: given, unique, and every reference to a body or node leads somewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
+from flexmb.scene.check.walk import entries
+from flexmb.scene.problems import Place, Problem, closest
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import GROUND, rest_frames
+
+# Hinges, wheels and point masses share one table of drive loads and coordinates, hence one set of names.
+NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses"), ("closures",), ("loads",), ("markers",))
+IMPLICIT = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
+
+
+def unique_names(scene: Scene) -> Iterator[Problem]:
+    """Every item has a name of its own, "ground" is the inertial frame, implicit nodes are not listed again."""
+    for collections in NAMESPACES:
+        yield from _unique(item for collection in collections for item in entries(scene, collection))
+    for place, body in entries(scene, "bodies"):
+        if body.name == GROUND:
+            yield Problem(str(place), 'the name "ground" is taken: it is the inertial frame', "rename the body")
+        if isinstance(body, SidBody):
+            continue
+        yield from _unique((place.key("nodes", i), node) for i, node in enumerate(body.nodes))
+        for i, node in enumerate(body.nodes):
+            if node.name in IMPLICIT.get(type(body), ()):
+                what = f'node "{node.name}" exists without being listed'
+                yield Problem(str(place.key("nodes", i)), what, "rename the node or leave it out")
+    seen: dict[str, Place] = {}
+    for place, state in entries(scene, "modal_states"):
+        if state.body in seen:
+            what = f"this body's modal state is already given at {seen[state.body].path}"
+            yield Problem(str(place), what, "merge the two")
+        seen.setdefault(state.body, place)
+
+
+def references(scene: Scene) -> Iterator[Problem]:
+    """Every body and node that something refers to exists."""
+    bodies = {body.name: body for body in scene.bodies}
+    for place, hinge in entries(scene, "hinges"):
+        yield from _attachment(place, bodies, ("parent", hinge.parent), ("parent_node", hinge.parent_node), ground=True)
+        yield from _attachment(place, bodies, ("child", hinge.child), ("child_node", hinge.child_node), ground=False)
+    for collection in ("wheels", "point_masses", "loads", "markers"):
+        for place, item in entries(scene, collection):
+            yield from _attachment(place, bodies, ("body", item.body), ("node", item.node), ground=False)
+    for place, closure in entries(scene, "closures"):
+        for end in ("a", "b"):
+            body, node = f"body_{end}", f"node_{end}"
+            ends = (body, getattr(closure, body)), (node, getattr(closure, node))
+            yield from _attachment(place, bodies, *ends, ground=True)
+        if closure.body_a == closure.body_b:
+            what = f'the closure joins "{closure.body_a}" to itself'
+            yield Problem(str(place), what, "give two different bodies")
+    for place, state in entries(scene, "modal_states"):
+        yield from _body(place.key("body"), bodies, state.body)
+
+
+def _unique(items: Iterator[tuple[Place, Any]]) -> Iterator[Problem]:
+    seen: dict[str, Place] = {}
+    for place, item in items:
+        if not item.name.strip() or not item.name.isprintable():
+            yield Problem(str(place.key("name")), f"{item.name!r} is not a name", "give a name of printable characters")
+        elif item.name in seen:
+            what = f'duplicate name "{item.name}": already used by {seen[item.name].path}'
+            yield Problem(str(place.key("name")), what, "rename one of the two")
+        seen.setdefault(item.name, place)
+
+
+def _attachment(
+    place: Place, bodies: dict[str, Body], to: tuple[str, str], at: tuple[str, str], *, ground: bool
+) -> Iterator[Problem]:
+    (body_key, body_name), (node_key, node) = to, at
+    if body_name == GROUND and ground:
+        if node != "origin":
+            remedy = "leave the node out and give the offset of the hinge frame instead"
+            yield Problem(str(place.key(node_key)), f'the ground has no node "{node}"', remedy)
+    elif body_name not in bodies:
+        yield from _body(place.key(body_key), bodies, body_name, ground=ground)
+    elif not isinstance(body := bodies[body_name], SidBody) and node not in (frames := rest_frames(body)):
+        remedy = closest(node, frames)
+        if isinstance(body, ModalBody) and node == "origin":
+            remedy = 'a free-free modal body has a node "origin" only where it is listed with its mode shapes: list it'
+        yield Problem(str(place.key(node_key)), f'body "{body_name}" has no node "{node}"', remedy)
+
+
+def _body(place: Place, bodies: dict[str, Body], name: str, *, ground: bool = False) -> Iterator[Problem]:
+    if name == GROUND and not ground:
+        yield Problem(str(place), "this cannot be the ground", "name a body")
+    elif name not in bodies:
+        yield Problem(str(place), f'there is no body "{name}"', closest(name, [*bodies, GROUND] if ground else bodies))

@@ -1,0 +1,209 @@
+"""Inertia beyond hinges: a freedom that moves nothing has no acceleration.
+
+Checked where it can be told without kinematics: for the child and everything welded to it, unless more mass hangs from
+these by moving hinges.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.check.profiles import start_of
+from flexmb.scene.check.walk import entries
+from flexmb.scene.hinges import (
+    Cylindrical,
+    Free,
+    Gimbal,
+    Hinge,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+    Weld,
+)
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.problems import Problem
+from flexmb.scene.schema import PointMass, Scene, Wheel
+from flexmb.scene.tree import Coordinate, coordinates, node_frame
+
+Array = NDArray[np.float64]
+Pose = tuple[Rotation, Array]
+
+# A moment below this share of the largest leaves no digits of the acceleration.
+NEGLIGIBLE = 1e-12
+GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
+
+
+def moved_inertia(scene: Scene) -> Iterator[Problem]:
+    """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be sound."""
+    bodies = {body.name: body for body in scene.bodies}
+    outboard: dict[str, list[Hinge]] = {}
+    for hinge in scene.hinges:
+        outboard.setdefault(hinge.parent, []).append(hinge)
+    own = {body.name: _spatial_inertia(scene, body) for body in scene.bodies}
+    for place, hinge in entries(scene, "hinges"):
+        H = _free_directions(hinge)
+        cluster, beyond = _cluster(hinge.child, bodies, outboard, own)
+        if H.shape[1] == 0 or cluster is None or beyond:
+            continue
+        X = _motion(_end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion))
+        inertia = np.linalg.inv(X).T @ cluster @ np.linalg.inv(X)
+        D = H.T @ inertia @ H
+        mass, moment = float(inertia[5, 5]), float(np.trace(inertia[:3, :3]))
+        reference = np.where(np.any(H[:3] != 0.0, axis=0), moment, mass)
+        where, child = str(place), hinge.child
+        if np.any(np.diag(D) <= NEGLIGIBLE * reference):
+            turning = bool(np.any(H[:3, np.diag(D) <= NEGLIGIBLE * reference]))
+            noun = "inertia about" if turning else "mass along"
+            what = f'body "{child}" and what is welded to it have no {noun} a free direction of this hinge'
+            yield Problem(where, what, f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate")
+        elif np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
+            what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
+            yield Problem(where, what, "start elsewhere, choose another sequence, or use a spherical hinge")
+
+
+def _cluster(
+    name: str, bodies: dict[str, Body], outboard: dict[str, list[Hinge]], own: dict[str, Array | None]
+) -> tuple[Array | None, bool]:
+    """Inertia (6,6) of a body and all that is welded to it, in the body's frame (None: not known), and whether mass
+    hangs from these by moving hinges."""
+    total = own[name]
+    beyond = False
+    for hinge in outboard.get(name, []):
+        welded, further = _cluster(hinge.child, bodies, outboard, own)
+        if not isinstance(hinge, Weld):
+            beyond = beyond or further or welded is None or bool(np.any(welded))
+            continue
+        beyond = beyond or further
+        if total is None or welded is None:
+            total = None
+            continue
+        to_parent = _end(bodies[name], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
+        to_child = _end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
+        X = np.linalg.solve(_motion(to_child), np.eye(6)) @ _motion(to_parent)
+        total = total + X.T @ welded @ X
+    return total, beyond
+
+
+def _spatial_inertia(scene: Scene, body: Body) -> Array | None:
+    """Inertia (6,6) at rest in the body frame, wheels and point masses included; None for a SID body."""
+    match body:
+        case RigidBody():
+            total = _lump(body.mass_kg, body.com_m, body.inertia_kg_m2)
+        case BeamBody():
+            total = _beam(body)
+        case ModalBody():
+            a = modal_arrays(body)
+            points = zip(a.mass, a.position + a.com_offset, a.inertia, strict=True)
+            total = sum((_lump(*point) for point in points), np.zeros((6, 6)))
+        case _:
+            return None
+    for item in (*scene.wheels, *scene.point_masses):
+        if item.body == body.name:
+            X = _motion(_end(body, item.node, item.offset_m, (1.0, 0.0, 0.0, 0.0)))
+            total = total + X.T @ _attached(item) @ X
+    return total
+
+
+def _attached(item: Wheel | PointMass) -> Array:
+    """A wheel that spins freely resists no rotation about its axis."""
+    if isinstance(item, PointMass):
+        return _lump(item.mass_kg, np.zeros(3), np.zeros((3, 3)))
+    along = np.outer(item.axis, item.axis)
+    inertia = item.transverse_inertia_kg_m2 * (np.eye(3) - along)
+    if item.prescribed_rad is not None:
+        inertia = inertia + item.axial_inertia_kg_m2 * along
+    return _lump(item.mass_kg, np.zeros(3), inertia)
+
+
+def _beam(body: BeamBody) -> Array:
+    total = sum((_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses),
+                np.zeros((6, 6)))  # fmt: skip
+    keys = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
+    for left, right in zip(body.stations, body.stations[1:], strict=False):
+        half = (right.x_m - left.x_m) / 2.0
+        for s, weight in zip(*GAUSS, strict=True):
+            share = (1.0 + s) / 2.0
+            mass, jy, jz = (
+                half * weight * ((1.0 - share) * getattr(left, key) + share * getattr(right, key)) for key in keys
+            )
+            section = np.zeros((3, 3)) if body.points == "line" else np.diag([jy + jz, jy, jz])
+            total = total + _lump(mass, (left.x_m + half * (1.0 + s), 0.0, 0.0), section)
+    return total
+
+
+def _lump(mass: float, com: Vector | Array, inertia: object) -> Array:
+    """Spatial inertia (6,6), angular first, of a lump with mass centre `com` and `inertia` (3,3) about it."""
+    c = np.cross(np.eye(3), np.asarray(com, dtype=float))  # c @ v = com x v
+    return np.block([[np.asarray(inertia, dtype=float) - mass * c @ c, mass * c], [-mass * c, mass * np.eye(3)]])
+
+
+def _end(body: Body, node: str, position: Vector, quaternion: Quaternion) -> Pose:
+    """Rotation and origin, in the body frame, of the frame offset from a node."""
+    frame = node_frame(body, node)
+    turn = Rotation.from_quat(frame.quaternion, scalar_first=True)
+    return turn * Rotation.from_quat(quaternion, scalar_first=True), np.add(frame.position, turn.apply(position))
+
+
+def _motion(pose: Pose) -> Array:
+    """X (6,6): spatial velocity [w; v] of the body frame to that of the frame at `pose`, in that frame's axes."""
+    turn, position = pose
+    R = turn.as_matrix().T
+    return np.block([[R, np.zeros((3, 3))], [-R @ np.cross(np.eye(3), position), R]])
+
+
+def _free_directions(hinge: Hinge) -> Array:
+    """Free columns of the hinge map at the start (6,n), outboard hinge axes; prescribed coordinates are left out."""
+    angular = np.eye(6)[:3]
+    match hinge:
+        case Spherical():
+            return angular.T
+        case Free():
+            return np.eye(6)
+        case Revolute() | Prismatic() | Cylindrical():
+            columns = {"rotation": (*hinge.axis, 0.0, 0.0, 0.0), "translation": (0.0, 0.0, 0.0, *hinge.axis)}
+            directions = [columns[name] for name, _ in coordinates(hinge)]
+        case Planar():
+            back = Rotation.from_euler("z", -_start(hinge.rotation))
+            directions = [(0.0, 0.0, 0.0, *back.apply(axis)) for axis in np.eye(3)[:2]] + [angular[2]]
+        case Universal():
+            directions = _carried("xy", hinge)
+        case Gimbal():
+            directions = _carried(hinge.sequence, hinge)
+        case _:
+            return np.zeros((6, 0))
+    kept = [
+        np.asarray(direction, dtype=float)
+        for direction, (_, coordinate) in zip(directions, coordinates(hinge), strict=True)
+        if _profile(coordinate) is None
+    ]
+    return np.array(kept).reshape(-1, 6).T
+
+
+def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Array]:
+    """Axes of successive rotations seen from the outboard frame: turned back by the rotations that follow."""
+    angles = [_start(coordinate) for _, coordinate in coordinates(hinge)]
+    directions = []
+    for k, letter in enumerate(sequence):
+        after = Rotation.identity()
+        for axis, angle in zip(sequence[k + 1 :], angles[k + 1 :], strict=True):
+            after = after * Rotation.from_euler(axis, angle)
+        directions.append(np.concatenate([after.inv().apply(np.eye(3)["xyz".index(letter)]), np.zeros(3)]))
+    return directions
+
+
+def _profile(coordinate: Coordinate) -> object:
+    return getattr(coordinate, "prescribed_rad", None) or getattr(coordinate, "prescribed_m", None)
+
+
+def _start(coordinate: Coordinate) -> float:
+    """Initial angle: the profile's where there is one."""
+    profile = _profile(coordinate)
+    start = start_of(profile) if profile is not None else None
+    return start[0] if start is not None else coordinate.angle_rad

@@ -1,0 +1,107 @@
+"""Functions of time: well-formed, defined over the run, smooth where they prescribe a motion that starts there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, sin
+
+from scipy.interpolate import make_interp_spline
+
+from flexmb.scene.bodies import _Strict
+from flexmb.scene.check.walk import non_finite, values
+from flexmb.scene.convert import ROOT
+from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.problems import Place, Problem
+from flexmb.scene.schema import Scene
+
+SAMPLES = 6  # a quintic spline needs degree + 1
+# Initial values printed to ten digits agree with the profile this well, relative to the larger of it and one unit.
+PRINTED = 1e-9
+MOTIONS = ("prescribed_rad", "prescribed_m")
+SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
+
+
+def functions(scene: Scene, t_end: float | None) -> Iterator[Problem]:
+    """Problems of every function in the scene; with `t_end` (s) a table must reach that far."""
+    for place, key, value in values(ROOT, scene):
+        if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
+            yield from _well_formed(place, value)
+            if isinstance(value, Table):
+                yield from _covers(place, value, t_end)
+            if isinstance(value, Pulse) and key in MOTIONS:
+                yield Problem(str(place), "a pulse jumps: no body can follow it", SMOOTH)
+
+
+def start_of(function: Function) -> tuple[float, float] | None:
+    """Value and rate at t = 0; None for a function that is not well-formed or jumps."""
+    match function:
+        case Constant(value=value):
+            return value, 0.0
+        case Ramp(value=value, rate=rate, start_s=start):
+            return value - rate * start, rate
+        case Sine(amplitude=a, angular_frequency_rad_s=w, phase_rad=phase, offset=offset):
+            return offset + a * sin(phase), a * w * cos(phase)
+        case SmoothStep(duration_s=duration) if duration > 0.0:
+            return _smooth_step_start(function)
+        case SpinUp(duration_s=duration) if duration > 0.0:
+            return 0.0, 0.0
+        case Table(times_s=times, values=samples) if not any((*_table(ROOT, function), *_covers(ROOT, function, None))):
+            spline = make_interp_spline(times, samples, k=5)
+            return float(spline(0.0)), float(spline(0.0, 1))
+    return None
+
+
+def initial_motion(place: Place, item: _Strict, keys: tuple[str, str], function: Function) -> Iterator[Problem]:
+    """A prescribed coordinate starts where its profile does: initial values are left out, or agree with it.
+
+    `keys` are the schema keys of the initial value and rate of `item`.
+    """
+    start = start_of(function)
+    if start is None:
+        return
+    for key, profile in zip(keys, start, strict=True):
+        given = getattr(item, key)
+        if given != 0.0 and abs(given - profile) > PRINTED * max(1.0, abs(profile)):
+            what = f"starts at {given:g}, but its prescribed motion at {profile:g}"
+            yield Problem(str(place.key(key)), what, f"leave {key} out: the profile says where the motion starts")
+
+
+def _well_formed(place: Place, function: Function) -> Iterator[Problem]:
+    duration = getattr(function, "duration_s", 1.0)
+    if duration <= 0.0:
+        yield Problem(str(place.key("duration_s")), f"the duration is {duration:g} s", "give a positive duration")
+    if isinstance(function, Table):
+        yield from _table(place, function)
+
+
+def _table(place: Place, table: Table) -> Iterator[Problem]:
+    count = len(table.times_s)
+    if len(table.values) != count:
+        what = f"the table has {count} times but {len(table.values)} values"
+        yield Problem(str(place.key("values")), what, "give one value for each time")
+    if count < SAMPLES:
+        remedy = f"a quintic spline needs {SAMPLES} samples at least"
+        yield Problem(str(place.key("times_s")), f"the table has only {count} samples", remedy)
+    for i in range(count - 1):
+        if table.times_s[i + 1] <= table.times_s[i]:
+            what = f"the table's times do not increase: {table.times_s[i]:g} s, then {table.times_s[i + 1]:g} s"
+            yield Problem(str(place.key("times_s", i + 1)), what, "sort the samples and drop repeated times")
+            return
+
+
+def _covers(place: Place, table: Table, t_end: float | None) -> Iterator[Problem]:
+    if not table.times_s:
+        return
+    first, last = table.times_s[0], table.times_s[-1]
+    needed = 0.0 if t_end is None else t_end
+    if first > 0.0 or last < needed:
+        what = f"the profile covers {first:g} s to {last:g} s, but the run 0 s to {needed:g} s"
+        yield Problem(str(place.key("times_s")), what, "extend the table, or shorten the run")
+
+
+def _smooth_step_start(step: SmoothStep) -> tuple[float, float]:
+    """35 x^4 - 84 x^5 + 70 x^6 - 20 x^7 and its rate 140 x^3 (1 - x)^3 at t = 0."""
+    x = min(max(-step.start_s / step.duration_s, 0.0), 1.0)
+    rise = step.end_value - step.start_value
+    blend = x**4 * (35.0 + x * (-84.0 + x * (70.0 - 20.0 * x)))
+    return step.start_value + rise * blend, rise * 140.0 * (x * (1.0 - x)) ** 3 / step.duration_s
