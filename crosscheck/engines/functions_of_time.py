@@ -1,0 +1,122 @@
+"""Functions of time evaluated for the peers: value, rate and acceleration of every kind in `flexmb.scene.functions`.
+
+Independent of the native code's compiled evaluation, so that the two check each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import cos, inf, pi, sin
+from typing import NamedTuple
+
+import numpy as np
+from scipy.interpolate import make_interp_spline
+
+from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+
+
+class Profile(NamedTuple):
+    """f, df/dt and d2f/dt2 at one time."""
+
+    value: float
+    rate: float
+    acceleration: float
+
+
+def profile(function: Function) -> Callable[[float], Profile]:
+    """The function as a callable t -> Profile. A table gives NaN outside its interval."""
+    match function:
+        case Constant(value=value):
+            return lambda t: Profile(value, 0.0, 0.0)
+        case Ramp(value=value, rate=rate, start_s=start):
+            return lambda t: Profile(value + rate * (t - start), rate, 0.0)
+        case Sine():
+            return _sine(function)
+        case SmoothStep():
+            return _smooth_step(function)
+        case SpinUp(rate=rate, duration_s=duration):
+            return _spin_up(rate, duration)
+        case Pulse(value=value, start_s=start, duration_s=duration):
+            return lambda t: Profile(value if start <= t < start + duration else 0.0, 0.0, 0.0)
+        case Table(times_s=times, values=values):
+            return _table(times, values)
+
+
+def breaks(function: Function) -> tuple[float, ...]:
+    """Times (s) at which the function or a low derivative is not smooth: an integrator should stop there."""
+    match function:
+        case SmoothStep(start_s=start, duration_s=duration) | Pulse(start_s=start, duration_s=duration):
+            return (start, start + duration)
+        case SpinUp(duration_s=duration):
+            return (duration,)
+    return ()
+
+
+def breaks_between(functions: list[Function], first: float, last: float) -> list[float]:
+    """All break times strictly inside (first, last), sorted, each once."""
+    return sorted({t for function in functions for t in breaks(function) if first < t < last})
+
+
+def fastest_rate(function: Function, until: float = inf) -> float:
+    """Largest |df/dt| (unit/s) over [0, until], for choosing a step: bounds where they are known, else samples."""
+    match function:
+        case Constant() | Pulse():
+            return 0.0
+        case Ramp(rate=rate) | SpinUp(rate=rate):
+            return abs(rate)
+        case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency):
+            return abs(amplitude * frequency)
+        case SmoothStep(start_value=start, end_value=end, duration_s=duration):
+            return 35.0 / 16.0 * abs(end - start) / duration  # s'(1/2)
+        case Table(times_s=times):
+            f = profile(function)
+            return max(abs(f(t).rate) for t in np.linspace(times[0], min(times[-1], until), 20 * len(times)))
+
+
+def _sine(function: Sine) -> Callable[[float], Profile]:
+    A, w, phase, offset = (
+        function.amplitude, function.angular_frequency_rad_s, function.phase_rad, function.offset,
+    )  # fmt: skip
+
+    def evaluate(t: float) -> Profile:
+        s, c = sin(w * t + phase), cos(w * t + phase)
+        return Profile(offset + A * s, A * w * c, -A * w * w * s)
+
+    return evaluate
+
+
+def _smooth_step(function: SmoothStep) -> Callable[[float], Profile]:
+    start, T = function.start_s, function.duration_s
+    first, height = function.start_value, function.end_value - function.start_value
+
+    def evaluate(t: float) -> Profile:
+        x = min(max((t - start) / T, 0.0), 1.0)
+        return Profile(
+            first + height * x**4 * (35.0 - 84.0 * x + 70.0 * x**2 - 20.0 * x**3),
+            height / T * 140.0 * x**3 * (1.0 - x) ** 3,
+            height / T**2 * 420.0 * x**2 * (1.0 - x) ** 2 * (1.0 - 2.0 * x),
+        )
+
+    return evaluate
+
+
+def _spin_up(rate: float, T: float) -> Callable[[float], Profile]:
+    def evaluate(t: float) -> Profile:
+        if t >= T:
+            return Profile(rate * (t - T / 2.0), rate, 0.0)
+        x = 2.0 * pi * t / T
+        return Profile(
+            rate / T * (t * t / 2.0 + (T / (2.0 * pi)) ** 2 * (cos(x) - 1.0)),
+            rate / T * (t - T / (2.0 * pi) * sin(x)),
+            rate / T * (1.0 - cos(x)),
+        )
+
+    return evaluate
+
+
+def _table(times: tuple[float, ...], values: tuple[float, ...]) -> Callable[[float], Profile]:
+    spline = make_interp_spline(times, values, k=5)
+    derivatives = (spline, spline.derivative(1), spline.derivative(2))
+    for each in derivatives:
+        each.extrapolate = False
+    return lambda t: Profile(*(float(each(t)) for each in derivatives))

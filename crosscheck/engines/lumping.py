@@ -1,0 +1,132 @@
+"""A flexible body without its flexibility: the rigid body with the same inertia points and the same nodes at rest.
+
+Independent of the native modal preprocessing, of which it repeats only the documented choice of inertia points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, TipMass, Vector
+from flexmb.scene.tree import rest_frames
+
+Array = NDArray[np.float64]
+
+_GAUSS_POINTS = 3
+"""Exact to degree 5: the second moment of a linearly varying section has degree 3."""
+
+
+@dataclass(frozen=True)
+class Inertia:
+    """Mass kg, mass centre (3,) m and inertia (3,3) kg m^2 about it, in one frame."""
+
+    mass: float
+    com: Array
+    inertia: Array
+
+
+def combine(parts: Sequence[Inertia]) -> Inertia:
+    """One rigid body made of several, by Steiner's theorem."""
+    mass = sum(part.mass for part in parts)
+    com = sum((part.mass * part.com for part in parts), np.zeros(3)) / (mass or 1.0)
+    inertia = sum((part.inertia + steiner(part.mass, part.com - com) for part in parts), np.zeros((3, 3)))
+    return Inertia(mass, com, inertia)
+
+
+def steiner(mass: float, offset: Array) -> Array:
+    """Inertia (3,3) of a point mass at `offset` (3,) about the origin."""
+    return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
+
+
+def section_properties(body: BeamBody, x: Array, *keys: str) -> tuple[Array, ...]:
+    """Station properties (keys of `BeamStation`) at x (n,): piecewise linear, constant beyond the outer stations."""
+    stations = sorted(body.stations, key=lambda station: station.x_m)
+    at = [station.x_m for station in stations]
+    return tuple(np.interp(x, at, [getattr(station, key) for station in stations]) for key in keys)
+
+
+def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Array, Array]:
+    """Gauss points and weights (n,) between the cuts (ascending), also broken at the stations, where sections kink."""
+    inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
+    ends = np.unique([*cuts, *inside])
+    s, w = np.polynomial.legendre.leggauss(_GAUSS_POINTS)
+    half = np.diff(ends)[:, None] / 2.0
+    return (ends[:-1, None] + half * (1.0 + s)).ravel(), (half * w).ravel()
+
+
+def beam_piece(body: BeamBody, start: float, end: float) -> Inertia:
+    """The piece start <= x <= end of a beam in the beam's frame, with the tip masses on it.
+
+    A tip mass exactly at `end` belongs to the next piece, except at the end of the beam.
+    """
+    x, weight = quadrature(body, (start, end))
+    mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
+    turning = 0.0 if body.points == "line" else 1.0
+    parts = [
+        Inertia(length * m, np.array([at, 0.0, 0.0]), turning * length * np.diag([iy + iz, iy, iz]))
+        for at, length, m, iy, iz in zip(x, weight, mass, rotary_y, rotary_z, strict=True)
+    ]
+    here = [lump for lump in body.tip_masses if start <= lump.x_m < end or lump.x_m == end == body.length_m]
+    return combine([*parts, *_lumps(here)])
+
+
+def _lumps(lumps: Sequence[TipMass]) -> list[Inertia]:
+    return [
+        Inertia(lump.mass_kg, np.array([lump.x_m, 0.0, 0.0]) + lump.com_m, np.array(lump.inertia_kg_m2))
+        for lump in lumps
+    ]
+
+
+def _lumped_beam(body: BeamBody) -> Inertia:
+    """A beam whose inertia sits at its element nodes: a node receives what its hat function weighs."""
+    nodes = np.linspace(0.0, body.length_m, body.elements + 1)
+    x, weight = quadrature(body, tuple(nodes))
+    hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)
+    mass, rotary_y, rotary_z = section_properties(body, x, "mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
+    turning = 0.0 if body.points == "line" else 1.0
+    parts = [*_lumps(body.tip_masses)]
+    for node, hat in zip(nodes, (weight[:, None] * hats).T, strict=True):
+        iy, iz = turning * hat @ rotary_y, turning * hat @ rotary_z
+        parts.append(Inertia(hat @ mass, np.array([node, 0.0, 0.0]), np.diag([iy + iz, iy, iz])))
+    return combine(parts)
+
+
+def rigid_equivalent(body: Body) -> RigidBody:
+    """The body with its modes left out. A rigid body is returned as it is; a SID body raises ValueError."""
+    match body:
+        case RigidBody():
+            return body
+        case BeamBody(mass="lumped"):
+            inertia = _lumped_beam(body)
+        case BeamBody():
+            inertia = beam_piece(body, 0.0, body.length_m)
+        case ModalBody():
+            arrays = modal_arrays(body)
+            parts = zip(arrays.mass, arrays.position + arrays.com_offset, arrays.inertia, strict=True)
+            inertia = combine([Inertia(*part) for part in parts])
+    frames = {name: frame for name, frame in rest_frames(body).items() if name != "origin"}
+    nodes = tuple(Node(name=name, position_m=at.position, quaternion=at.quaternion) for name, at in frames.items())
+    return rigid_body(body.name, inertia, nodes)
+
+
+def rigid_body(name: str, inertia: Inertia, nodes: tuple[Node, ...]) -> RigidBody:
+    """A `RigidBody` from arrays."""
+    return RigidBody(
+        name=name, mass_kg=float(inertia.mass), com_m=_vector(inertia.com),
+        inertia_kg_m2=tuple(_vector(row) for row in inertia.inertia), nodes=nodes,
+    )  # fmt: skip
+
+
+def inertia_of(body: RigidBody) -> Inertia:
+    """The inertia of a rigid body as arrays, in its body frame."""
+    return Inertia(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2))
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)

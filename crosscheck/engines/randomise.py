@@ -1,0 +1,133 @@
+"""Random states of one scene: where engines must agree on accelerations, loads, energies and momenta to round-off."""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.random import Generator
+
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import (
+    AngularCoordinate,
+    BeamBody,
+    Free,
+    Hinge,
+    LinearCoordinate,
+    ModalBody,
+    ModalState,
+    PointMass,
+    Quaternion,
+    Scene,
+    Spherical,
+    Vector,
+    Wheel,
+)
+
+_ANGLE = 0.8  # rad: away from the singularity of three-axis gimbals at pi/2
+_SHIFT = 0.2  # m
+_RATE = 1.0  # rad/s, m/s
+_WHEEL_SPEED = 20.0  # rad/s
+_DEFLECTION = 0.03  # of a beam's length
+
+
+def randomise(scene: Scene, rng: Generator) -> Scene:
+    """The same scene at random hinge coordinates and speeds, modal states and wheel speeds; prescribed ones stay."""
+    states = tuple(_modal_state(body, rng) for body in scene.bodies if _is_flexible(body))
+    return replace(
+        scene,
+        hinges=tuple(_hinge(hinge, rng) for hinge in scene.hinges),
+        wheels=tuple(_wheel(wheel, rng) for wheel in scene.wheels),
+        point_masses=tuple(_point_mass(point, rng) for point in scene.point_masses),
+        modal_states=states,
+    )
+
+
+def _hinge(hinge: Hinge, rng: Generator) -> Hinge:
+    match hinge:
+        case Spherical():
+            return replace(hinge, quaternion=_quaternion(rng), angular_velocity_rad_s=_vector(rng, _RATE))
+        case Free():
+            return replace(
+                hinge, position_m=_vector(rng, _SHIFT), quaternion=_quaternion(rng),
+                angular_velocity_rad_s=_vector(rng, _RATE), velocity_m_s=_vector(rng, _RATE),
+            )  # fmt: skip
+    changed = {}
+    for key in hinge.__struct_fields__:
+        match getattr(hinge, key):
+            case AngularCoordinate() | LinearCoordinate() as coordinate:
+                changed[key] = _coordinate(coordinate, rng)
+            case (AngularCoordinate(), *_) as rotations:
+                changed[key] = tuple(_coordinate(rotation, rng) for rotation in rotations)
+    return replace(hinge, **changed)
+
+
+def _coordinate(
+    coordinate: AngularCoordinate | LinearCoordinate, rng: Generator
+) -> AngularCoordinate | LinearCoordinate:
+    value, rate = rng.uniform(-1.0, 1.0), rng.uniform(-_RATE, _RATE)
+    match coordinate:
+        case AngularCoordinate(prescribed_rad=None):
+            return replace(coordinate, angle_rad=_ANGLE * value, rate_rad_s=rate)
+        case LinearCoordinate(prescribed_m=None):
+            return replace(coordinate, position_m=_SHIFT * value, rate_m_s=rate)
+    return coordinate
+
+
+def _point_mass(point: PointMass, rng: Generator) -> PointMass:
+    still = point.coordinates or tuple(LinearCoordinate() for _ in point.directions)
+    return replace(point, coordinates=tuple(_coordinate(coordinate, rng) for coordinate in still))
+
+
+def _wheel(wheel: Wheel, rng: Generator) -> Wheel:
+    if wheel.prescribed_rad is not None:
+        return wheel
+    return replace(wheel, angle_rad=rng.uniform(-np.pi, np.pi), speed_rad_s=rng.uniform(-_WHEEL_SPEED, _WHEEL_SPEED))
+
+
+def _is_flexible(body: object) -> bool:
+    return isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
+
+
+def _modal_state(body: BeamBody | ModalBody, rng: Generator) -> ModalState:
+    """Modal coordinates whose largest displacement is a few per cent of the body's size, rates alike per second."""
+    if isinstance(body, BeamBody):
+        count, scale = _beam_modes(body)
+    else:
+        arrays = modal_arrays(body)
+        modes = arrays.translation_modes
+        count = modes.shape[2]
+        size = np.ptp(arrays.position, axis=0).max()
+        scale = _DEFLECTION * size / np.maximum(np.abs(modes).max(axis=(0, 1)), np.finfo(float).tiny)
+    coordinates, rates = scale * rng.uniform(-1.0, 1.0, (2, count))
+    return ModalState(body=body.name, coordinates=tuple(map(float, coordinates)), rates=tuple(map(float, rates)))
+
+
+def _beam_modes(body: BeamBody) -> tuple[int, float]:
+    """Number of modes, and a coordinate that moves the tip by a few per cent: beam modes have unit modal mass.
+
+    Attachment modes add, for each wanted family, one (axial, torsion) or two (bending: force and moment). Torsional
+    modes are normalised by the polar inertia, which keeps the scale small enough for them.
+    """
+    mean = {
+        key: float(np.mean([getattr(station, key) for station in body.stations])) * body.length_m
+        for key in ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
+    }
+    scale = _DEFLECTION * body.length_m * np.sqrt(mean["mass_per_length_kg_m"]) / 2.0
+    polar = mean["rotary_y_kg_m"] + mean["rotary_z_kg_m"]
+    turns = "torsion" in body.modes.families and polar > 0.0 and body.points != "line"
+    if turns:
+        scale = min(scale, 0.2 * np.sqrt(polar))
+    attachments = {"axial": 1, "torsion": 1 if turns else 0, "bending_y": 2, "bending_z": 2}
+    extra = sum(attachments[family] for family in body.modes.families) if body.modes.static else 0
+    return body.modes.count + extra, float(scale)
+
+
+def _quaternion(rng: Generator) -> Quaternion:
+    q = rng.normal(size=4)
+    w, x, y, z = (float(part) for part in q / np.linalg.norm(q))
+    return (w, x, y, z)
+
+
+def _vector(rng: Generator, size: float) -> Vector:
+    x, y, z = (float(part) for part in rng.uniform(-size, size, 3))
+    return (x, y, z)
