@@ -63,6 +63,11 @@ def dumps(scene: Scene, folder: str | os.PathLike[str] | None = None) -> str:
     return "\n".join([*simple, *tables]) + "\n"
 
 
+def inline(value: Any) -> str:
+    """One value (struct, array, number, string) as TOML on one line, keys at their default left out."""
+    return _value(_sparse(value), 0)
+
+
 def _relative(file: str, folder: str | os.PathLike[str]) -> str:
     try:
         return Path(os.path.relpath(file, folder)).as_posix()

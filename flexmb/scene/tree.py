@@ -40,7 +40,7 @@ def ordered(scene: Scene) -> tuple[Branch, ...]:
     Every parent precedes its children and every subtree is contiguous. Raises ValueError where the scene is no tree.
     """
     bodies = {body.name: body for body in scene.bodies}
-    outboard: dict[str, list[Hinge]] = {GROUND: []} | {name: [] for name in bodies}
+    outboard: dict[str, list[Hinge]] = {name: [] for name in (GROUND, *bodies)}
     for hinge in scene.hinges:
         if hinge.parent not in outboard or hinge.child not in bodies:
             raise ValueError(f'hinge "{hinge.name}" joins an unknown body: run check_scene for the details')

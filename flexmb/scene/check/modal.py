@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from math import pi, sqrt
 
 import numpy as np
@@ -60,7 +60,7 @@ def _inline_modes(body: ModalBody) -> int | None:
         return None  # reported with the body
 
 
-def _read(place: Place, body: ModalBody) -> Iterator[Problem]:
+def _read(place: Place, body: ModalBody) -> Generator[Problem, None, ModalArrays | None]:
     """Yields what is wrong with the data and returns its arrays, or None."""
     if bool(body.points) == (body.file is not None):
         what = "both points and file are given" if body.points else "neither points nor file is given"
@@ -157,7 +157,7 @@ def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Probl
         if node.name == "origin" and node.translation_modes and node.rotation_modes
     ]
     shapes += [
-        (place.key("points", j), arrays.translation_modes[j], np.zeros((3, 1)))
+        (place.key("points", int(j)), arrays.translation_modes[j], np.zeros((3, 1)))
         for j in np.flatnonzero(np.linalg.norm(arrays.position, axis=1) <= PRINTED * size)
         if size > 0.0
     ]

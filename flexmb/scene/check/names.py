@@ -13,7 +13,7 @@ from flexmb.scene.tree import GROUND, rest_frames
 
 # Hinges, wheels and point masses share one table of drive loads and coordinates, hence one set of names.
 NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses"), ("closures",), ("loads",), ("markers",))
-IMPLICIT = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
+IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 
 
 def unique_names(scene: Scene) -> Iterator[Problem]:

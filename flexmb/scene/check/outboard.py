@@ -6,16 +6,18 @@ these by moving hinges.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
+from flexmb.scene.functions import Function
 from flexmb.scene.hinges import (
+    AngularCoordinate,
     Cylindrical,
     Free,
     Gimbal,
@@ -101,10 +103,11 @@ def _spatial_inertia(scene: Scene, body: Body) -> Array | None:
         case ModalBody():
             a = modal_arrays(body)
             points = zip(a.mass, a.position + a.com_offset, a.inertia, strict=True)
-            total = sum((_lump(*point) for point in points), np.zeros((6, 6)))
+            total = _sum(_lump(*point) for point in points)
         case _:
             return None
-    for item in (*scene.wheels, *scene.point_masses):
+    items: tuple[Wheel | PointMass, ...] = (*scene.wheels, *scene.point_masses)
+    for item in items:
         if item.body == body.name:
             X = _motion(_end(body, item.node, item.offset_m, (1.0, 0.0, 0.0, 0.0)))
             total = total + X.T @ _attached(item) @ X
@@ -123,8 +126,7 @@ def _attached(item: Wheel | PointMass) -> Array:
 
 
 def _beam(body: BeamBody) -> Array:
-    total = sum((_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses),
-                np.zeros((6, 6)))  # fmt: skip
+    total = _sum(_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
     keys = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     for left, right in zip(body.stations, body.stations[1:], strict=False):
         half = (right.x_m - left.x_m) / 2.0
@@ -144,6 +146,10 @@ def _lump(mass: float, com: Vector | Array, inertia: object) -> Array:
     return np.block([[np.asarray(inertia, dtype=float) - mass * c @ c, mass * c], [-mass * c, mass * np.eye(3)]])
 
 
+def _sum(inertias: Iterable[Array]) -> Array:
+    return sum(inertias, np.zeros((6, 6)))
+
+
 def _end(body: Body, node: str, position: Vector, quaternion: Quaternion) -> Pose:
     """Rotation and origin, in the body frame, of the frame offset from a node."""
     frame = node_frame(body, node)
@@ -161,6 +167,7 @@ def _motion(pose: Pose) -> Array:
 def _free_directions(hinge: Hinge) -> Array:
     """Free columns of the hinge map at the start (6,n), outboard hinge axes; prescribed coordinates are left out."""
     angular = np.eye(6)[:3]
+    directions: Sequence[ArrayLike]
     match hinge:
         case Spherical():
             return angular.T
@@ -198,12 +205,14 @@ def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Array]:
     return directions
 
 
-def _profile(coordinate: Coordinate) -> object:
-    return getattr(coordinate, "prescribed_rad", None) or getattr(coordinate, "prescribed_m", None)
+def _profile(coordinate: Coordinate) -> Function | None:
+    return coordinate.prescribed_rad if isinstance(coordinate, AngularCoordinate) else coordinate.prescribed_m
 
 
 def _start(coordinate: Coordinate) -> float:
-    """Initial angle: the profile's where there is one."""
+    """Initial value (rad or m): the profile's where there is one."""
     profile = _profile(coordinate)
     start = start_of(profile) if profile is not None else None
-    return start[0] if start is not None else coordinate.angle_rad
+    if start is not None:
+        return start[0]
+    return coordinate.angle_rad if isinstance(coordinate, AngularCoordinate) else coordinate.position_m

@@ -1,0 +1,106 @@
+"""The written form of the schema, generated from it: ``python -m flexmb.scene.reference [FOLDER]``.
+
+Writes `scene.schema.json` (for editors and validators) and `scene-reference.md` (a table for each struct) to FOLDER, by
+default `docs`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from inspect import cleandoc
+from pathlib import Path
+
+import msgspec
+from msgspec import inspect
+
+from flexmb.scene.files import inline
+from flexmb.scene.schema import Scene
+from flexmb.scene.units import split_unit
+
+SCALARS: dict[type[inspect.Type], str] = {
+    inspect.StrType: "string", inspect.FloatType: "number", inspect.IntType: "integer", inspect.BoolType: "boolean",
+}  # fmt: skip
+
+INTRODUCTION = """\
+# Scene reference
+
+Generated from the schema by `python -m flexmb.scene.reference`; do not edit. A scene is a TOML file; the same structs
+are built in Python with `SceneBuilder`, whose argument names are these keys without their unit.
+
+SI throughout; the unit of a key is its suffix. Quaternions are scalar-first, unit, and map outboard components to
+inboard ones. References are by name. A key without default is required.
+"""
+
+
+def json_schema() -> str:
+    """The JSON Schema of a scene."""
+    return json.dumps(msgspec.json.schema(Scene), indent=2, ensure_ascii=False) + "\n"
+
+
+def reference() -> str:
+    """The reference in Markdown: every struct that a scene may hold, in the order it is first met."""
+    sections = [INTRODUCTION]
+    for struct in _structs(inspect.type_info(Scene), set()):
+        kind = f' (`{struct.tag_field} = "{struct.tag}"`)' if struct.tag is not None else ""
+        sections.append(f"## {struct.cls.__name__}{kind}\n\n{cleandoc(struct.cls.__doc__ or '')}\n")
+        if struct.fields:
+            rows = [f"| `{f.encode_name}` | {_type(f.type)} | {_unit(f)} | {_default(f)} |" for f in struct.fields]
+            sections.append("\n".join(["| key | type | unit | default |", "|---|---|---|---|", *rows, ""]))
+    return "\n".join(sections)
+
+
+def write(folder: Path) -> None:
+    """Write both documents to `folder`."""
+    (folder / "scene.schema.json").write_text(json_schema(), encoding="utf-8")
+    (folder / "scene-reference.md").write_text(reference(), encoding="utf-8")
+
+
+def _structs(node: inspect.Type, seen: set[type]) -> Iterator[inspect.StructType]:
+    match node:
+        case inspect.StructType(cls=cls) if cls not in seen:
+            seen.add(cls)
+            yield node
+            for field in node.fields:
+                yield from _structs(field.type, seen)
+        case inspect.VarTupleType(item_type=item):
+            yield from _structs(item, seen)
+        case inspect.UnionType(types=types):
+            for each in types:
+                yield from _structs(each, seen)
+
+
+def _type(node: inspect.Type) -> str:
+    match node:
+        case inspect.StructType(cls=cls):
+            return f"[{cls.__name__}](#{_anchor(node)})"
+        case inspect.VarTupleType(item_type=item):
+            return f"array of {_type(item)}"
+        case inspect.TupleType(item_types=(first, *_) as items):
+            return f"{len(items)} × {_type(first)}"
+        case inspect.LiteralType(values=values):
+            return ", ".join(f'`"{value}"`' for value in values)
+        case inspect.UnionType(types=types):
+            return " or ".join(_type(each) for each in types if not isinstance(each, inspect.NoneType))
+    return SCALARS[type(node)]
+
+
+def _anchor(struct: inspect.StructType) -> str:
+    """The heading's anchor as Markdown renderers form it: lower case, punctuation dropped, spaces to hyphens."""
+    name = struct.cls.__name__.lower()
+    return name if struct.tag is None else f"{name}-{struct.tag_field}--{struct.tag}"
+
+
+def _unit(field: inspect.Field) -> str:
+    return split_unit(field.encode_name)[1]
+
+
+def _default(field: inspect.Field) -> str:
+    if field.required:
+        return "required"
+    return "none" if field.default is None else f"`{inline(field.default)}`"
+
+
+if __name__ == "__main__":
+    write(Path(sys.argv[1]) if len(sys.argv) > 1 else Path("docs"))
