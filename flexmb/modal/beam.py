@@ -133,7 +133,7 @@ def beam_elements(body: BeamBody) -> BeamElements:
         if name in _LINE_ROWS:
             fields[name] = LineField(mesh)
         else:
-            fields[name] = BendingField(mesh, _shear_parameter(mesh, table, name))
+            fields[name] = BendingField(mesh, shear=body.theory == "timoshenko")
     return BeamElements(mesh, table, fields)
 
 
@@ -145,15 +145,6 @@ def lump_mass(lump: Lump) -> Array:
 
 def _plane_stiffness(table: SectionTable, family: str) -> tuple[Array, Array | None]:
     return (table.EIz, table.GAy) if family == "bending_y" else (table.EIy, table.GAz)
-
-
-def _shear_parameter(mesh: Mesh, table: SectionTable, family: str) -> Array | None:
-    """12 EI / (GA h^2) of each element at its middle; None without shear."""
-    EI, GA = _plane_stiffness(table, family)
-    if GA is None:
-        return None
-    middle = (mesh.nodes[1:] + mesh.nodes[:-1]) / 2.0
-    return 12.0 * table.at(EI, middle) / (table.at(GA, middle) * np.diff(mesh.nodes) ** 2)
 
 
 def _weighted(rows: Array, weight: Array) -> Array:

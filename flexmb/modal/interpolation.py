@@ -19,8 +19,8 @@ INTERNAL_LINE = 3
 """Internal functions per element of a line field: degree 4."""
 INTERNAL_BENDING = 2
 """Internal functions per element and bending plane: deflection of degree 5."""
-INTERNAL_SHEAR = 3
-"""Internal shear functions per element and bending plane of a Timoshenko beam: shear strain of degree 3."""
+SHEAR_DEFLECTIONS = 4
+"""Internal deflections without rotation per element and bending plane of a Timoshenko beam."""
 
 
 @dataclass(frozen=True)
@@ -60,53 +60,50 @@ def line_shapes(xi: Array, h: Array) -> LineValues:
     return LineValues(value, slope)
 
 
-def bending_shapes(xi: Array, h: Array, phi: Array | None) -> BendingValues:
+def bending_shapes(xi: Array, h: Array, shear: bool) -> BendingValues:
     """Local functions of a bending element, columns [v0, theta0, v1, theta1, internal ...].
 
-    Nodal functions: the interdependent interpolation, exact for the statics of a uniform Timoshenko element with
-    phi = 12 EI / (GA h^2) (Przemieniecki 1968, sec. 5.6; Friedman and Kosmatka, Computers & Structures 47 (1993) 473);
-    it tends to the cubic Hermite functions as phi -> 0, hence does not lock. phi None: Euler-Bernoulli, no shear.
-    Internal functions: deflections b_k with theta = b_k' (no shear), then for Timoshenko deflections g_k with
-    theta = 0 (pure shear).
+    Without shear: the cubic Hermite functions and two internal deflections, all with theta = v': every v of degree 5.
+    With shear: besides these, deflections without rotation and one rotation without deflection; together every v of
+    degree 5 with every theta of degree 4. The statics of a uniform Timoshenko element (the interdependent
+    interpolation, Friedman and Kosmatka, Computers & Structures 47 (1993) 473) and the shear-free motions are both
+    among them, so the element is exact for end loads and does not lock.
     """
-    f = np.zeros_like(xi) if phi is None else phi
-    mu = 1.0 / (1.0 + f)
     x2, x3, x4 = xi**2, xi**3, xi**4
     one = np.ones_like(xi)
     v = np.column_stack([
-        mu * (2 * x3 - 3 * x2 - f * xi + 1 + f),
-        mu * h * (x3 - (2 + f / 2) * x2 + (1 + f / 2) * xi),
-        mu * (-2 * x3 + 3 * x2 + f * xi),
-        mu * h * (x3 - (1 - f / 2) * x2 - f / 2 * xi),
+        1 - 3 * x2 + 2 * x3,
+        h * (xi - 2 * x2 + x3),
+        3 * x2 - 2 * x3,
+        h * (x3 - x2),
         h * (x2 - 2 * x3 + x4),
         h * (x2 - 4 * x3 + 5 * x4 - 2 * xi**5),
     ])  # fmt: skip
     theta = np.column_stack([
-        6 * mu / h * (x2 - xi),
-        mu * (3 * x2 - (4 + f) * xi + 1 + f),
-        -6 * mu / h * (x2 - xi),
-        mu * (3 * x2 - (2 - f) * xi),
+        6 * (x2 - xi) / h,
+        1 - 4 * xi + 3 * x2,
+        6 * (xi - x2) / h,
+        3 * x2 - 2 * xi,
         2 * xi - 6 * x2 + 4 * x3,
         2 * xi - 12 * x2 + 20 * x3 - 10 * x4,
     ])  # fmt: skip
     curvature = np.column_stack([
-        6 * mu / h * (2 * xi - 1),
-        mu * (6 * xi - 4 - f),
-        -6 * mu / h * (2 * xi - 1),
-        mu * (6 * xi - 2 + f),
+        6 * (2 * xi - 1) / h,
+        6 * xi - 4,
+        6 * (1 - 2 * xi) / h,
+        6 * xi - 2,
         2 - 12 * xi + 12 * x2,
         2 - 24 * xi + 60 * x2 - 40 * x3,
     ]) / h[:, None]  # fmt: skip
-    gamma = np.column_stack([-mu * f / h, -mu * f / 2, mu * f / h, -mu * f / 2, 0 * one, 0 * one])
-    if phi is None:
-        return BendingValues(v, theta, curvature, gamma)
-    g, dg = integrated_legendre(xi, INTERNAL_SHEAR)
-    zero = np.zeros_like(g)
+    if not shear:
+        return BendingValues(v, theta, curvature, np.zeros_like(v))
+    g, dg = integrated_legendre(xi, SHEAR_DEFLECTIONS)
+    still, turn = np.zeros_like(g), (xi - x2)[:, None]
     return BendingValues(
-        np.hstack([v, h[:, None] * g]),
-        np.hstack([theta, zero]),
-        np.hstack([curvature, zero]),
-        np.hstack([gamma, dg]),
+        np.hstack([v, h[:, None] * g, 0 * turn]),
+        np.hstack([theta, still, turn]),
+        np.hstack([curvature, still, ((one - 2 * xi) / h)[:, None]]),
+        np.hstack([np.zeros_like(v), dg, -turn]),
     )
 
 
@@ -161,15 +158,15 @@ class LineField:
 class BendingField:
     """One bending plane. Coordinates: (v, theta) node by node, then internal ones element by element.
 
-    `phi` (elements,): shear parameter of each element, None for Euler-Bernoulli.
+    `shear`: Timoshenko's kinematics, otherwise Euler-Bernoulli's.
     """
 
     mesh: Mesh
-    phi: Array | None
+    shear: bool
 
     @property
     def _internal(self) -> int:
-        return INTERNAL_BENDING + (0 if self.phi is None else INTERNAL_SHEAR)
+        return INTERNAL_BENDING + (SHEAR_DEFLECTIONS + 1 if self.shear else 0)
 
     @property
     def size(self) -> int:
@@ -183,7 +180,7 @@ class BendingField:
     def at(self, x: Array) -> BendingValues:
         """Rows over all coordinates, (n, size)."""
         element, xi, h = self.mesh.locate(x)
-        local = bending_shapes(xi, h, None if self.phi is None else self.phi[element])
+        local = bending_shapes(xi, h, self.shear)
         internal = 2 * (self.mesh.elements + 1) + self._internal * element
         nodal = [2 * element + k for k in range(4)]
         columns = np.stack([*nodal, *(internal + k for k in range(self._internal))], axis=1)
