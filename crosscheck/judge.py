@@ -1,0 +1,175 @@
+"""From results to verdicts: every channel of every comparison, control and conservation check of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from crosscheck.case import Comparison, Conservation, Control, Side
+from crosscheck.channels import matches
+from crosscheck.results import CaseResults, Result
+from crosscheck.verdict import Finding, Status, Verdict, compare, conserve
+
+MISSING: tuple[Status, ...] = ("did not run", "refused", "failed")
+MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
+TRUE_MODEL = "conservation law"
+
+
+def judge(case: CaseResults) -> list[Verdict]:
+    """All verdicts of a case, in the order of its run file."""
+    run = case.case.run
+    found: list[Verdict] = []
+    for comparison in run.comparisons:
+        found += _comparison(case, comparison)
+    for control in run.controls:
+        found += _control(case, control)
+    for conservation in run.conservations:
+        found += (_conservation(case, conservation, engine) for engine in conservation.engines)
+    return found
+
+
+def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
+    a, b = case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
+    across = item.a.variant != item.b.variant
+    for channel, goal, finding in _channels(item.goals, a, b):
+        if finding is None:
+            scale = _scale(item.scales, channel)
+            finding = compare(channel, a.signal(channel, across), b.signal(channel, across), goal, scale)
+        yield _verdict(case, item.name, "comparison", channel, item.a, item.b, item.expect, item.reason, goal, finding)
+
+
+def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
+    """The faulty run takes its U from the same engine's true run: the same ladder on nearly the same scene."""
+    faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
+    twin, b = case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
+    across = item.a.variant != item.b.variant
+    why = f"negative control ({item.mutation} of {item.target or 'the scene'}): the fault must be noticed"
+    for channel, goal, finding in _channels(item.goals, faulty, b):
+        if finding is None:
+            finding = _absent(twin, channel)
+        if finding is None:
+            signal = faulty.control_signal(channel, twin)
+            finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
+        yield _verdict(case, item.name, "control", channel, item.a, item.b, "differ", why, goal, finding)
+
+
+def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict:
+    result = case.get(item.variant, engine)
+    channel = "energy.total" if item.quantity == "energy" else MOMENTUM[item.quantity]
+    finding = _absent(result, channel) or _drift(result, channel, item)
+    side = Side(variant=item.variant, engine=engine)
+    law = Side(variant=item.variant, engine=TRUE_MODEL)
+    name = f"{item.quantity.replace('_', ' ')} conserved"
+    return _verdict(case, name, "conservation", channel, side, law, item.expect, item.reason, item.limit, finding)
+
+
+def _drift(result: Result, channel: str, item: Conservation) -> Finding:
+    """Drift (SI): of the energy less the work done, or the change of the momentum vector."""
+    values = result.values(channel)
+    if item.quantity == "energy":
+        drift, scale = energy_drift(result)
+    else:
+        drift = np.linalg.norm(values - values[0], axis=1)
+        scale = float(np.max(np.linalg.norm(values, axis=1)))
+    return conserve(drift, item.scale if item.scale is not None else scale, item.limit)
+
+
+def energy_drift(result: Result) -> tuple[np.ndarray, float]:
+    """E(t) - E(0) - W(t) + W(0) (J), and the largest sum of magnitudes of the kinds of energy (J)."""
+    drift = result.values("energy.total")[:, 0]
+    if "work" in result.channels:
+        drift = drift - result.values("work")[:, 0]
+    kinds = [name for name in result.channels if name.startswith("energy.") and name != "energy.total"]
+    scale = float(np.max(sum(np.abs(result.values(name)[:, 0]) for name in kinds)))
+    return drift - drift[0], scale
+
+
+def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[str, float, Finding | None]]:
+    """Every channel to judge with its goal, and the finding where there is nothing to compare.
+
+    Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
+    is left out, any other channel that only one offers is a refusal of the other.
+    """
+    missing = _missing(a, b)
+    for pattern, goal in goals.items():
+        if missing is not None:
+            yield pattern, goal, missing
+            continue
+        offered = [name for name in _union(a.channels, b.channels) if _belongs(name, pattern, goals)]
+        if pattern not in offered:
+            shared = set(a.channels) & set(b.channels)
+            offered = [name for name in offered if name in shared or not name.startswith("energy.")]
+        if not offered:
+            text = f'neither {a.engine} nor {b.engine} has a channel "{pattern}"'
+            yield pattern, goal, Finding("did not run", text)
+        for name in offered:
+            yield name, goal, _absent(a, name) or _absent(b, name)
+
+
+def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:
+    """Whether `pattern` is the most specific (longest) of the patterns that name the channel."""
+    naming = [each for each in goals if matches(each, channel)]
+    return bool(naming) and max(naming, key=len) == pattern
+
+
+def _missing(a: Result, b: Result) -> Finding | None:
+    """The graver of two missing results: not run, refused, failed."""
+    absent = [result for result in (a, b) if result.status != "finished"]
+    if not absent:
+        return None
+    worst = min(absent, key=lambda result: MISSING.index(result.status))
+    return Finding(worst.status, f"{worst.engine} on {worst.variant}: {worst.message}")
+
+
+def _absent(result: Result, channel: str) -> Finding | None:
+    """Why a result has no such channel, if it has not."""
+    if result.status != "finished":
+        return Finding(result.status, f"{result.engine} on {result.variant}: {result.message}")
+    if channel not in result.channels:
+        return Finding("refused", f"{result.engine} does not offer {channel}")
+    return None
+
+
+def _scale(scales: dict[str, float], channel: str) -> float | None:
+    naming = [pattern for pattern in scales if matches(pattern, channel)]
+    return scales[max(naming, key=len)] if naming else None
+
+
+def _union(first: Iterable[str], second: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys((*first, *second)))
+
+
+def _verdict(
+    case: CaseResults,
+    name: str,
+    kind: str,
+    channel: str,
+    a: Side,
+    b: Side,
+    expected: Status,
+    why: str,
+    goal: float,
+    finding: Finding,
+) -> Verdict:
+    infos = case.case.variants
+    levels = dict.fromkeys(infos[side.variant].level for side in (a, b) if side.variant in infos)
+    return Verdict(
+        case=case.case.case,
+        comparison=name,
+        kind=kind,
+        channel=channel,
+        variant_a=a.variant,
+        engine_a=a.engine,
+        variant_b=b.variant,
+        engine_b=b.engine,
+        level=" / ".join(levels),
+        status=finding.status,
+        expected=expected,
+        E=finding.E,
+        U=finding.U,
+        goal=goal,
+        scale=finding.scale,
+        reason=finding.reason,
+        expected_reason=why,
+    )

@@ -1,0 +1,130 @@
+"""Numerical uncertainty of one engine's result, from its own runs at successive efforts.
+
+Let f_1, f_2, f_3 be the results at the last three efforts, coarse to fine, and d_12 = max |f_1 - f_2|, d_23 likewise.
+
+**Fixed step** h_1 > h_2 > h_3. If f(h) = f + C h^p with r_12 = h_1/h_2 and r_23 = h_2/h_3, then
+
+    d_12 / d_23 = r_23^p (r_12^p - 1) / (r_23^p - 1),         |f_3 - f| = d_23 / (r_23^p - 1).
+
+The first equation gives the observed order p (for equal ratios p = log(d_12/d_23) / log r); the second, Richardson's
+estimate, gives U with the safety factor 1.25 of the grid convergence index for three grids (Roache 1998). It is used
+where p is within `ORDER_BAND` of a whole number: all one-step and multistep methods have whole orders, so a p that is
+not is a sign of being outside the asymptotic range. No credit is given for more than order `ORDER_CREDIT`.
+Outside the band but with p at least 1 - ORDER_BAND, the method is taken to be of order 1: U = 1.25 d_23/(r_23 - 1).
+With a smaller p the runs have not begun to converge, or have reached round-off: U = 3 max(d_12, d_23), with the factor
+of the grid convergence index for an unproven order.
+
+**Tolerance.** Error is not a power of the tolerance, but it falls. If the finest error is at most half the one before,
+|f_2 - f_3| >= e_2 - e_3 >= e_3: the difference bounds the error. d_12 >= 2 d_23 is the sign of it; without it
+U = 3 max(d_12, d_23) again.
+
+**Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
+eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
+size is that of the largest signal of the same family (all hinge torques, all positions): a backward-stable solve leaves
+errors relative to the norm of everything it solves for.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq
+
+from crosscheck.channels import distance
+
+Array = NDArray[np.float64]
+
+SAFETY = 1.25
+UNPROVEN_SAFETY = 3.0
+ORDER_BAND = 0.1
+ORDER_CREDIT = 4.0
+LARGEST_ORDER = 16.0
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """U of one channel of one result: `envelope` (T,), never falling; `value`, its maximum; how it was found."""
+
+    envelope: Array
+    value: float
+    how: str
+    order: float | None = None
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One run of a ladder in one channel: the effort's step (s) or relative tolerance, and the signal (T, k)."""
+
+    effort: float
+    values: Array
+
+
+def estimate(channel: str, kind: str, rungs: Sequence[Rung], evaluations: int, size: float) -> Uncertainty:
+    """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
+
+    `size` is the magnitude of the signal's family, `evaluations` the number of right-hand sides (0 if not counted).
+    """
+    finest = rungs[-1].values
+    floor = roundoff_floor(size, max(evaluations, len(finest)))
+    if len(rungs) < 2:
+        unknown = np.full(len(finest), np.inf)
+        return Uncertainty(unknown, float("inf"), "unknown: only one effort finished")
+    gap = distance(channel, rungs[-2].values, finest)
+    if len(rungs) == 2:
+        envelope = np.maximum.accumulate(UNPROVEN_SAFETY * gap) + floor
+        return Uncertainty(envelope, float(envelope[-1]), "3 x the difference of the only two efforts")
+    wider = distance(channel, rungs[-3].values, rungs[-2].values)
+    factor, gap, how, order = _bound(kind, [rung.effort for rung in rungs[-3:]], wider, gap)
+    envelope = np.maximum.accumulate(factor * gap) + floor
+    return Uncertainty(envelope, float(envelope[-1]), how, order)
+
+
+def roundoff_floor(size: float, evaluations: int) -> float:
+    """eps sqrt(N) times the size of the signals."""
+    return float(np.finfo(np.float64).eps * np.sqrt(evaluations) * size)
+
+
+def spatial(channel: str, coarse: Array, fine: Array, ratio: float, order: float) -> Array:
+    """U (T,) of a spatial discretisation, for its *coarse* result: f_c - f = (f_c - f_f) r^p / (r^p - 1), safety 1.25.
+
+    `order` is the known order p of the discretisation and `ratio` r its refinement.
+    """
+    gain = ratio**order
+    return np.maximum.accumulate(SAFETY * gain / (gain - 1.0) * distance(channel, coarse, fine))
+
+
+def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | None:
+    """Order p from three steps and the two differences; None where there is none between 0 and LARGEST_ORDER."""
+    if gap <= 0.0 or wider <= 0.0:
+        return None
+    first, second = steps[0] / steps[1], steps[1] / steps[2]
+
+    def mismatch(order: float) -> float:
+        return second**order * (first**order - 1.0) / (second**order - 1.0) - wider / gap
+
+    low, high = 1e-3, LARGEST_ORDER
+    if mismatch(low) * mismatch(high) > 0.0:
+        return None
+    return float(brentq(mismatch, low, high))
+
+
+def _bound(kind: str, efforts: Sequence[float], wider: Array, gap: Array) -> tuple[float, Array, str, float | None]:
+    """Factor, the difference (T,) it applies to, an explanation, and the observed order if there is one."""
+    far, near = float(np.max(wider)), float(np.max(gap))
+    unproven = UNPROVEN_SAFETY, np.maximum(wider, gap), "3 x the larger difference: the runs do not converge yet", None
+    if kind == "tolerance":
+        if far < 2.0 * near:
+            return unproven
+        return 1.0, gap, "difference of the two finest tolerances", None
+    order = observed_order(efforts, far, near)
+    if order is None or order < 1.0 - ORDER_BAND:
+        return unproven
+    ratio = efforts[1] / efforts[2]
+    if abs(order - round(order)) > ORDER_BAND:
+        how = f"difference of the two finest steps, as order {order:.2f} is not whole"
+        return SAFETY / (ratio - 1.0), gap, how, order
+    credited = min(order, ORDER_CREDIT)
+    return SAFETY / (ratio**credited - 1.0), gap, f"Richardson, observed order {order:.2f}", order

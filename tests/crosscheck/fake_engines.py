@@ -1,0 +1,205 @@
+"""Engines that are none: a planar pendulum integrated in a few lines, with the faults that engines have.
+
+They know one scene: a rigid body on a revolute hinge to the ground, axis +-z, mass centre on the body's x axis.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from crosscheck.engines.contract import Effort, EngineMissing, MarkerPath, Run, Snapshot, Support, Trajectory
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+TOLERANCES = tuple(Effort(kind="tolerance", value=10.0**-n, method="dop853") for n in (6, 8, 10, 12))
+STEPS = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(4, 8))
+COARSE = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(3))
+
+
+@dataclass
+class Pendulum:
+    """theta'' = -m g l sin(theta + phase) / I about the hinge; x = l cos, y = l sin of the angle from the x axis."""
+
+    scene: Scene
+    gravity_factor: float = 1.0
+
+    def __post_init__(self) -> None:
+        body, hinge = self.scene.bodies[0], self.scene.hinges[0]
+        self.mass, self.arm = body.mass_kg, body.com_m[0]
+        self.inertia = body.inertia_kg_m2[2][2] + self.mass * self.arm**2
+        self.gravity = self.gravity_factor * self.scene.gravity_m_s2[1]
+        self.sign = np.sign(hinge.axis[2])
+        self.start = np.array([hinge.rotation.angle_rad, hinge.rotation.rate_rad_s]) * self.sign
+        self.tips = {marker.name: body.nodes[0].position_m[0] for marker in self.scene.markers}
+
+    def warm_up(self) -> None:
+        pass
+
+    def rate(self, t: float, y: Array) -> Array:
+        return np.array([y[1], self.mass * self.gravity * self.arm * np.cos(y[0]) / self.inertia])
+
+    def evaluate(self) -> Snapshot:
+        raise NotImplementedError
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        if effort.kind == "tolerance":
+            solution = solve_ivp(
+                self.rate,
+                (0.0, run.times[-1]),
+                self.start,
+                "DOP853",
+                run.times,
+                rtol=effort.value,
+                atol=effort.value * 1e-2,
+            )
+            return self.trajectory(run.times, solution.y.T, 1e-3, solution.nfev)
+        states, count = rk4(self.rate, self.start, run.times, effort.value)
+        return self.trajectory(run.times, states, 2e-3 / effort.value, count)
+
+    def trajectory(self, times: Array, states: Array, wall: float, evaluations: int) -> Trajectory:
+        angle, speed = states.T
+        zero = np.zeros_like(angle)
+        out = np.column_stack([np.cos(angle), np.sin(angle), zero])
+        along = np.column_stack([-np.sin(angle), np.cos(angle), zero])
+        turn = np.column_stack([zero, zero, speed])
+        acceleration = np.array([self.rate(0.0, state)[1] for state in states])
+        com = self.arm * (acceleration[:, None] * along - speed[:, None] ** 2 * out)
+        force = self.mass * (com - np.array([0.0, self.gravity, 0.0]))
+        quaternion = np.column_stack([np.cos(angle / 2), zero, zero, np.sin(angle / 2)])
+        return Trajectory(
+            status="finished",
+            message="",
+            times=times,
+            markers={
+                name: MarkerPath(length * out, quaternion, np.hstack([turn, length * speed[:, None] * along]))
+                for name, length in self.tips.items()
+            },
+            loads={self.scene.hinges[0].name: np.hstack([np.zeros_like(force), force])},
+            energy={
+                "kinetic": 0.5 * self.inertia * speed**2,
+                "gravity": -self.mass * self.gravity * self.arm * np.sin(angle),
+            },
+            momentum=np.hstack([self.inertia * turn, self.mass * self.arm * speed[:, None] * along]),
+            wall_s=wall,
+            evaluations=evaluations,
+        )
+
+
+def rk4(rate: Callable[[float, Array], Array], start: Array, times: Array, step: float) -> tuple[Array, int]:
+    """Classical Runge-Kutta with the step cut to reach every sample time; states (T, n) and evaluations."""
+    states, count = [start], 0
+    for begin, end in zip(times, times[1:], strict=False):
+        n = max(round((end - begin) / step), 1)
+        h, y = (end - begin) / n, states[-1]
+        for i in range(n):
+            t = begin + i * h
+            k1 = rate(t, y)
+            k2 = rate(t + h / 2, y + h / 2 * k1)
+            k3 = rate(t + h / 2, y + h / 2 * k2)
+            k4 = rate(t + h, y + h * k3)
+            y = y + h / 6 * (k1 + 2 * k2 + 2 * k3 + k4)
+        states.append(y)
+        count += 4 * n
+    return np.array(states), count
+
+
+@dataclass
+class Fake:
+    """A sound engine; the others differ in one respect each."""
+
+    name: str
+    ladder: tuple[Effort, ...] = TOLERANCES
+    gravity_factor: float = 1.0
+
+    def version(self) -> str:
+        return "1.0"
+
+    def supports(self, scene: Scene) -> Support:
+        return Support("exact")
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        return self.ladder
+
+    def compile(self, scene: Scene) -> Pendulum:
+        return Pendulum(scene, self.gravity_factor)
+
+
+class Absent(Fake):
+    """Its library is not installed."""
+
+    def version(self) -> str:
+        raise EngineMissing("the library is not installed; install the extra `absent`")
+
+
+class Refuser(Fake):
+    """Cannot represent the scene."""
+
+    def supports(self, scene: Scene) -> Support:
+        return Support("no", "revolute hinges are beyond it")
+
+
+class Crasher(Fake):
+    """Dies with its process."""
+
+    def compile(self, scene: Scene) -> Pendulum:
+        os._exit(139)
+
+
+class Raiser(Fake):
+    """Raises in the middle of a run."""
+
+    def compile(self, scene: Scene) -> Pendulum:
+        raise RuntimeError("the solver gave up on purpose")
+
+
+class DivergingPendulum(Pendulum):
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        half = Run(run.times[: len(run.times) // 2])
+        good = super().simulate(half, effort)
+        return Trajectory("diverged", "the step fell below 1e-12 s", good.times, good.markers, energy=good.energy)
+
+
+class Diverger(Fake):
+    """Keeps the good half of its run and says that it diverged."""
+
+    def compile(self, scene: Scene) -> Pendulum:
+        return DivergingPendulum(scene)
+
+
+class LoudPendulum(Pendulum):
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        with open(os.environ["FAKE_ENGINE_DIARY"], "a", encoding="utf-8") as diary:
+            diary.write(f"{effort.label}\n")
+        return super().simulate(run, effort)
+
+
+class Diarist(Fake):
+    """Writes down every run in the file named by FAKE_ENGINE_DIARY."""
+
+    def compile(self, scene: Scene) -> Pendulum:
+        return LoudPendulum(scene)
+
+
+def engines() -> dict[str, Fake]:
+    """All of them, by name."""
+    return {
+        engine.name: engine
+        for engine in (
+            Fake("fine"),
+            Fake("stepper", STEPS),
+            Fake("sloppy", COARSE),
+            Fake("biased", gravity_factor=1.001),
+            Absent("absent"),
+            Refuser("refuser"),
+            Crasher("crasher"),
+            Raiser("raiser"),
+            Diverger("diverger"),
+            Diarist("diarist"),
+        )
+    }
