@@ -1,0 +1,21 @@
+"""The repository as its own tests see it: where it is, what belongs to it, what its metadata says."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+PYPROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
+SOURCES = ("flexmb", "crosscheck", "cases", "tests", "docs", ".ci")
+TEXT = {".py", ".toml", ".md", ".cff", ".json", ".html", ".css", ".js", ".csv", ".txt", ""}
+
+
+def text_files() -> Iterator[Path]:
+    """Every text file of the project, generated and cached ones left out."""
+    yield from (path for path in sorted(ROOT.iterdir()) if path.is_file() and path.suffix in TEXT - {""})
+    for folder in SOURCES:
+        for path in sorted((ROOT / folder).rglob("*")):
+            if path.is_file() and path.suffix in TEXT and "__pycache__" not in path.parts:
+                yield path

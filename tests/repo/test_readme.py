@@ -1,0 +1,43 @@
+"""The README's quick start is two commands that do all their own set-up and name options that exist."""
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from typer.main import get_command
+
+from crosscheck.cli import app
+from tests.repo.project import PYPROJECT, ROOT
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+QUICK_START = README.partition("## Quick start")[2].partition("\n## ")[0]
+COMMANDS = [block.strip() for block in re.findall(r"```sh\n(.*?)```", QUICK_START, flags=re.DOTALL)]
+
+
+def test_exactly_two_commands() -> None:
+    assert len(COMMANDS) == 2
+    assert all(len(command.splitlines()) == 1 for command in COMMANDS)
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_command_sets_itself_up(command: str) -> None:
+    """Every program it starts is `python3` or something the command has put into .venv before."""
+    steps = [step.split()[0] for step in command.split(" && ")]
+    assert steps[0] == "python3"
+    assert all(step.startswith(".venv/bin/") for step in steps[1:])
+    extras = re.search(r"'\.\[(.*?)\]'", command)
+    assert extras is not None
+    assert set(extras[1].split(",")) <= set(PYPROJECT["project"]["optional-dependencies"])
+
+
+def test_crosscheck_options_exist() -> None:
+    words = COMMANDS[0].rpartition(".venv/bin/crosscheck ")[2].split()
+    run = get_command(app).commands[words[0]]  # type: ignore[attr-defined]
+    options = {name for parameter in run.params for name in parameter.opts}
+    assert {word for word in words if word.startswith("--")} <= options
+
+
+def test_the_test_command_is_what_continuous_integration_runs() -> None:
+    assert COMMANDS[1].startswith("python3 ") and COMMANDS[1].endswith("pytest")
+    assert 'grep -E "^python3 .*pytest$" README.md' in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
