@@ -54,7 +54,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` as an entry point, cached on disk."""
     if CACHE_DIRECTORY is None:
         return njit(**_SEMANTICS)(function)
-    # Numba reads its cache directory while it decorates: set only here, the caches of other packages stay where they are.
+    # Numba reads its cache directory while it decorates: set only here, other packages keep theirs.
     others, config.CACHE_DIR = config.CACHE_DIR, CACHE_DIRECTORY
     try:
         return njit(cache=True, **_SEMANTICS)(function)
@@ -68,9 +68,9 @@ def helper(function: Callable[..., Any]) -> Any:
 
 
 def generic(function: Callable[..., Any]) -> Any:
-    """Compile `function`, which takes kernels as arguments, into every place it is called from.
+    """Write out `function`, which takes kernels as arguments, in every place it is called from.
 
     A kernel that is still passed around in the machine code is an address of this process: numba then refuses to cache
-    the caller. Inlining down to the entry point, which names the kernel, turns it into a direct call.
+    the caller. Written out down to the entry point, which names the kernel, it is a direct call.
     """
-    return njit(forceinline=True, no_cpython_wrapper=True, no_cfunc_wrapper=True, **_SEMANTICS)(function)
+    return njit(inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True, **_SEMANTICS)(function)

@@ -1,0 +1,1 @@
+"""Integrators: whole runs in one compiled loop, given a right-hand side; no mechanics here."""

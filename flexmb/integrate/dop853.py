@@ -1,0 +1,202 @@
+"""DOP853: Runge-Kutta of order 8 with error control and dense output of order 7, whole runs in one compiled loop.
+
+Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I (1993), II.5 and II.10. A step ends in this order:
+error test, projection of the new state, derivative at the projected state. That derivative is the first stage of the
+next step and belongs to the interpolant: both are consistent with the projected state, and projection costs no order.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from flexmb.integrate.control import (
+    ACCEPTED,
+    REJECTED,
+    RETREAT,
+    SAMPLES,
+    all_finite,
+    copy,
+    derivative,
+    initial_step,
+    step_factor,
+)
+from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
+from flexmb.kernel import generic, helper
+from flexmb.status import MAX_STEPS, NONFINITE, OK, STEP_TOO_SMALL
+
+_END = STAGES  # row of A with the weights of the result; k[_END] is the derivative there
+_ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)
+
+
+@helper
+def weighted_sum(weights, count, k, i):
+    """Sum over j < count of weights[j] k[j, i]."""
+    total = 0.0
+    for j in range(count):
+        total += weights[j] * k[j, i]
+    return total
+
+
+@helper
+def combine(y, h, row, k, result):
+    """result = y + h * sum over j < row of A[row, j] k[j]."""
+    for i in range(y.shape[0]):
+        result[i] = y[i] + h * weighted_sum(A[row], row, k, i)
+
+
+@generic
+def stages(rhs, t, last, y, h, k, trial, constants, workspace, counts):
+    """Stages 1 to 11 (stage 0 is given), then trial = y(t + h). No stage is evaluated later than `last`."""
+    for s in range(1, STAGES + 1):
+        combine(y, h, s, k, trial)
+        if s == _END:
+            break
+        status = derivative(rhs, min(t + C[s] * h, last), trial, k[s], constants, workspace, counts)
+        if status != OK:
+            return status
+    return OK if all_finite(trial) else NONFINITE
+
+
+@helper
+def error_norm(y, y_new, h, k, rtol, atol, controlled):
+    """Hairer's blend of the 5th and 3rd order error estimates over the tolerance: 1 is just acceptable."""
+    sum5, sum3 = 0.0, 0.0
+    for i in range(controlled):
+        scale = atol + rtol * max(abs(y[i]), abs(y_new[i]))
+        sum5 += (weighted_sum(E5, E5.shape[0], k, i) / scale) ** 2
+        sum3 += (weighted_sum(E3, E3.shape[0], k, i) / scale) ** 2
+    if sum5 == 0.0 and sum3 == 0.0:
+        return 0.0
+    return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * controlled)
+
+
+@generic
+def interpolant(rhs, t, last, y, y_new, h, k, f, trial, constants, workspace, counts):
+    """Coefficients f (7, n) of the interpolant of order 7 on the step from y(t) to y_new; three more stages."""
+    for s in range(STAGES + 1, STAGES_DENSE):
+        combine(y, h, s, k, trial)
+        status = derivative(rhs, min(t + C[s] * h, last), trial, k[s], constants, workspace, counts)
+        if status != OK:
+            return status
+    for i in range(y.shape[0]):
+        change = y_new[i] - y[i]
+        f[0, i] = change
+        f[1, i] = h * k[0, i] - change
+        f[2, i] = 2.0 * change - h * (k[_END, i] + k[0, i])
+        for row in range(4):
+            f[3 + row, i] = h * weighted_sum(D[row], D.shape[1], k, i)
+    return OK
+
+
+@helper
+def interpolate(y, f, x, result):
+    """result = y + x (f0 + (1-x) (f1 + x (f2 + (1-x) (f3 + ...)))): the state at the fraction x of the step."""
+    for i in range(y.shape[0]):
+        value = 0.0
+        for row in range(6, -1, -1):
+            value = (value + f[row, i]) * (x if row % 2 == 0 else 1.0 - x)
+        result[i] = y[i] + value
+
+
+@generic
+def store_samples(rhs, project, t, t_new, last, y, y_new, k, f, times, constants, workspace, out, counts):
+    """Store the samples in (t, t_new]; inside the step by the interpolant, which is only built where it is needed.
+
+    Interpolated states are projected, so that quaternions are unit and prescribed coordinates exact there too.
+    """
+    sample = counts[SAMPLES]
+    built = False
+    while sample < times.shape[0] and times[sample] <= t_new:
+        if times[sample] == t_new:
+            copy(y_new, out[sample])
+        else:
+            if not built:
+                status = interpolant(rhs, t, last, y, y_new, t_new - t, k, f, out[sample], constants, workspace, counts)
+                if status != OK:
+                    return status
+                built = True
+            interpolate(y, f, (times[sample] - t) / (t_new - t), out[sample])
+            project(times[sample], out[sample], constants)
+        sample += 1
+        counts[SAMPLES] = sample
+    return OK
+
+
+@generic
+def attempt(rhs, project, t, t_new, last, y, y_new, k, rtol, atol, controlled, constants, workspace, counts):
+    """One trial step: y_new = y(t_new), projected, and k[_END] = f(t_new, y_new). Returns (status, error norm)."""
+    h = t_new - t
+    status = stages(rhs, t, last, y, h, k, y_new, constants, workspace, counts)
+    if status != OK:
+        return status, math.inf
+    error = error_norm(y, y_new, h, k, rtol, atol, controlled)
+    if error < 1.0:
+        project(t_new, y_new, constants)
+        status = derivative(rhs, min(t_new, last), y_new, k[_END], constants, workspace, counts)
+    return status, error
+
+
+@generic
+def dop853(rhs, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts):
+    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends: increasing, the last is
+    times[-1]; no step crosses one, and the stages before one see the right-hand side's limit from the left.
+    `project(t, y, constants)` puts y back on its manifold. Only the first `controlled` components enter the error norm:
+    what follows are quadratures (work), which nothing depends on; they have no scale of their own to compare `atol`
+    with, and are as smooth as the state, hence integrated as accurately by the same steps.
+    A step whose right-hand side fails is retried shorter: it may only have reached too far. When the step gets too
+    short to advance time, the failure's own status is returned. counts (4,): evaluations, accepted and rejected steps,
+    samples stored. Returns (status code, time of the last good state).
+    """
+    n = y.shape[0]
+    k = np.empty((STAGES_DENSE, n))
+    y_new, f = np.empty(n), np.empty((7, n))
+    t, h = times[0], 0.0
+    project(t, y, constants)
+    copy(y, out[0])
+    counts[SAMPLES] = 1
+    for end in segment_ends:
+        last = np.nextafter(end, t)
+        status = derivative(rhs, t, y, k[0], constants, workspace, counts)
+        if status != OK:
+            return status, t
+        if h == 0.0:
+            h = initial_step(
+                rhs, t, y, k[0], end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
+                constants, workspace, counts, y_new, k[1],
+            )  # fmt: skip
+        rejected = False
+        trouble = STEP_TOO_SMALL
+        while t < end:
+            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
+                return MAX_STEPS, t
+            if h < 10.0 * (np.nextafter(t, math.inf) - t):
+                return trouble, t
+            t_new = end if t + 1.01 * h >= end else t + h  # 1.01: no sliver of a step is left before the end
+            status, error = attempt(
+                rhs, project, t, t_new, last, y, y_new, k, rtol, atol, controlled, constants, workspace, counts
+            )
+            accepted = status == OK and error < 1.0
+            if accepted:
+                status = store_samples(
+                    rhs, project, t, t_new, last, y, y_new, k, f, times, constants, workspace, out, counts
+                )
+                if status != OK:
+                    return status, t
+                factor = step_factor(error, _ERROR_EXPONENT, rejected)
+                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
+                h = max(h, (t_new - t) * factor) if t_new == end and factor >= 1.0 else (t_new - t) * factor
+                t = t_new
+                copy(y_new, y)
+                copy(k[_END], k[0])
+                counts[ACCEPTED] += 1
+                trouble = STEP_TOO_SMALL
+            else:
+                h = (t_new - t) * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else RETREAT)
+                trouble = STEP_TOO_SMALL if status == OK else status
+                counts[REJECTED] += 1
+            rejected = not accepted
+    return OK, t
