@@ -93,6 +93,15 @@ def test_static_modes_make_tip_loads_exact(theory):
     assert slope == pytest.approx(P * length**2 / (2.0 * EI), rel=1e-10)
 
 
+def test_static_modes_of_a_free_beam_make_its_tip_flexibility_exact():
+    # Sum over all modes of (tip / omega)^2 with tip^2 = 4 / (m L): 4 L^3/EI sum 1/(beta_n L)^4, and the power
+    # series of 1 - cos cosh gives sum 1/(beta_n L)^4 = 1/420.
+    modes = {"families": ("bending_z",), "static": True, "boundary": "free-free"}
+    model = flexible_model(beam(4, 2, {"EIy_Nm2": 1.7}, modes))
+    tip = model.nodes["tip"].translation[2]
+    assert tip @ np.linalg.solve(model.stiffness, tip) == pytest.approx(1.0 / (105.0 * 1.7), rel=1e-10)
+
+
 def test_static_modes_keep_the_eigenmodes():
     plain, extended = (frequencies(beam(8, 6, modes={"static": static})) for static in (False, True))
     assert extended[:6] == pytest.approx(plain, rel=1e-14)
