@@ -10,9 +10,11 @@ from math import cos, inf, pi, sin
 from typing import NamedTuple
 
 import numpy as np
+from msgspec import Struct
 from scipy.interpolate import make_interp_spline
 
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.schema import Scene
 
 
 class Profile(NamedTuple):
@@ -55,6 +57,25 @@ def breaks(function: Function) -> tuple[float, ...]:
 def breaks_between(functions: list[Function], first: float, last: float) -> list[float]:
     """All break times strictly inside (first, last), sorted, each once."""
     return sorted({t for function in functions for t in breaks(function) if first < t < last})
+
+
+def scene_functions(scene: Scene) -> list[Function]:
+    """Every function of time in the scene: loads, motors, prescribed motions."""
+    found: list[Function] = []
+
+    def visit(item: object) -> None:
+        if isinstance(item, Function):
+            found.append(item)
+        elif isinstance(item, Struct):
+            for key in item.__struct_fields__:
+                visit(getattr(item, key))
+        elif isinstance(item, tuple):
+            for each in item:
+                visit(each)
+
+    for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads):
+        visit(part)
+    return found
 
 
 def fastest_rate(function: Function, until: float = inf) -> float:

@@ -1,0 +1,64 @@
+"""The MuJoCo adapter: what it supports, and how hard it may try."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.links import Link, links, obstacle
+from flexmb.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from crosscheck.engines.mujoco.model import MujocoModel
+
+_COARSEST = 4e-3  # s
+_MOTION = 0.3  # rad a step of the fastest prescribed or initial turning, at the coarsest effort
+_ELASTIC = 1.0  # rad a step of the stiffest spring mode: RK4 is stable to 2.8
+_LADDER = (1.0, 0.5, 0.25, 0.125)
+
+
+class MujocoEngine:
+    """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
+
+    name = "mujoco"
+
+    def version(self) -> str:
+        try:
+            import mujoco
+        except ImportError as error:
+            raise EngineMissing("MuJoCo is not installed: pip install flexmb[peers]") from error
+        return mujoco.__version__
+
+    def supports(self, scene: Scene) -> Support:
+        reason = obstacle(scene, "MuJoCo")
+        if not reason:
+            reason = next(filter(None, map(_refusal, links(scene))), "")
+        return Support("no", reason) if reason else Support("exact")
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        """Steps by halves, the coarsest fitting the scene's fastest motion and stiffest spring."""
+        fastest = self.compile(scene).fastest()
+        coarsest = min(_COARSEST, _MOTION / max(fastest.motion, 1e-9), _ELASTIC / max(fastest.elastic, 1e-9))
+        coarsest = float(f"{coarsest:.2g}")
+        return tuple(Effort("step", coarsest * part, "RK4") for part in _LADDER)
+
+    def compile(self, scene: Scene) -> MujocoModel:
+        self.version()
+        from crosscheck.engines.mujoco.model import MujocoModel
+
+        support = self.supports(scene)
+        if support.kind == "no":
+            raise ValueError(f'scene "{scene.name}": {support.reason}')
+        return MujocoModel(scene)
+
+
+def _refusal(link: Link) -> str:
+    """Why MuJoCo's compiler would reject a link."""
+    if link.inertia.mass <= 0.0:
+        return f'MuJoCo needs a positive mass on every link ("{link.name}")'
+    a, b, c = np.linalg.eigvalsh(link.inertia.inertia)
+    if a < -1e-12 * c or a + b < c * (1.0 - 1e-12):
+        return f'MuJoCo refuses the inertia of "{link.name}": principal moments {a:g}, {b:g}, {c:g} kg m^2'
+    return ""

@@ -1,0 +1,103 @@
+"""What MuJoCo cannot hold in its model: motors, loads at nodes and prescribed accelerations as functions of time."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.engines.conventions import rotation_vector
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
+from crosscheck.engines.mujoco.tree import ARMATURE, Slot, Tree
+from flexmb.scene.schema import Load, Scene
+
+Array = NDArray[np.float64]
+
+
+class Forces:
+    """Writes applied forces into `data` at every stage of a step, through MuJoCo's control callback.
+
+    The callback is global to the process: `active` sets it and always takes it away again. `before_end` (s) caps the
+    time seen by the functions, so that the last stage before a jump sees the limit from the left.
+    """
+
+    def __init__(self, tree: Tree, scene: Scene) -> None:
+        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        self.driven: list[Slot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
+        self._tree = tree
+        self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
+        self._motors = {
+            slot.v: profile(slot.freedom.effort)
+            for slot in scalars
+            if slot.freedom.effort is not None and slot.freedom.prescribed is None
+        }
+        self._loads = [_NodeLoad(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
+        self.before_end = np.inf
+
+    @contextmanager
+    def active(self) -> Iterator[None]:
+        if not (self._motions or self._motors or self._loads):
+            yield
+            return
+        mujoco.set_mjcb_control(self._apply)
+        try:
+            yield
+        finally:
+            mujoco.set_mjcb_control(None)
+
+    def motor(self, slot: Slot, t: float) -> float:
+        """Motor effort of a scalar freedom (Nm or N)."""
+        return 0.0 if slot.freedom.effort is None else profile(slot.freedom.effort)(t).value
+
+    def follow(self, t: float, data: mujoco.MjData) -> None:
+        """Put the prescribed coordinates where their functions say."""
+        for q, v, motion in self._motions:
+            data.qpos[q], data.qvel[v], _ = motion(t)
+
+    def spring_energy(self, q: Array) -> float:
+        energy = 0.0
+        for slot in self._tree.slots:
+            match slot.freedom:
+                case Scalar(stiffness=k, rest=rest):
+                    energy += 0.5 * k * (q[slot.q] - rest) ** 2
+                case Ball(stiffness=k):
+                    turn = rotation_vector(q[slot.q : slot.q + 4] / np.linalg.norm(q[slot.q : slot.q + 4]))
+                    energy += 0.5 * k * (turn @ turn)
+        return float(energy)
+
+    def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
+        t = min(data.time, self.before_end)
+        for index, motor in self._motors.items():
+            data.qfrc_applied[index] = motor(t).value
+        for _, v, motion in self._motions:
+            data.qfrc_applied[v] = ARMATURE * motion(t).acceleration
+        if self._loads:
+            data.xfrc_applied[:] = 0.0
+            for load in self._loads:
+                load.add(t, data)
+
+
+class _NodeLoad:
+    """A force or torque at a node, handed to MuJoCo as a wrench [force; torque] at the mass centre in World axes."""
+
+    def __init__(self, tree: Tree, at: Attachment, load: Load) -> None:
+        self._body = int(tree.bodies[at.link])
+        self._arm = at.frame.position - tree.links[at.link].inertia.com
+        self._in_world = load.frame == "world"
+        direction = np.array(load.direction, dtype=float)
+        self._direction = direction if self._in_world else at.frame.rotation @ direction
+        self._is_force = load.type == "force"
+        self._size = profile(load.function)
+
+    def add(self, t: float, data: mujoco.MjData) -> None:
+        R = data.xmat[self._body].reshape(3, 3)
+        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
+        if self._is_force:
+            data.xfrc_applied[self._body, :3] += vector
+            data.xfrc_applied[self._body, 3:] += np.cross(R @ self._arm, vector)
+        else:
+            data.xfrc_applied[self._body, 3:] += vector

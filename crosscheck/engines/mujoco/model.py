@@ -1,0 +1,148 @@
+"""One scene compiled for MuJoCo: evaluate at t = 0, or integrate with RK4 at a fixed step."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from itertools import pairwise
+from math import ceil
+from typing import NamedTuple
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.functions_of_time import breaks_between, fastest_rate, scene_functions
+from crosscheck.engines.links import Ball, Floating, Scalar, links
+from crosscheck.engines.mujoco.forces import Forces
+from crosscheck.engines.mujoco.observer import Observer
+from crosscheck.engines.mujoco.tree import build_tree, initial_state
+from crosscheck.engines.trajectories import stack
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+_STAGES = 4
+
+
+class Fastest(NamedTuple):
+    """What bounds a step: turning rates of `motion` and poles of springs and dampers (`elastic`), rad/s."""
+
+    motion: float
+    elastic: float
+
+
+class MujocoModel:
+    def __init__(self, scene: Scene) -> None:
+        self._tree = build_tree(links(scene), np.array(scene.gravity_m_s2, dtype=float))
+        self._forces = Forces(self._tree, scene)
+        self._observer = Observer(self._tree, self._forces, scene)
+        self._functions = scene_functions(scene)
+
+    def warm_up(self) -> None:
+        """Nothing is compiled; touch the code once so that first-call costs are not timed."""
+        self.evaluate()
+
+    def evaluate(self) -> Snapshot:
+        self._forces.before_end = np.inf
+        return self._observer.observe(0.0, self._initial())
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        with _quiet():
+            start = time.perf_counter()
+            states, steps, message = self._integrate(run.times, effort.value)
+            wall = time.perf_counter() - start
+            self._forces.before_end = np.inf
+            data = mujoco.MjData(self._tree.model)
+            samples = []
+            for t, (qpos, qvel) in zip(run.times, states, strict=False):
+                data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
+                samples.append(self._observer.observe(t, data))
+        status: Status = "finished" if len(states) == len(run.times) else "diverged"
+        reached = run.times[: len(states)]
+        evaluations = _STAGES * steps
+        return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations)
+
+    def fastest(self) -> Fastest:
+        """Fastest motion and stiffest pole at the initial state, for choosing a step."""
+        model, data = self._tree.model, self._initial()
+        mujoco.mj_forward(model, data)
+        rates = [0.0]
+        K, C = np.zeros((2, model.nv))
+        for slot in self._tree.slots:
+            match slot.freedom:
+                case Scalar(prescribed=None, angular=angular) as freedom:
+                    rates.append(abs(freedom.rate) if angular else 0.0)
+                    K[slot.v], C[slot.v] = freedom.stiffness, freedom.damping
+                case Scalar(angular=True) as freedom:
+                    rates.append(fastest_rate(freedom.prescribed))
+                case Ball() as freedom:
+                    rates.append(float(np.linalg.norm(freedom.angular_velocity)))
+                    K[slot.v : slot.v + 3], C[slot.v : slot.v + 3] = freedom.stiffness, freedom.damping
+                case Floating() as freedom:
+                    rates.append(float(np.linalg.norm(freedom.angular_velocity)))
+        M = np.zeros((model.nv, model.nv))
+        mujoco.mj_fullM(model, data, M)
+        free = np.setdiff1d(np.arange(model.nv), [slot.v for slot in self._forces.driven])
+        M = M[np.ix_(free, free)]
+        elastic = np.sqrt(eigh(np.diag(K[free]), M, eigvals_only=True).max(initial=0.0))
+        damped = eigh(np.diag(C[free]), M, eigvals_only=True).max(initial=0.0)
+        return Fastest(max(rates), float(max(elastic, damped)))
+
+    def _initial(self) -> mujoco.MjData:
+        data = mujoco.MjData(self._tree.model)
+        data.qpos[:], data.qvel[:] = initial_state(self._tree)
+        return data
+
+    def _integrate(self, times: Array, longest: float) -> tuple[list[tuple[Array, Array]], int, str]:
+        """(qpos, qvel) at the sample times reached, steps made, and why it stopped early.
+
+        Samples and breaks of the functions of time cut the run into stretches of whole equal steps <= `longest`. At the
+        start of each, prescribed coordinates are put on their functions, so that their round-off cannot pile up.
+        """
+        model, data = self._tree.model, self._initial()
+        wanted = set(times.tolist())
+        ends = sorted(wanted | set(breaks_between(self._functions, times[0], times[-1])))
+        states = [(data.qpos.copy(), data.qvel.copy())]
+        total = 0
+        with self._forces.active():
+            for begin, end in pairwise(ends):
+                # A ratio that is whole but for round-off must not cost one more step.
+                steps = max(1, ceil((end - begin) / longest * (1.0 - 1e-9)))
+                model.opt.timestep = (end - begin) / steps
+                data.time = begin
+                self._forces.before_end = np.nextafter(end, begin)
+                self._forces.follow(begin, data)
+                mujoco.mj_step(model, data, steps)
+                total += steps
+                if _is_bad(data):
+                    return states, total, f"stopped between t = {begin:g} s and {end:g} s: {_last_warning(data)}"
+                if end in wanted:
+                    states.append((data.qpos.copy(), data.qvel.copy()))
+        return states, total, ""
+
+
+def _is_bad(data: mujoco.MjData) -> bool:
+    return not (np.isfinite(data.qpos).all() and np.isfinite(data.qvel).all()) or _bad_warnings(data) > 0
+
+
+def _bad_warnings(data: mujoco.MjData) -> int:
+    kinds = (mujoco.mjtWarning.mjWARN_BADQPOS, mujoco.mjtWarning.mjWARN_BADQVEL, mujoco.mjtWarning.mjWARN_BADQACC)
+    return sum(data.warning[int(kind)].number for kind in kinds)
+
+
+def _last_warning(data: mujoco.MjData) -> str:
+    return "MuJoCo found huge or undefined numbers" if _bad_warnings(data) else "undefined numbers"
+
+
+@contextmanager
+def _quiet() -> Iterator[None]:
+    """Divergence is a status here: keep MuJoCo from writing its log file into the working directory."""
+    mujoco.set_mju_user_warning(lambda message: None)
+    try:
+        yield
+    finally:
+        mujoco.set_mju_user_warning(None)

@@ -1,0 +1,108 @@
+"""From MuJoCo's data to what engines exchange: World axes, angular first, scalar-first."""
+
+from __future__ import annotations
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.engines.contract import MarkerSnapshot, Snapshot
+from crosscheck.engines.conventions import quaternion_of, shift_wrench
+from crosscheck.engines.links import Attachment, attachment
+from crosscheck.engines.mujoco.forces import Forces
+from crosscheck.engines.mujoco.tree import Slot, Tree
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+
+class Observer:
+    """Reads `data` after `mj_forward` and `mj_rnePostConstraint`.
+
+    MuJoCo's spatial vectors (`cvel`, `cacc`, `cfrc_int`) are [angular; linear] in World axes about the mass centre of
+    the tree that the body belongs to; `cacc` starts from -gravity at the ground; `cfrc_int` is the wrench of the parent
+    on the body.
+    """
+
+    def __init__(self, tree: Tree, forces: Forces, scene: Scene) -> None:
+        self._tree = tree
+        self._forces = forces
+        self._gravity = np.array(scene.gravity_m_s2, dtype=float)
+        self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
+
+    def observe(self, t: float, data: mujoco.MjData) -> Snapshot:
+        model = self._tree.model
+        with self._forces.active():
+            mujoco.mj_forward(model, data)
+        mujoco.mj_rnePostConstraint(model, data)
+        loads = {
+            (link.kind, link.joint): self._load(body, data)
+            for link, body in zip(self._tree.links, self._tree.bodies, strict=True)
+        }
+        kinetic, momentum = self._motion(data)
+        mass = model.body_mass
+        return Snapshot(
+            markers={name: self._marker(at, data) for name, at in self._markers.items()},
+            loads={name: load for (kind, name), load in loads.items() if kind == "body"},
+            wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
+            drives=self._drives(t, data, loads),
+            energy={
+                "kinetic": kinetic,
+                "strain": 0.0,
+                "spring": self._forces.spring_energy(data.qpos),
+                "gravity": -float(mass @ data.xipos @ self._gravity),
+            },
+            momentum=momentum,
+        )
+
+    def _pole(self, body: int, data: mujoco.MjData) -> Array:
+        """The point about which MuJoCo's spatial vectors of a body are given."""
+        return data.subtree_com[self._tree.model.body_rootid[body]]
+
+    def _load(self, body: int, data: mujoco.MjData) -> Array:
+        """[torque; force] on the link about its frame's origin, which is the outboard hinge point."""
+        return shift_wrench(data.cfrc_int[body], self._pole(body, data) - data.xpos[body])
+
+    def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
+        body = self._tree.bodies[at.link]
+        R = data.xmat[body].reshape(3, 3)
+        position = data.xpos[body] + R @ at.frame.position
+        arm = position - self._pole(body, data)
+        w, alpha = data.cvel[body, :3], data.cacc[body, :3]
+        v = data.cvel[body, 3:] + np.cross(w, arm)
+        # The spatial acceleration's linear part lacks w x v of the point; it counts from -gravity.
+        a = data.cacc[body, 3:] + self._gravity + np.cross(alpha, arm) + np.cross(w, v)
+        return MarkerSnapshot(
+            position=position,
+            quaternion=quaternion_of(R @ at.frame.rotation),
+            velocity=np.concatenate([w, v]),
+            acceleration=np.concatenate([alpha, a]),
+        )
+
+    def _motion(self, data: mujoco.MjData) -> tuple[float, Array]:
+        """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count the drives' armature."""
+        model = self._tree.model
+        pole = data.subtree_com[model.body_rootid]
+        w = data.cvel[:, :3]
+        v = data.cvel[:, 3:] + np.cross(w, data.xipos - pole)
+        axes = data.ximat.reshape(-1, 3, 3)
+        spin = np.einsum("bij,bi->bj", axes, w)
+        p = model.body_mass[:, None] * v
+        about_com = np.einsum("bij,bj->bi", axes, model.body_inertia * spin)
+        kinetic = 0.5 * (np.sum(p * v) + np.sum(model.body_inertia * spin**2))
+        return float(kinetic), np.concatenate([np.sum(about_com + np.cross(data.xipos, p), axis=0), p.sum(axis=0)])
+
+    def _drives(self, t: float, data: mujoco.MjData, loads: dict[tuple[str, str], Array]) -> dict[str, Array]:
+        """Load across the joint along the prescribed axis, less what spring, damper and motor already give."""
+        named: dict[str, list[float]] = {}
+        for slot in self._forces.driven:
+            load = loads[slot.link.kind, slot.link.joint]
+            about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
+            half = about_axis[:3] if slot.freedom.angular else about_axis[3:]
+            named.setdefault(slot.link.joint, []).append(half @ data.xaxis[slot.joint] - self._known(slot, t, data))
+        return {name: np.array(values) for name, values in named.items()}
+
+    def _known(self, slot: Slot, t: float, data: mujoco.MjData) -> float:
+        freedom = slot.freedom
+        stretch = data.qpos[slot.q] - freedom.rest
+        return self._forces.motor(slot, t) - freedom.stiffness * stretch - freedom.damping * data.qvel[slot.v]

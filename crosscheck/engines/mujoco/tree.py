@@ -1,0 +1,141 @@
+"""The scene's links as a MuJoCo model: one body per link, its elementary joints in sequence at the body's origin.
+
+Conventions of MuJoCo: quaternions wxyz; a ball's velocity in outboard axes; slides before the ball of a floating link
+are in inboard axes (three slides and a ball serve on any parent, MuJoCo's free joint only on the ground).
+
+Two artifices. (1) A prescribed coordinate has an armature so large that nothing but the applied ARMATURE * acceleration
+moves it; its load is that of the inverse dynamics, where armature has no part. The error of its acceleration is the
+load / ARMATURE. (2) MuJoCo refuses principal moments of inertia below 1e-15 kg m^2: smaller ones (point masses, rods)
+are raised to `LEAST_INERTIA`, an error of that much against the carrier's moment of inertia.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.engines.conventions import quaternion_of, rotation_matrix
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+
+Array = NDArray[np.float64]
+
+ARMATURE = 1e15
+LEAST_INERTIA = 1e-14
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A freedom and where its coordinates `q` and speeds `v` start; `joint` is the id of its first MuJoCo joint."""
+
+    freedom: Freedom
+    link: Link
+    body: int
+    joint: int
+    q: int
+    v: int
+
+
+@dataclass(frozen=True)
+class Tree:
+    """`bodies[i]` is the MuJoCo body of link i."""
+
+    model: mujoco.MjModel
+    links: tuple[Link, ...]
+    bodies: NDArray[np.intp]
+    slots: tuple[Slot, ...]
+
+
+def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
+    spec = mujoco.MjSpec()
+    spec.compiler.degree = False
+    spec.option.gravity = gravity
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_RK4
+    off = mujoco.mjtDisableBit
+    # AUTORESET would silently rewind a diverged run.
+    spec.option.disableflags = int(off.mjDSBL_CONTACT) | int(off.mjDSBL_AUTORESET)
+    bodies = []
+    for link in links:
+        parent = bodies[link.parent] if link.parent >= 0 else spec.worldbody
+        body = parent.add_body(name=_body_name(link), pos=link.inboard.position, quat=link.inboard.quaternion)
+        body.explicitinertial = True
+        body.mass = link.inertia.mass
+        body.ipos = link.inertia.com
+        principal, axes = _principal(link.inertia.inertia)
+        body.inertia = principal
+        body.iquat = quaternion_of(axes)
+        for k, freedom in enumerate(link.freedoms):
+            _add_joints(body, freedom, f"{_body_name(link)}.{k}")
+        bodies.append(body)
+    model = spec.compile()
+    ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
+    return Tree(model, links, ids, _slots(model, links, ids))
+
+
+def initial_state(tree: Tree) -> tuple[Array, Array]:
+    """qpos and qvel at t = 0."""
+    q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
+    for slot in tree.slots:
+        match slot.freedom:
+            case Scalar(prescribed=None) as freedom:
+                q[slot.q], v[slot.v] = freedom.value, freedom.rate
+            case Scalar() as freedom:
+                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+            case Ball() as freedom:
+                q[slot.q : slot.q + 4] = freedom.quaternion
+                v[slot.v : slot.v + 3] = freedom.angular_velocity
+            case Floating() as freedom:
+                q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
+                linear = rotation_matrix(freedom.quaternion) @ freedom.velocity
+                v[slot.v : slot.v + 6] = [*linear, *freedom.angular_velocity]
+    return q, v
+
+
+def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
+    kinds = mujoco.mjtJoint
+    match freedom:
+        case Scalar():
+            joint = body.add_joint(name=name, type=kinds.mjJNT_HINGE if freedom.angular else kinds.mjJNT_SLIDE)
+            joint.axis = freedom.axis
+            if freedom.prescribed is None:
+                joint.stiffness = [freedom.stiffness, 0.0, 0.0]
+                joint.springref = freedom.rest
+                joint.damping = [freedom.damping, 0.0, 0.0]
+            else:
+                joint.armature = ARMATURE
+        case Ball():
+            joint = body.add_joint(name=name, type=kinds.mjJNT_BALL)
+            joint.stiffness = [freedom.stiffness, 0.0, 0.0]
+            joint.damping = [freedom.damping, 0.0, 0.0]
+        case Floating():
+            for axis, letter in zip(np.eye(3), "xyz", strict=True):
+                body.add_joint(name=f"{name}.{letter}", type=kinds.mjJNT_SLIDE, axis=axis)
+            body.add_joint(name=name, type=kinds.mjJNT_BALL)
+
+
+def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.intp]) -> tuple[Slot, ...]:
+    slots = []
+    for link, body in zip(links, bodies, strict=True):
+        joint = int(model.body_jntadr[body])
+        for freedom in link.freedoms:
+            q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
+            slots.append(Slot(freedom, link, int(body), joint, q, v))
+            joint += 4 if isinstance(freedom, Floating) else 1
+    return tuple(slots)
+
+
+def _principal(inertia: Array) -> tuple[Array, Array]:
+    """Principal moments (3,), none below `LEAST_INERTIA`, and right-handed axes (3,3) as columns."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    moments = np.maximum(moments, LEAST_INERTIA)
+    # A disc's moments miss the triangle inequality by round-off, which the compiler does not forgive.
+    moments[2] = min(moments[2], moments[0] + moments[1])
+    return moments, axes
+
+
+def _body_name(link: Link) -> str:
+    return f"{link.kind} {link.name}"

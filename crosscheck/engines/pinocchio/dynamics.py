@@ -1,0 +1,140 @@
+"""Forward and hybrid dynamics of a Pinocchio tree as an ordinary differential equation.
+
+State y = [free coordinates, free speeds, work]. Quaternions are integrated as four numbers: qdot is linear in q, so the
+norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates (prescribed, or
+held for a weld) follow their functions of time.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.pinocchio.forces import JointForces, NodeLoads
+from crosscheck.engines.pinocchio.tree import Slot, Tree, initial_state
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+
+class Solution(NamedTuple):
+    """Accelerations (nv,), loads of the driven coordinates (d,), power of drives, motors, dampers and loads (W)."""
+
+    acceleration: Array
+    drive: Array
+    power: float
+
+
+class State(NamedTuple):
+    """q (nq,) with unit quaternions, v (nv,), driven accelerations (d,)."""
+
+    q: Array
+    v: Array
+    driven: Array
+
+
+class Dynamics:
+    def __init__(self, tree: Tree, scene: Scene) -> None:
+        self.tree = tree
+        self.data = tree.model.createData()
+        self.forces = JointForces(tree)
+        self.loads = NodeLoads(tree, scene)
+        self.driven: list[Slot] = [slot for slot in tree.slots if _is_driven(slot)]
+        self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
+        self._driven_q = np.array([slot.q for slot in self.driven], dtype=np.intp)
+        self._driven_v = np.array([slot.v for slot in self.driven], dtype=np.intp)
+        self._free_q = np.setdiff1d(np.arange(tree.model.nq), self._driven_q)
+        self._free_v = np.setdiff1d(np.arange(tree.model.nv), self._driven_v)
+        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        self._scalar_q = np.array([slot.q for slot in scalars], dtype=np.intp)
+        self._scalar_v = np.array([slot.v for slot in scalars], dtype=np.intp)
+        self._turning = [slot for slot in tree.slots if not isinstance(slot.freedom, Scalar)]
+
+    def initial(self) -> Array:
+        q, v = initial_state(self.tree)
+        return np.concatenate([q[self._free_q], v[self._free_v], [0.0]])
+
+    def state(self, t: float, y: Array) -> State:
+        q, v = np.empty(self.tree.model.nq), np.empty(self.tree.model.nv)
+        split = len(self._free_q)
+        q[self._free_q], v[self._free_v] = y[:split], y[split:-1]
+        motion = np.array([each(t) for each in self._motions]).reshape(-1, 3)
+        q[self._driven_q], v[self._driven_v] = motion[:, 0], motion[:, 1]
+        for slot in self._turning:
+            quaternion = q[(start := _quaternion_start(slot)) : start + 4]
+            quaternion /= np.sqrt(quaternion @ quaternion)
+        return State(q, v, motion[:, 2])
+
+    def solve(self, t: float, state: State) -> Solution:
+        """Hybrid dynamics: M_FF a_F = tau_F - n_F - M_FD a_D, and the drives supply the rest of their rows."""
+        model, data = self.tree.model, self.data
+        q, v, driven = state
+        lost = self.forces.dampers_and_motors(t, v)
+        tau = self.forces.springs(q) + lost
+        wrenches = self._wrenches(t, state)
+        if len(self._driven_v) == 0:
+            extra = () if wrenches is None else (wrenches,)
+            a, drive = pin.aba(model, data, q, v, tau, *extra), np.zeros(0)
+        else:
+            F, D = self._free_v, self._driven_v
+            a = np.zeros(model.nv)
+            a[D] = driven
+            # n + M_D a_D, external loads included; crba comes after, rnea would not disturb its M.
+            rest = self.inverse(state, a, wrenches) - tau
+            M = pin.crba(model, data, q)
+            a[F] = np.linalg.solve(M[np.ix_(F, F)], -rest[F])
+            drive = rest[D] + M[np.ix_(D, F)] @ a[F]
+        power = lost @ v + drive @ v[self._driven_v]
+        if self.loads:
+            power += self.loads.power(t, data)
+        return Solution(a, drive, float(power))
+
+    def inverse(self, state: State, acceleration: Array, wrenches: pin.StdVec_Force | None) -> Array:
+        """Generalised forces of the whole motion; leaves the joint wrenches in `data.f`."""
+        extra = () if wrenches is None else (wrenches,)
+        return pin.rnea(self.tree.model, self.data, state.q, state.v, acceleration, *extra)
+
+    def resolve_loads(self, t: float, state: State, acceleration: Array) -> None:
+        """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
+        self.inverse(state, acceleration, self._wrenches(t, state))
+
+    def rate(self, t: float, y: Array) -> Array:
+        """dy/dt."""
+        state = self.state(t, y)
+        solution = self.solve(t, state)
+        qdot = np.empty(self.tree.model.nq)
+        qdot[self._scalar_q] = state.v[self._scalar_v]
+        for slot in self._turning:
+            self._turning_rate(slot, y, state, qdot)
+        return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
+
+    def _turning_rate(self, slot: Slot, y: Array, state: State, qdot: Array) -> None:
+        """Rates of ball and free-flyer coordinates; the quaternion's own (not normalised) value enters its rate."""
+        start = _quaternion_start(slot)
+        own = y[np.searchsorted(self._free_q, start) :][:4]
+        if isinstance(slot.freedom, Floating):
+            linear, omega = state.v[slot.v : slot.v + 3], state.v[slot.v + 3 : slot.v + 6]
+            qdot[slot.q : slot.q + 3] = pin.Quaternion(state.q[start : start + 4]).toRotationMatrix() @ linear
+        else:
+            omega = state.v[slot.v : slot.v + 3]
+        qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own), omega))
+
+    def _wrenches(self, t: float, state: State) -> pin.StdVec_Force | None:
+        if not self.loads:
+            return None
+        pin.forwardKinematics(self.tree.model, self.data, state.q, state.v)
+        return self.loads.wrenches(t, self.data)
+
+
+def _is_driven(slot: Slot) -> bool:
+    return isinstance(slot.freedom, Scalar) and slot.freedom.prescribed is not None
+
+
+def _quaternion_start(slot: Slot) -> int:
+    return slot.q if isinstance(slot.freedom, Ball) else slot.q + 3

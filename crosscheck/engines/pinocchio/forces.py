@@ -1,0 +1,107 @@
+"""Everything that acts on a Pinocchio tree besides gravity: springs, dampers, motors, loads at nodes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from crosscheck.engines.conventions import rotation_vector, scalar_first
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Ball, Scalar, attachment
+from crosscheck.engines.pinocchio.tree import Slot, Tree
+from flexmb.scene.schema import Load, Scene
+
+Array = NDArray[np.float64]
+
+
+class JointForces:
+    """Generalised forces (nv,) of springs, of dampers and of motors."""
+
+    def __init__(self, tree: Tree) -> None:
+        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        sprung = [slot for slot in scalars if slot.freedom.stiffness]
+        damped = [slot for slot in scalars if slot.freedom.damping]
+        self._nv = tree.model.nv
+        self._spring_q, self._spring_v = _indices(sprung)
+        self._stiffness = np.array([slot.freedom.stiffness for slot in sprung])
+        self._rest = np.array([slot.freedom.rest for slot in sprung])
+        _, self._damper_v = _indices(damped)
+        self._damping = np.array([slot.freedom.damping for slot in damped])
+        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
+        self._balls = [
+            slot
+            for slot in tree.slots
+            if isinstance(slot.freedom, Ball) and (slot.freedom.stiffness or slot.freedom.damping)
+        ]
+
+    def springs(self, q: Array) -> Array:
+        tau = np.zeros(self._nv)
+        tau[self._spring_v] = -self._stiffness * (q[self._spring_q] - self._rest)
+        for slot in self._balls:
+            tau[slot.v : slot.v + 3] = -slot.freedom.stiffness * _turn(slot, q)
+        return tau
+
+    def dampers_and_motors(self, t: float, v: Array) -> Array:
+        tau = np.zeros(self._nv)
+        tau[self._damper_v] = -self._damping * v[self._damper_v]
+        for slot in self._balls:
+            tau[slot.v : slot.v + 3] = -slot.freedom.damping * v[slot.v : slot.v + 3]
+        for index, motor in self._motors:
+            tau[index] += motor(t).value
+        return tau
+
+    def spring_energy(self, q: Array) -> float:
+        energy = 0.5 * self._stiffness @ (q[self._spring_q] - self._rest) ** 2
+        for slot in self._balls:
+            turn = _turn(slot, q)
+            energy += 0.5 * slot.freedom.stiffness * (turn @ turn)
+        return float(energy)
+
+
+class NodeLoads:
+    """Loads at nodes as wrenches on the joints, in joint axes; needs the kinematics of `data` to be up to date."""
+
+    def __init__(self, tree: Tree, scene: Scene) -> None:
+        self._loads = [_NodeLoad(tree, scene, load) for load in scene.loads]
+        self._joints = tree.model.njoints
+
+    def __bool__(self) -> bool:
+        return bool(self._loads)
+
+    def wrenches(self, t: float, data: pin.Data) -> pin.StdVec_Force:
+        total = pin.StdVec_Force()
+        total.extend([pin.Force.Zero() for _ in range(self._joints)])
+        for load in self._loads:
+            total[load.joint] = total[load.joint] + load.wrench(t, data)
+        return total
+
+    def power(self, t: float, data: pin.Data) -> float:
+        return sum(load.wrench(t, data).dot(data.v[load.joint]) for load in self._loads)
+
+
+class _NodeLoad:
+    def __init__(self, tree: Tree, scene: Scene, load: Load) -> None:
+        at = attachment(scene, tree.links, load)
+        self.joint = tree.joints[at.link]
+        self._point = at.frame.position
+        self._in_world = load.frame == "world"
+        direction = np.array(load.direction, dtype=float)
+        self._direction = direction if self._in_world else at.frame.rotation @ direction
+        self._is_force = load.type == "force"
+        self._size = profile(load.function)
+
+    def wrench(self, t: float, data: pin.Data) -> pin.Force:
+        R = data.oMi[self.joint].rotation
+        vector = self._size(t).value * (R.T @ self._direction if self._in_world else self._direction)
+        if self._is_force:
+            return pin.Force(vector, np.cross(self._point, vector))
+        return pin.Force(np.zeros(3), vector)
+
+
+def _indices(slots: list[Slot]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    return np.array([slot.q for slot in slots], dtype=np.intp), np.array([slot.v for slot in slots], dtype=np.intp)
+
+
+def _turn(slot: Slot, q: Array) -> Array:
+    return rotation_vector(scalar_first(q[slot.q : slot.q + 4]))

@@ -1,0 +1,78 @@
+"""From a state of the Pinocchio tree to what engines exchange: World axes, angular first, scalar-first."""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from crosscheck.engines.contract import MarkerSnapshot, Snapshot
+from crosscheck.engines.conventions import angular_first, quaternion_of, rotate_spatial
+from crosscheck.engines.links import attachment
+from crosscheck.engines.pinocchio.dynamics import Dynamics, State
+from crosscheck.engines.pinocchio.tree import placement
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+
+class Observer:
+    """Adds the markers to the model as operational frames, so it must exist before the model's data do."""
+
+    def __init__(self, dynamics: Dynamics, scene: Scene) -> None:
+        self._dynamics = dynamics
+        tree = dynamics.tree
+        self._frames = {}
+        for marker in scene.markers:
+            at = attachment(scene, tree.links, marker)
+            joint = tree.joints[at.link]
+            frame = pin.Frame(f"marker {marker.name}", joint, placement(at.frame), pin.FrameType.OP_FRAME)
+            self._frames[marker.name] = tree.model.addFrame(frame)
+        dynamics.data = tree.model.createData()
+
+    def observe(self, t: float, state: State) -> Snapshot:
+        dynamics = self._dynamics
+        model, data, links = dynamics.tree.model, dynamics.data, dynamics.tree.links
+        acceleration, drive, _ = dynamics.solve(t, state)
+        dynamics.resolve_loads(t, state, acceleration)
+        wrench = {}
+        pin.forwardKinematics(model, data, state.q, state.v, acceleration)
+        for link, joint in zip(links, dynamics.tree.joints, strict=True):
+            local = angular_first(data.f[joint].vector)
+            wrench[link.kind, link.joint] = rotate_spatial(data.oMi[joint].rotation, local)
+        pin.updateFramePlacements(model, data)
+        markers = {name: self._marker(frame) for name, frame in self._frames.items()}
+        pin.computeCentroidalMomentum(model, data, state.q, state.v)
+        linear, about_com, com = data.hg.linear, data.hg.angular, data.com[0]
+        return Snapshot(
+            markers=markers,
+            loads={name: load for (kind, name), load in wrench.items() if kind == "body"},
+            wheel_loads={name: load for (kind, name), load in wrench.items() if kind == "wheel"},
+            drives=self._drives(drive),
+            energy={
+                "kinetic": pin.computeKineticEnergy(model, data, state.q, state.v),
+                "strain": 0.0,
+                "spring": dynamics.forces.spring_energy(state.q),
+                "gravity": pin.computePotentialEnergy(model, data, state.q),
+            },
+            momentum=np.concatenate([about_com + np.cross(com, linear), linear]),
+        )
+
+    def _marker(self, frame: int) -> MarkerSnapshot:
+        model, data = self._dynamics.tree.model, self._dynamics.data
+        world = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        pose = data.oMf[frame]
+        return MarkerSnapshot(
+            position=pose.translation.copy(),
+            quaternion=quaternion_of(pose.rotation),
+            velocity=angular_first(pin.getFrameVelocity(model, data, frame, world).vector),
+            acceleration=angular_first(pin.getFrameClassicalAcceleration(model, data, frame, world).vector),
+        )
+
+    def _drives(self, drive: Array) -> dict[str, Array]:
+        """Loads of the prescribed coordinates by joint name; what holds a weld is no drive."""
+        named: dict[str, list[float]] = {}
+        for slot, load in zip(self._dynamics.driven, drive, strict=True):
+            if not slot.held:
+                named.setdefault(slot.link.joint, []).append(float(load))
+        return {name: np.array(loads) for name, loads in named.items()}

@@ -1,0 +1,98 @@
+"""The scene's links as a `pinocchio.Model`: every hinge a chain of elementary joints on massless links.
+
+Conventions of Pinocchio: quaternions xyzw, spatial vectors [linear; angular], velocities of spherical and free-flying
+joints in outboard axes. A weld is a revolute joint held at zero, so that its load is an output like any other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from crosscheck.engines.conventions import Frame, scalar_last
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from flexmb.scene.functions import Constant
+
+Array = NDArray[np.float64]
+
+_HELD = Scalar(True, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
+
+
+@dataclass(frozen=True)
+class Slot:
+    """A freedom and where its coordinates `q` and speeds `v` start; `held`: it stands for a weld."""
+
+    freedom: Freedom
+    link: Link
+    q: int
+    v: int
+    held: bool
+
+
+@dataclass(frozen=True)
+class Tree:
+    """`joints[i]`: the joint whose frame is link i. `slots` follow the order of the coordinates."""
+
+    model: pin.Model
+    links: tuple[Link, ...]
+    joints: tuple[int, ...]
+    slots: tuple[Slot, ...]
+
+
+def placement(frame: Frame) -> pin.SE3:
+    return pin.SE3(frame.rotation, frame.position)
+
+
+def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
+    """Links come depth-first, as Pinocchio needs them: `crba` is silently wrong otherwise, hence the check."""
+    model = pin.Model()
+    model.gravity.linear = gravity
+    joints: list[int] = []
+    slots: list[Slot] = []
+    for link in links:
+        joint = joints[link.parent] if link.parent >= 0 else 0
+        at = placement(link.inboard)
+        for k, freedom in enumerate(link.freedoms or (_HELD,)):
+            joint = model.addJoint(joint, _joint(freedom), at, f"{link.joint}.{k}")
+            at = pin.SE3.Identity()
+            slots.append(Slot(freedom, link, model.joints[joint].idx_q, model.joints[joint].idx_v, not link.freedoms))
+        own = link.inertia
+        model.appendBodyToJoint(joint, pin.Inertia(own.mass, own.com, own.inertia), pin.SE3.Identity())
+        joints.append(joint)
+    if not model.check(model.createData()):
+        raise RuntimeError("Pinocchio refuses the order of the joints: links must come depth-first")
+    return Tree(model, links, tuple(joints), tuple(slots))
+
+
+def initial_state(tree: Tree) -> tuple[Array, Array]:
+    """Coordinates (nq,) and speeds (nv,) at t = 0."""
+    q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
+    for slot in tree.slots:
+        match slot.freedom:
+            case Scalar(prescribed=None) as freedom:
+                q[slot.q], v[slot.v] = freedom.value, freedom.rate
+            case Scalar() as freedom:
+                q[slot.q], v[slot.v], _ = profile(freedom.prescribed)(0.0)
+            case Ball() as freedom:
+                q[slot.q : slot.q + 4] = scalar_last(freedom.quaternion)
+                v[slot.v : slot.v + 3] = freedom.angular_velocity
+            case Floating() as freedom:
+                q[slot.q : slot.q + 7] = [*freedom.position, *scalar_last(freedom.quaternion)]
+                v[slot.v : slot.v + 6] = [*freedom.velocity, *freedom.angular_velocity]
+    return q, v
+
+
+def _joint(freedom: Freedom) -> pin.JointModel:
+    match freedom:
+        case Scalar(angular=True, axis=axis):
+            return pin.JointModelRevoluteUnaligned(axis)
+        case Scalar(axis=axis):
+            return pin.JointModelPrismaticUnaligned(axis)
+        case Ball():
+            return pin.JointModelSpherical()
+        case Floating():
+            return pin.JointModelFreeFlyer()

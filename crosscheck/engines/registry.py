@@ -1,0 +1,53 @@
+"""Which engines there are: the built-in adapters, and plug-ins from the entry-point group `crosscheck.engines`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from importlib import import_module
+from importlib.metadata import entry_points
+from importlib.util import find_spec
+
+from crosscheck.engines.contract import Engine
+
+GROUP = "crosscheck.engines"
+
+_BUILT_IN = {
+    "native": "crosscheck.engines.native:NativeEngine",
+    "pinocchio": "crosscheck.engines.pinocchio:PinocchioEngine",
+    "mujoco": "crosscheck.engines.mujoco:MujocoEngine",
+    "exudyn": "crosscheck.engines.exudyn:ExudynEngine",
+}
+
+
+def engines() -> dict[str, Engine]:
+    """All engines by name, built-in ones first, whether or not their libraries are installed.
+
+    An engine without its library raises `EngineMissing` from `version`. A plug-in may not take a built-in name.
+    """
+    found = {name: _load(path)() for name, path in _BUILT_IN.items() if _is_there(path)}
+    for point in entry_points(group=GROUP):
+        if point.name in _BUILT_IN:
+            continue
+        engine = point.load()()
+        if not isinstance(engine, Engine):
+            raise TypeError(f'entry point "{point.name}" of group "{GROUP}" is no crosscheck engine: {engine!r}')
+        found[point.name] = engine
+    return found
+
+
+def engine(name: str) -> Engine:
+    """One engine; KeyError names those there are."""
+    known = engines()
+    if name not in known:
+        raise KeyError(f'no engine "{name}"; there are {", ".join(known)}')
+    return known[name]
+
+
+def _is_there(path: str) -> bool:
+    spec = find_spec(path.partition(":")[0])
+    return spec is not None and spec.origin is not None
+
+
+def _load(path: str) -> Callable[[], Engine]:
+    module, _, name = path.partition(":")
+    return getattr(import_module(module), name)
