@@ -1,0 +1,146 @@
+"""Second-order jets: the value of an array and its first and second time derivative along a motion.
+
+Products follow Leibniz, functions the chain rule; rotations are matrix-valued jets, from which angular velocity and
+acceleration are read. Arrays may carry leading axes (many points at once).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from math import factorial
+
+import numpy as np
+from numpy.polynomial import Polynomial
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# sin(x)/x and (1 - cos(x))/x^2 as power series in x^2; 24 terms are exact to round-off for |x| <= 2 pi.
+SINE = Polynomial([(-1.0) ** k / factorial(2 * k + 1) for k in range(24)])
+VERSINE = Polynomial([(-1.0) ** k / factorial(2 * k + 2) for k in range(24)])
+
+
+@dataclass(frozen=True)
+class Jet:
+    """x, dx/dt, d2x/dt2; equal shapes."""
+
+    value: Array
+    rate: Array
+    acceleration: Array
+
+    def __add__(self, other: Jet) -> Jet:
+        return Jet(self.value + other.value, self.rate + other.rate, self.acceleration + other.acceleration)
+
+    def __neg__(self) -> Jet:
+        return Jet(-self.value, -self.rate, -self.acceleration)
+
+    def __matmul__(self, other: Jet) -> Jet:
+        return product(np.matmul, self, other)
+
+    def __getitem__(self, key: int | None) -> Jet:
+        return self.map(lambda x: x[key])
+
+    def map(self, linear: Callable[[Array], Array]) -> Jet:
+        """A constant linear operation."""
+        return Jet(linear(self.value), linear(self.rate), linear(self.acceleration))
+
+    @property
+    def transpose(self) -> Jet:
+        return self.map(lambda x: np.swapaxes(x, -1, -2))
+
+
+@dataclass(frozen=True)
+class Frame:
+    """A frame that moves: origin (...,3) and rotation (...,3,3), in the axes of the frame it is seen from."""
+
+    position: Jet
+    rotation: Jet
+
+    def carry(self, inner: Frame) -> Frame:
+        """`inner`, seen from this frame, seen from where this frame is seen."""
+        return Frame(self.position + turn(self.rotation, inner.position), self.rotation @ inner.rotation)
+
+    def inverse(self) -> Frame:
+        """The frame this one is seen from, seen from this one."""
+        back = self.rotation.transpose
+        return Frame(-turn(back, self.position), back)
+
+    def angular_velocity(self) -> Array:
+        """w (...,3) with dR/dt = w~ R."""
+        return vector(self.rotation.rate @ np.swapaxes(self.rotation.value, -1, -2))
+
+    def angular_acceleration(self) -> Array:
+        """alpha = dw/dt (...,3): the skew part of d2R/dt2 R' (what is left, dR/dt dR/dt', is symmetric)."""
+        return vector(self.rotation.acceleration @ np.swapaxes(self.rotation.value, -1, -2))
+
+
+def constant(value: ArrayLike) -> Jet:
+    """A jet that does not change."""
+    array = np.asarray(value, dtype=float)
+    return Jet(array, np.zeros_like(array), np.zeros_like(array))
+
+
+def stack(jets: list[Jet]) -> Jet:
+    """Jets of shapes (n, ...) one after the other."""
+    parts = ([jet.value for jet in jets], [jet.rate for jet in jets], [jet.acceleration for jet in jets])
+    return Jet(*map(np.concatenate, parts))
+
+
+def product(operation: Callable[[Array, Array], Array], a: Jet, b: Jet) -> Jet:
+    """Leibniz for a bilinear operation."""
+    return Jet(
+        operation(a.value, b.value),
+        operation(a.rate, b.value) + operation(a.value, b.rate),
+        operation(a.acceleration, b.value) + 2.0 * operation(a.rate, b.rate) + operation(a.value, b.acceleration),
+    )
+
+
+def turn(rotation: Jet, x: Jet) -> Jet:
+    """R x for vectors (...,3)."""
+    return product(lambda R, v: np.einsum("...ij,...j->...i", R, v), rotation, x)
+
+
+def scale(factor: Jet, matrix: Jet) -> Jet:
+    """Scalars (...) times matrices (...,3,3)."""
+    return product(lambda s, A: s[..., None, None] * A, factor, matrix)
+
+
+def chain(f: Array, df: Array, d2f: Array, x: Jet) -> Jet:
+    """f(x) from f, f' and f'' at x.value."""
+    return Jet(f, df * x.rate, d2f * x.rate**2 + df * x.acceleration)
+
+
+def polynomial(p: Polynomial, x: Jet) -> Jet:
+    """p(x)."""
+    return chain(p(x.value), p.deriv()(x.value), p.deriv(2)(x.value), x)
+
+
+def skew(v: Array) -> Array:
+    """v~ with v~ a = v x a, (...,3) -> (...,3,3)."""
+    x, y, z = np.moveaxis(v, -1, 0)
+    zero = np.zeros_like(x)
+    return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*v.shape, 3)
+
+
+def vector(A: Array) -> Array:
+    """v of the skew part of A, (...,3,3) -> (...,3)."""
+    return 0.5 * np.stack(
+        [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1
+    )
+
+
+def rotation_exponential(theta: Jet) -> Jet:
+    """exp(theta~) of rotation vectors (...,3): Rodrigues, 1 + sin(x)/x theta~ + (1 - cos(x))/x^2 theta~^2."""
+    squared = product(lambda a, b: np.einsum("...i,...i->...", a, b), theta, theta)
+    cross = theta.map(skew)
+    one = constant(np.broadcast_to(np.eye(3), cross.value.shape))
+    return one + scale(polynomial(SINE, squared), cross) + scale(polynomial(VERSINE, squared), cross @ cross)
+
+
+def rotation_about(axis: ArrayLike, angle: Jet) -> Jet:
+    """Rotation by a scalar angle about a unit vector: 1 + sin(angle) axis~ + (1 - cos(angle)) axis~^2."""
+    cross = skew(np.asarray(axis, dtype=float))
+    s, c = np.sin(angle.value), np.cos(angle.value)
+    sine, versine = chain(s, c, -s, angle), chain(1.0 - c, s, c, angle)
+    return constant(np.eye(3)) + scale(sine, constant(cross)) + scale(versine, constant(cross @ cross))

@@ -1,0 +1,290 @@
+"""Mass matrix, bias, accelerations, loads, energy and momentum of a scene as sums over its inertia points.
+
+At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
+Rodriguez, Appendix B); markers move with the true deformation.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from flexmb.dense.jets import Frame
+from flexmb.dense.kinematics import Motion, Points, hinge_point, member_frames, point_frames, points, seat_frame
+from flexmb.dense.profiles import profile
+from flexmb.dense.tree import Scalar, Tree, build
+from flexmb.scene import schema as s
+
+Array = NDArray[np.float64]
+
+
+class Jacobian(NamedTuple):
+    """Velocities per speed of K frames: angular (K,3,nu), linear (K,3,nu), World axes."""
+
+    angular: Array
+    linear: Array
+
+
+class Wrenches(NamedTuple):
+    """On each of K points: torque (K,3) about it, force (K,3), and where it is (K,3); World."""
+
+    torque: Array
+    force: Array
+    position: Array
+
+    def about(self, origin: Array, chosen: NDArray[np.bool_]) -> Array:
+        """Sum (6,) [torque; force] of the chosen ones about `origin`."""
+        force = self.force[chosen]
+        torque = self.torque[chosen] + np.cross(self.position[chosen] - origin, force)
+        return np.concatenate([torque.sum(axis=0), force.sum(axis=0)])
+
+
+class SiteMotion(NamedTuple):
+    """A marker in World: position (3,), rotation (3,3), velocity and classical acceleration (6,) [angular; linear]."""
+
+    position: Array
+    rotation: Array
+    velocity: Array
+    acceleration: Array
+
+
+class DenseSystem:
+    """A scene for the dense route. q and u are ordered as in `flexmb.dense.tree`; SI, World axes."""
+
+    def __init__(self, scene: s.Scene, folder: Path | None = None) -> None:
+        self.scene = scene
+        self.tree: Tree = build(scene, folder)
+        self.nq, self.nu = self.tree.nq, self.tree.nu
+        self._gravity = np.array(scene.gravity_m_s2)
+
+    @cached_property
+    def points(self) -> Points:
+        """All inertia points."""
+        return points(self.tree)
+
+    def mass_matrix(self, q: Array) -> Array:
+        """M (nu,nu) = sum over points m v'v + w' J w."""
+        frames = self._frames(Motion(self._undeformed(q), np.zeros(self.nu), np.zeros(self.nu)))
+        J, I = self._jacobian(q), self._inertia(frames)
+        return np.einsum("p,pai,paj->ij", self.points.mass, J.linear, J.linear) + np.einsum(
+            "pai,pab,pbj->ij", J.angular, I, J.angular
+        )
+
+    def bias(self, q: Array, u: Array, t: float = 0.0) -> Array:
+        """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes."""
+        J = self._jacobian(q)
+        inertial = self._inertial(self._seen(q, u, np.zeros(self.nu)))
+        c = np.einsum("pai,pa->i", J.linear, inertial.force) + np.einsum("pai,pa->i", J.angular, inertial.torque)
+        for name, load in self._loads(q, t).items():
+            site = self._site_jacobian(f"load:{name}", q)
+            c -= load.torque[0] @ site.angular[0] + load.force[0] @ site.linear[0]
+        for member in self.tree.members:
+            c[member.u_modes] += member.model.stiffness @ q[member.q_modes]
+            c[member.u_modes] += member.model.damping @ u[member.u_modes]
+        return c
+
+    def applied(self, q: Array, u: Array, t: float = 0.0) -> Array:
+        """tau (nu,) of springs, dampers and motors of hinges, point masses and wheels."""
+        tau = np.zeros(self.nu)
+        for x in self.tree.scalars:
+            tau[x.u] -= x.stiffness * (q[x.q] - x.rest) + x.damping * u[x.u]
+            if x.motor is not None:
+                tau[x.u] += profile(x.motor, t).value
+        for member in self.tree.members:
+            if isinstance(member.hinge, s.Spherical):
+                theta = rotation_vector(q[member.q_hinge])
+                tau[member.u_hinge] -= member.hinge.stiffness_Nm_rad * theta
+                tau[member.u_hinge] -= member.hinge.damping_Nms_rad * u[member.u_hinge]
+        return tau
+
+    def on_profile(self, q: Array, u: Array, t: float) -> tuple[Array, Array]:
+        """q and u with every prescribed coordinate at its function's value and rate."""
+        q, u = q.copy(), u.copy()
+        for x in self._prescribed:
+            f = profile(x.prescribed, t)  # type: ignore[arg-type]
+            q[x.q], u[x.u] = f.value, f.rate
+        return q, u
+
+    def accelerations(self, t: float, q: Array, u: Array) -> Array:
+        """udot (nu,): M_ff udot_f = tau_f - c_f - M_fp udot_p, where p are the prescribed speeds."""
+        q, u = self.on_profile(q, u, t)
+        rates, free = np.zeros(self.nu), np.ones(self.nu, dtype=bool)
+        for x in self._prescribed:
+            rates[x.u], free[x.u] = profile(x.prescribed, t).acceleration, False  # type: ignore[arg-type]
+        M = self.mass_matrix(q)
+        right = self.applied(q, u, t) - self.bias(q, u, t) - M @ rates
+        rates[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
+        return rates
+
+    def drives(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+        """Drive loads of prescribed coordinates by hinge, point mass or wheel, beyond springs, dampers and motors."""
+        q, u = self.on_profile(q, u, t)
+        residual = self.mass_matrix(q) @ rates + self.bias(q, u, t) - self.applied(q, u, t)
+        found: dict[str, Array] = {}
+        for x in self._prescribed:
+            found[x.owner] = np.append(found.get(x.owner, np.zeros(0)), residual[x.u])
+        return found
+
+    def hinge_loads(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+        """Total load (6,) [torque; force] on the outboard body about the outboard hinge point, by hinge.
+
+        Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes.
+        """
+        q, u = self.on_profile(q, u, t)
+        motion = self._seen(q, u, rates)
+        frames = member_frames(self.tree, motion)
+        inertial, loads = self._inertial(motion), self._loads(q, t)
+        found = {}
+        for k, member in enumerate(self.tree.members):
+            outboard = self._outboard(k)
+            origin = hinge_point(self.tree, frames, k, motion).position.value
+            total = inertial.about(origin, np.isin(self.points.member, outboard))
+            for load in self.scene.loads:
+                if self.tree.index(load.body) in outboard:
+                    total -= loads[load.name].about(origin, np.array([True]))
+            found[member.hinge.name] = total
+        return found
+
+    def wheel_loads(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+        """Load (6,) [torque; force] of bearing and motor on each wheel about its centre."""
+        q, u = self.on_profile(q, u, t)
+        inertial = self._inertial(self._seen(q, u, rates))
+        first = len(self.points.mass) - len(self.tree.rotors)
+        return {
+            rotor.wheel.name: np.concatenate([inertial.torque[first + i], inertial.force[first + i]])
+            for i, rotor in enumerate(self.tree.rotors)
+        }
+
+    def markers(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, SiteMotion]:
+        """Motion of all markers, with the true deformation at every level."""
+        q, u = self.on_profile(q, u, t)
+        motion = Motion(q, u, rates)
+        frames = member_frames(self.tree, motion)
+        found = {}
+        for marker in self.scene.markers:
+            k, seat = self.tree.sites[f"marker:{marker.name}"]
+            f = seat_frame(self.tree, frames, k, seat, motion)
+            velocity = np.concatenate([f.angular_velocity(), f.position.rate])
+            acceleration = np.concatenate([f.angular_acceleration(), f.position.acceleration])
+            found[marker.name] = SiteMotion(f.position.value, f.rotation.value, velocity, acceleration)
+        return found
+
+    def energy(self, q: Array, u: Array) -> dict[str, float]:
+        """Kinetic, strain, spring and gravity energy (J)."""
+        frames = self._frames(Motion(self._undeformed(q), u, np.zeros(self.nu)))
+        w, v = frames.angular_velocity(), frames.position.rate
+        mass, inertia = self.points.mass, self._inertia(frames)
+        spring = sum(0.5 * x.stiffness * (q[x.q] - x.rest) ** 2 for x in self.tree.scalars)
+        strain = 0.0
+        for member in self.tree.members:
+            eta = q[member.q_modes]
+            strain += 0.5 * float(eta @ member.model.stiffness @ eta)
+            if isinstance(member.hinge, s.Spherical):
+                theta = rotation_vector(q[member.q_hinge])
+                spring += 0.5 * member.hinge.stiffness_Nm_rad * float(theta @ theta)
+        return {
+            "kinetic": 0.5 * float(mass @ (v * v).sum(axis=1) + np.einsum("pa,pab,pb->", w, inertia, w)),
+            "strain": strain,
+            "spring": spring,
+            "gravity": -float(mass @ frames.position.value @ self._gravity),
+        }
+
+    def momentum(self, q: Array, u: Array) -> Array:
+        """(6,) [angular about the World origin; linear]."""
+        frames = self._frames(Motion(self._undeformed(q), u, np.zeros(self.nu)))
+        spin = np.einsum("pab,pb->pa", self._inertia(frames), frames.angular_velocity())
+        linear = self.points.mass[:, None] * frames.position.rate
+        everything = np.ones(len(linear), dtype=bool)
+        return Wrenches(spin, linear, frames.position.value).about(np.zeros(3), everything)
+
+    @property
+    def _prescribed(self) -> list[Scalar]:
+        return [x for x in self.tree.scalars if x.prescribed is not None]
+
+    def _undeformed(self, q: Array) -> Array:
+        """q with the modal coordinates of ruthless bodies at zero."""
+        q = q.copy()
+        for member in self.tree.members:
+            if member.ruthless:
+                q[member.q_modes] = 0.0
+        return q
+
+    def _seen(self, q: Array, u: Array, rates: Array) -> Motion:
+        """The motion as inertia sees it: eta = etadot = 0 for ruthless bodies."""
+        u = u.copy()
+        for member in self.tree.members:
+            if member.ruthless:
+                u[member.u_modes] = 0.0
+        return Motion(self._undeformed(q), u, rates)
+
+    def _frames(self, motion: Motion) -> Frame:
+        return point_frames(self.tree, member_frames(self.tree, motion), motion)
+
+    def _inertia(self, frames: Frame) -> Array:
+        """(P,3,3) in World axes."""
+        R = frames.rotation.value
+        return R @ self.points.inertia @ np.swapaxes(R, -1, -2)
+
+    def _unit_motions(self, q: Array) -> list[Motion]:
+        zero = np.zeros(self.nu)
+        return [Motion(self._undeformed(q), unit, zero) for unit in np.eye(self.nu)]
+
+    def _jacobian(self, q: Array) -> Jacobian:
+        """Column j is the points' velocity for u = e_j."""
+        columns = [self._frames(motion) for motion in self._unit_motions(q)]
+        return _columns(columns)
+
+    def _site_jacobian(self, name: str, q: Array) -> Jacobian:
+        k, seat = self.tree.sites[name]
+        columns = [
+            seat_frame(self.tree, member_frames(self.tree, motion), k, seat, motion)
+            for motion in self._unit_motions(q)
+        ]
+        return _columns([Frame(f.position[None], f.rotation[None]) for f in columns])
+
+    def _inertial(self, motion: Motion) -> Wrenches:
+        """What each point needs to move so, beyond gravity: m (a - g), J alpha + w x J w."""
+        frames = self._frames(motion)
+        J, w, alpha = self._inertia(frames), frames.angular_velocity(), frames.angular_acceleration()
+        torque = np.einsum("pab,pb->pa", J, alpha) + np.cross(w, np.einsum("pab,pb->pa", J, w))
+        force = self.points.mass[:, None] * (frames.position.acceleration - self._gravity)
+        return Wrenches(torque, force, frames.position.value)
+
+    def _loads(self, q: Array, t: float) -> dict[str, Wrenches]:
+        """Loads at nodes by name, one point each."""
+        motion = Motion(self._undeformed(q), np.zeros(self.nu), np.zeros(self.nu))
+        frames = member_frames(self.tree, motion)
+        found = {}
+        for load in self.scene.loads:
+            site = seat_frame(self.tree, frames, *self.tree.sites[f"load:{load.name}"], motion)
+            direction = np.array(load.direction)
+            if load.frame == "node":
+                direction = site.rotation.value @ direction
+            value, none = profile(load.function, t).value * direction[None], np.zeros((1, 3))
+            torque, force = (value, none) if load.type == "torque" else (none, value)
+            found[load.name] = Wrenches(torque, force, site.position.value[None])
+        return found
+
+    def _outboard(self, k: int) -> list[int]:
+        """Member k and everything that hangs on it."""
+        found = [k]
+        for i, member in enumerate(self.tree.members):
+            if member.parent in found:
+                found.append(i)
+        return found
+
+
+def rotation_vector(quaternion: Array) -> Array:
+    """Rotation vector (3,) of a scalar-first quaternion, of length at most pi."""
+    return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
+
+
+def _columns(frames: list[Frame]) -> Jacobian:
+    return Jacobian(
+        np.stack([f.angular_velocity() for f in frames], axis=-1), np.stack([f.position.rate for f in frames], axis=-1)
+    )
