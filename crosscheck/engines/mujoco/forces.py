@@ -30,11 +30,7 @@ class Forces:
         self.driven: list[Slot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
-        self._motors = {
-            slot.v: profile(slot.freedom.effort)
-            for slot in scalars
-            if slot.freedom.effort is not None and slot.freedom.prescribed is None
-        }
+        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
         self._loads = [_NodeLoad(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.before_end = np.inf
 
@@ -48,10 +44,6 @@ class Forces:
             yield
         finally:
             mujoco.set_mjcb_control(None)
-
-    def motor(self, slot: Slot, t: float) -> float:
-        """Motor effort of a scalar freedom (Nm or N)."""
-        return 0.0 if slot.freedom.effort is None else profile(slot.freedom.effort)(t).value
 
     def follow(self, t: float, data: mujoco.MjData) -> None:
         """Put the prescribed coordinates where their functions say."""
@@ -71,7 +63,7 @@ class Forces:
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         t = min(data.time, self.before_end)
-        for index, motor in self._motors.items():
+        for index, motor in self._motors:
             data.qfrc_applied[index] = motor(t).value
         for _, v, motion in self._motions:
             data.qfrc_applied[v] = ARMATURE * motion(t).acceleration

@@ -48,7 +48,7 @@ class MujocoModel:
 
     def evaluate(self) -> Snapshot:
         self._forces.before_end = np.inf
-        return self._observer.observe(0.0, self._initial())
+        return self._observer.observe(self._initial())
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         with _quiet():
@@ -60,7 +60,7 @@ class MujocoModel:
             samples = []
             for t, (qpos, qvel) in zip(run.times, states, strict=False):
                 data.time, data.qpos[:], data.qvel[:] = t, qpos, qvel
-                samples.append(self._observer.observe(t, data))
+                samples.append(self._observer.observe(data))
         status: Status = "finished" if len(states) == len(run.times) else "diverged"
         reached = run.times[: len(states)]
         evaluations = _STAGES * steps

@@ -10,7 +10,7 @@ from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import Slot, Tree
+from crosscheck.engines.mujoco.tree import Tree
 from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
@@ -30,7 +30,7 @@ class Observer:
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
-    def observe(self, t: float, data: mujoco.MjData) -> Snapshot:
+    def observe(self, data: mujoco.MjData) -> Snapshot:
         model = self._tree.model
         with self._forces.active():
             mujoco.mj_forward(model, data)
@@ -45,7 +45,7 @@ class Observer:
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
             loads={name: load for (kind, name), load in loads.items() if kind == "body"},
             wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
-            drives=self._drives(t, data, loads),
+            drives=self._drives(data, loads),
             energy={
                 "kinetic": kinetic,
                 "strain": 0.0,
@@ -92,17 +92,14 @@ class Observer:
         kinetic = 0.5 * (np.sum(p * v) + np.sum(model.body_inertia * spin**2))
         return float(kinetic), np.concatenate([np.sum(about_com + np.cross(data.xipos, p), axis=0), p.sum(axis=0)])
 
-    def _drives(self, t: float, data: mujoco.MjData, loads: dict[tuple[str, str], Array]) -> dict[str, Array]:
-        """Load across the joint along the prescribed axis, less what spring, damper and motor already give."""
+    def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Array]) -> dict[str, Array]:
+        """Load across the joint along the prescribed axis, less what spring and damper already give."""
         named: dict[str, list[float]] = {}
         for slot in self._forces.driven:
             load = loads[slot.link.kind, slot.link.joint]
             about_axis = shift_wrench(load, data.xpos[slot.body] - data.xanchor[slot.joint])
             half = about_axis[:3] if slot.freedom.angular else about_axis[3:]
-            named.setdefault(slot.link.joint, []).append(half @ data.xaxis[slot.joint] - self._known(slot, t, data))
+            freedom = slot.freedom
+            passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
+            named.setdefault(slot.link.joint, []).append(float(half @ data.xaxis[slot.joint] - passive))
         return {name: np.array(values) for name, values in named.items()}
-
-    def _known(self, slot: Slot, t: float, data: mujoco.MjData) -> float:
-        freedom = slot.freedom
-        stretch = data.qpos[slot.q] - freedom.rest
-        return self._forces.motor(slot, t) - freedom.stiffness * stretch - freedom.damping * data.qvel[slot.v]

@@ -1,0 +1,155 @@
+"""Random scenes of rigid bodies: every hinge kind, turned node frames, springs, dampers, motors, wheels, point masses."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.random import Generator
+
+from crosscheck.engines.conventions import quaternion_of
+from crosscheck.engines.randomise import randomise
+from flexmb.scene.build import SceneBuilder, angular, linear, make
+from flexmb.scene.functions import Constant, Sine
+from flexmb.scene.schema import (
+    AngularCoordinate,
+    Cylindrical,
+    Free,
+    Gimbal,
+    Hinge,
+    LinearCoordinate,
+    Node,
+    Planar,
+    Prismatic,
+    Revolute,
+    Scene,
+    Spherical,
+    Universal,
+    Weld,
+)
+
+KINDS = (
+    "weld", "revolute", "prismatic", "cylindrical", "universal", "gimbal2", "gimbal3", "spherical", "planar", "free",
+)  # fmt: skip
+
+
+def unit(rng: Generator) -> np.ndarray:
+    v = rng.normal(size=3)
+    return v / np.linalg.norm(v)
+
+
+def rotation(rng: Generator) -> np.ndarray:
+    Q, R = np.linalg.qr(rng.normal(size=(3, 3)))
+    Q *= np.sign(np.diag(R))
+    return Q * np.linalg.det(Q)
+
+
+def inertia(rng: Generator, mass: float) -> np.ndarray:
+    """A possible inertia tensor: trace(S) 1 - S of a positive second moment of mass S."""
+    A = rng.normal(size=(3, 3))
+    S = mass * (0.02 * A @ A.T + 0.01 * np.eye(3))
+    return np.trace(S) * np.eye(3) - S
+
+
+def random_scene(
+    rng: Generator, kinds: tuple[str, ...], *, driven: bool = False, extras: bool = True, dissipative: bool = True
+) -> Scene:
+    """A tree with one body per entry of `kinds`, at a random state.
+
+    `driven` prescribes some coordinates; `extras` adds wheels, point masses and loads; `dissipative` adds dampers and
+    motors to the springs.
+    """
+    builder = SceneBuilder("random tree", gravity=rng.uniform(-5.0, 5.0, 3))
+    parents = ["ground"]
+    for i, kind in enumerate(kinds):
+        name, mass = f"b{i}", rng.uniform(0.5, 3.0)
+        node = make(Node, name="n", position=rng.normal(size=3) * 0.5, quaternion=_quaternion(rng))
+        builder.rigid_body(name, mass=mass, com=rng.normal(size=3) * 0.2, inertia=inertia(rng, mass), nodes=(node,))
+        parent = str(rng.choice(parents[-3:]))
+        builder.add(_hinge(rng, kind, f"h{i}", parent, name, driven and i % 2 == 1, dissipative))
+        builder.marker(f"m{i}", name, node="n", offset=rng.normal(size=3) * 0.2)
+        parents.append(name)
+        if extras:
+            _add_extras(builder, rng, name, i, driven)
+    return randomise(builder.scene(), rng)
+
+
+def _hinge(
+    rng: Generator, kind: str, name: str, parent: str, child: str, driven: bool, dissipative: bool
+) -> Hinge:
+    """A hinge of the kind with springs at a random place; `driven` prescribes its first coordinate."""
+    values = {
+        "name": name, "parent": parent, "child": child,
+        "parent_node": "n" if parent != "ground" else "origin", "child_node": str(rng.choice(["n", "origin"])),
+        "parent_position": rng.normal(size=3) * 0.3, "parent_quaternion": _quaternion(rng),
+        "child_position": rng.normal(size=3) * 0.3, "child_quaternion": _quaternion(rng),
+    }  # fmt: skip
+
+    def turn(drives: bool = False) -> AngularCoordinate:
+        return angular(**_coordinate(rng, "torque", drives, dissipative))
+
+    def shift(drives: bool = False) -> LinearCoordinate:
+        return linear(**_coordinate(rng, "force", drives, dissipative))
+
+    match kind:
+        case "weld":
+            return make(Weld, **values)
+        case "revolute":
+            return make(Revolute, axis=unit(rng), rotation=turn(driven), **values)
+        case "prismatic":
+            return make(Prismatic, axis=unit(rng), translation=shift(driven), **values)
+        case "cylindrical":
+            return make(Cylindrical, axis=unit(rng), rotation=turn(driven), translation=shift(), **values)
+        case "universal":
+            return make(Universal, first=turn(driven), second=turn(), **values)
+        case "gimbal2":
+            return make(Gimbal, sequence="zx", rotations=(turn(driven), turn()), **values)
+        case "gimbal3":
+            return make(Gimbal, sequence="zyx", rotations=(turn(driven), turn(), turn()), **values)
+        case "spherical":
+            damping = rng.uniform(0.1, 0.5) if dissipative else 0.0
+            return make(Spherical, stiffness=rng.uniform(1.0, 5.0), damping=damping, **values)
+        case "planar":
+            return make(Planar, x=shift(driven), y=shift(), rotation=turn(), **values)
+        case "free":
+            return make(Free, **values)
+    raise ValueError(kind)
+
+
+def _coordinate(rng: Generator, motor: str, driven: bool, dissipative: bool) -> dict:
+    values = {"stiffness": rng.uniform(1.0, 5.0), "rest": rng.uniform(-0.3, 0.3)}
+    if dissipative:
+        values["damping"] = rng.uniform(0.1, 0.5)
+    if driven:
+        values["prescribed"] = Sine(amplitude=0.4, angular_frequency_rad_s=rng.uniform(1.0, 3.0), phase_rad=0.3)
+    elif dissipative:
+        values[motor] = Constant(value=rng.uniform(-2.0, 2.0))
+    return values
+
+
+def _add_extras(builder: SceneBuilder, rng: Generator, body: str, i: int, driven: bool) -> None:
+    """By turns: a wheel, a moving point mass and a fixed one, a load."""
+    match i % 4:
+        case 0:
+            builder.wheel(
+                f"wheel{i}", body, node="n", offset=rng.normal(size=3) * 0.1, axis=unit(rng), mass=rng.uniform(0.1, 0.5),
+                axial_inertia=0.02, transverse_inertia=0.013, friction=0.002,
+                torque=None if driven else Constant(value=0.3),
+                prescribed=Sine(amplitude=2.0, angular_frequency_rad_s=3.0, phase_rad=0.2) if driven else None,
+            )  # fmt: skip
+        case 1:
+            directions = rotation(rng)[: rng.integers(1, 4)]
+            springs = [linear(stiffness=rng.uniform(5.0, 20.0), damping=0.1) for _ in directions]
+            builder.point_mass(
+                f"point{i}", body, node="n", mass=0.2, directions=list(directions), coordinates=springs,
+                offset=rng.normal(size=3) * 0.1,
+            )  # fmt: skip
+            builder.point_mass(f"fixed{i}", body, mass=0.1, offset=rng.normal(size=3) * 0.1)
+        case 2:
+            builder.force(f"force{i}", body, node="n", direction=unit(rng), function=Constant(value=1.5))
+            builder.force(f"follower{i}", body, node="n", direction=unit(rng), function=Constant(value=0.7), frame="node")
+        case 3:
+            builder.torque(f"torque{i}", body, direction=unit(rng), function=Sine(amplitude=1.0, angular_frequency_rad_s=2.0, phase_rad=0.5))  # noqa: E501
+            builder.torque(f"turning{i}", body, node="n", direction=unit(rng), function=Constant(value=0.4), frame="node")
+
+
+def _quaternion(rng: Generator) -> np.ndarray:
+    return quaternion_of(rotation(rng))
