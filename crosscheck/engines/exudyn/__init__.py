@@ -1,0 +1,5 @@
+"""Exudyn as an engine (FFRF bodies and redundant rigid bodies), and its geometrically exact beams as a second one."""
+
+from crosscheck.engines.exudyn.engine import ExudynEngine
+
+__all__ = ["ExudynEngine"]

@@ -1,0 +1,305 @@
+"""A scene as an assembled Exudyn system, with the tables that lead from scene names to Exudyn items."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crosscheck.engines.contract import Array
+from crosscheck.engines.conventions import Frame, frame, rotation_matrix
+from crosscheck.engines.exudyn import joints
+from crosscheck.engines.exudyn.carriers import Carrier, Workshop
+from crosscheck.engines.exudyn.joints import Link, Port
+from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
+from crosscheck.engines.exudyn.motion import AT_REST, Motion, across_quaternion
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.lumping import Inertia, inertia_of, rigid_equivalent
+from flexmb.scene.hinges import (
+    AngularCoordinate, Cylindrical, Free, Gimbal, Hinge, Planar, Prismatic, Revolute, Spherical, Universal, Weld,
+)  # fmt: skip
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import Body, Load, ModalBody, PointMass, Scene, Wheel
+from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
+
+X, Y, Z = np.eye(3)
+CROSS_ARM = 0.01
+"""Arm (m) of the massless crosses: displacements are linear in it, so its length does not matter."""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """A scene body in the system: its carrier and its motion at t = 0; where it bends, its modal state and mesh crosses.
+
+    `reach` (m,): largest displacement of an inertia point for a unit modal coordinate, in units of the body's length.
+    """
+
+    body: Body
+    carrier: Carrier
+    motion: Motion
+    eta: Array = field(default_factory=lambda: np.zeros(0))
+    rate: Array = field(default_factory=lambda: np.zeros(0))
+    crosses: dict[str, list[int]] = field(default_factory=dict)
+    reach: Array = field(default_factory=lambda: np.zeros(0))
+
+    def shape(self, node: str) -> NodeShape:
+        """A node in Exudyn axes."""
+        if self.carrier.flexible is not None:
+            return node_shape(self.body, node, self.carrier.zero)
+        rest = node_frame(self.body, node)
+        none = np.zeros((3, 0))
+        zero = self.carrier.zero
+        return NodeShape(zero @ np.array(rest.position), zero @ rotation_matrix(rest.quaternion), none, none)
+
+
+@dataclass(frozen=True)
+class Assembly:
+    """The assembled system. `links` holds hinges, wheel bearings and point masses' guides by their scene names."""
+
+    scene: Scene
+    shop: Workshop
+    bodies: dict[str, Placed]
+    hinges: dict[str, Link]
+    wheels: dict[str, Link]
+    guides: dict[str, Link]
+    carriers: tuple[Carrier, ...]
+    sampler: int
+
+    @property
+    def links(self) -> dict[str, Link]:
+        return self.hinges | self.wheels | self.guides
+
+
+def unconstrained(scene: Scene) -> bool:
+    """Whether the scene is one free-flying body: the case for Exudyn's explicit integrators, which take no joints."""
+    single = len(scene.bodies) == 1 and isinstance(scene.hinges[0], Free)
+    return single and not scene.wheels and not scene.point_masses
+
+
+def flexible(body: Body) -> bool:
+    """Whether the body has modal coordinates here."""
+    return isinstance(body, ModalBody) and body.level != "rigid"
+
+
+def deforming(body: Body, node: str) -> bool:
+    """Whether the node moves relative to its body's frame."""
+    return flexible(body) and node_shape(body, node, np.eye(3)).deforms
+
+
+def assemble(scene: Scene) -> Assembly:
+    """Build the Exudyn system of a scene that `supports` accepted."""
+    shop = Workshop(np.array(scene.gravity_m_s2), unconstrained(scene))
+    held = _held_nodes(scene)
+    placed: dict[str, Placed] = {}
+    hinges = {}
+    carriers: list[Carrier] = []
+    for body, hinge in ordered(scene):
+        hinges[hinge.name], placed[body.name] = _attach(shop, scene, placed, body, hinge, held[body.name])
+        carriers.append(placed[body.name].carrier)
+    wheels, guides = {}, {}
+    for wheel in scene.wheels:
+        wheels[wheel.name], carrier = _wheel(shop, placed[wheel.body], wheel)
+        carriers.append(carrier)
+    for mass in scene.point_masses:
+        guides[mass.name], carrier = _point_mass(shop, placed[mass.body], mass)
+        carriers.append(carrier)
+    for load in scene.loads:
+        _load(shop, placed[load.body], load)
+    sampler = shop.mbs.AddSensor(shop.items.SensorUserFunction(sensorUserFunction=_nothing, storeInternal=True))
+    shop.mbs.Assemble()
+    return Assembly(scene, shop, placed, hinges, wheels, guides, tuple(carriers), sampler)
+
+
+def _nothing(mbs, t, sensors, factors, configuration) -> list[float]:
+    """What the sampler records until a run gives it something to do."""
+    return [0.0]
+
+
+def _held_nodes(scene: Scene) -> dict[str, set[str]]:
+    """Nodes of each flexible body that carry something and deform, or take a load: they need mesh points."""
+    held: dict[str, set[str]] = {body.name: set() for body in scene.bodies}
+    bodies = {body.name: body for body in scene.bodies}
+    users = [(hinge.parent, hinge.parent_node) for hinge in scene.hinges if hinge.parent != GROUND]
+    users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
+    for name, node in users:
+        if deforming(bodies[name], node):
+            held[name].add(node)
+    for load in scene.loads:
+        if flexible(bodies[load.body]):
+            held[load.body].add(load.node)
+    return held
+
+
+def _attach(
+    shop: Workshop, scene: Scene, placed: dict[str, Placed], body: Body, hinge: Hinge, held: set[str]
+) -> tuple[Link, Placed]:
+    """A body and the hinge that joins it to its parent."""
+    own = frame(hinge.parent_position_m, hinge.parent_quaternion)
+    if hinge.parent == GROUND:
+        port = Port(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
+    else:
+        port = _port(shop, placed[hinge.parent], hinge.parent_node, own)
+    outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
+    zero = port.zero @ outboard.rotation.T
+    found: list[Placed] = []
+
+    def make(hinge_motion: Motion) -> Carrier:
+        found.append(_place(shop, scene, body, hinge, hinge_motion, zero, held))
+        return found[0].carrier
+
+    point = zero @ outboard.position
+    match hinge:
+        case Free():
+            make(across_quaternion(port.motion, hinge))
+            link = joints.free(hinge.name)
+        case Weld():
+            link, _ = joints.weld(shop, hinge.name, port, make, point)
+        case Spherical():
+            link, _ = joints.spherical(shop, hinge, port, make, point)
+        case _:
+            link, _ = joints.chain(shop, hinge.name, port, _steps(hinge), make, point)
+    return link, found[0]
+
+
+def _steps(hinge: Hinge) -> list[tuple[Array, joints.Coordinate]]:
+    """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
+    match hinge:
+        case Revolute() | Prismatic() | Cylindrical():
+            axes = [_unit(hinge.axis)] * 2
+        case Universal():
+            axes = [X, Y]
+        case Gimbal():
+            axes = [{"x": X, "y": Y, "z": Z}[letter] for letter in hinge.sequence]
+        case Planar():
+            axes = [X, Y, Z]
+    return [(axis, each.coordinate) for axis, each in zip(axes, coordinates(hinge), strict=False)]
+
+
+def _place(
+    shop: Workshop, scene: Scene, body: Body, hinge: Hinge, hinge_motion: Motion, zero: Array, held: set[str]
+) -> Placed:
+    """The carrier of a body, from the motion of its outboard hinge frame."""
+    fixed = frame(hinge.child_position_m, hinge.child_quaternion).inverse()
+    node_motion = hinge_motion.offset(fixed.position, fixed.rotation)
+    if not flexible(body):
+        node = frame(*node_frame(body, hinge.child_node)).inverse()
+        motion = node_motion.offset(node.position, node.rotation)
+        inertia = inertia_of(rigid_equivalent(body))
+        return Placed(body, shop.rigid(motion, zero, inertia), motion)
+    eta, rate = _modal_state(scene, body)
+    motion = node_motion.body_of(AT_REST.node(node_shape(body, hinge.child_node, np.eye(3)), eta, rate))
+    crosses, rows = {}, []
+    for node in sorted(held):
+        crosses[node] = list(range(4 * len(crosses), 4 * len(crosses) + 4))
+        rows += _cross(node_shape(body, node, zero))
+    rows = rows or _cross(NodeShape(np.zeros(3), np.eye(3), *np.zeros((2, 3, len(eta)))))
+    carrier = shop.flexible(motion, zero, integrals(body, zero), eta, rate, rows)
+    return Placed(body, carrier, motion, eta, rate, crosses, _reach(body))
+
+
+def _reach(body: ModalBody) -> Array:
+    arrays = modal_arrays(body)
+    length = np.linalg.norm(np.ptp(arrays.position, axis=0))
+    return np.linalg.norm(arrays.translation_modes, axis=1).max(axis=0) / length
+
+
+def _modal_state(scene: Scene, body: ModalBody) -> tuple[Array, Array]:
+    count = modal_arrays(body).translation_modes.shape[2]
+    for state in scene.modal_states:
+        if state.body == body.name:
+            return np.array(state.coordinates), np.array(state.rates or (0.0,) * count)
+    return np.zeros(count), np.zeros(count)
+
+
+def _cross(shape: NodeShape) -> list[Array]:
+    """Four mesh points [position, modes] (3, 1+m) about a node, in its y-z plane, moving as its section does."""
+    found = []
+    for arm in (Y, Z, -Y, -Z):
+        p = CROSS_ARM * (shape.rotation @ arm)
+        moved = shape.translation + np.cross(shape.rotation_modes.T, p).T
+        found.append(np.column_stack([shape.position + p, moved]))
+    return found
+
+
+def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> Port:
+    """An inboard hinge frame at a node of a placed body plus a fixed offset; a section carrier where the node deforms."""
+    shape = parent.shape(node)
+    zero = shape.rotation @ offset.rotation
+    at_node = _exudyn_motion(parent).node(shape, parent.eta, parent.rate)
+    motion = at_node.offset(offset.position, offset.rotation)
+    if not shape.deforms:
+        return Port(parent.carrier, shape.position + shape.rotation @ offset.position, zero, motion)
+    section = shop.rigid(at_node, shape.rotation, None)
+    markers = [_section_marker(shop, parent, node), shop.marker(section, np.zeros(3))]
+    shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
+    return Port(section, shape.rotation @ offset.position, zero, motion)
+
+
+def _exudyn_motion(parent: Placed) -> Motion:
+    """Motion of the body's Exudyn axes."""
+    return parent.motion.offset(np.zeros(3), parent.carrier.zero.T)
+
+
+def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
+    return shop.mbs.AddMarker(
+        shop.items.MarkerSuperElementRigid(
+            bodyNumber=parent.carrier.flexible, meshNodeNumbers=parent.crosses[node], weightingFactors=[0.25] * 4
+        )
+    )
+
+
+def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[Link, Carrier]:
+    """A wheel as a body of its own on a revolute joint; friction and motor between it and its node."""
+    axis = _unit(wheel.axis)
+    port = _port(shop, parent, wheel.node, Frame(np.array(wheel.offset_m), np.eye(3)))
+    spin = AngularCoordinate(
+        angle_rad=wheel.angle_rad, rate_rad_s=wheel.speed_rad_s, damping_Nms_rad=wheel.friction_Nms_rad,
+        torque_Nm=wheel.torque_Nm, prescribed_rad=wheel.prescribed_rad,
+    )  # fmt: skip
+    across_axis = np.eye(3) - np.outer(axis, axis)
+    tensor = wheel.axial_inertia_kg_m2 * np.outer(axis, axis) + wheel.transverse_inertia_kg_m2 * across_axis
+    inertia = Inertia(wheel.mass_kg, np.zeros(3), tensor)
+    return joints.chain(
+        shop, wheel.name, port, [(axis, spin)], lambda motion: shop.rigid(motion, port.zero, inertia), np.zeros(3)
+    )
+
+
+def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Link, Carrier]:
+    """A rigid body without rotary inertia, guided along the point mass's directions."""
+    port = _port(shop, parent, mass.node, Frame(np.array(mass.offset_m), np.eye(3)))
+    inertia = Inertia(mass.mass_kg, np.zeros(3), np.zeros((3, 3)))
+    steps = [
+        (_unit(direction), each.coordinate)
+        for direction, each in zip(mass.directions, coordinates(mass), strict=True)
+    ]
+
+    def make(motion: Motion) -> Carrier:
+        return shop.rigid(motion, port.zero, inertia)
+
+    if not steps:
+        return joints.weld(shop, mass.name, port, make, np.zeros(3))
+    return joints.chain(shop, mass.name, port, steps, make, np.zeros(3))
+
+
+def _load(shop: Workshop, parent: Placed, load: Load) -> None:
+    """A named load at a node."""
+    f, direction = profile(load.function), np.array(load.direction)
+    shape = parent.shape(load.node)
+    turning = load.frame == "node"
+    along = shape.rotation @ direction if turning else direction
+    if load.node in parent.crosses:
+        marker = _section_marker(shop, parent, load.node)
+    else:
+        marker = shop.marker(parent.carrier, shape.position)
+    kind = shop.items.LoadForceVector if load.type == "force" else shop.items.LoadTorqueVector
+    shop.mbs.AddLoad(
+        kind(
+            markerNumber=marker, loadVector=list(along), bodyFixed=turning,
+            loadVectorUserFunction=lambda mbs, t, unit: f(t).value * along,
+        )
+    )  # fmt: skip
+
+
+def _unit(axis: tuple[float, float, float]) -> Array:
+    vector = np.array(axis)
+    return vector / np.linalg.norm(vector)

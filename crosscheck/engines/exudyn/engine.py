@@ -1,0 +1,54 @@
+"""The Exudyn engine: rigid bodies in redundant coordinates, flexible ones in floating frames of reference."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.engines.contract import Effort, Model, Support
+from crosscheck.engines.exudyn import library
+from crosscheck.engines.exudyn.assembly import unconstrained
+from crosscheck.engines.exudyn.solve import EXPLICIT
+from crosscheck.engines.exudyn.support import supports
+from crosscheck.engines.functions_of_time import fastest_rate
+from flexmb.scene.schema import Scene
+
+STEP = 4e-3
+"""Coarsest step (s) of a scene in which nothing spins."""
+SPIN_PER_STEP = 0.05
+"""Largest angle (rad) a wheel turns in a coarsest step: its joint's error grows with it."""
+
+
+class ExudynEngine:
+    """Exudyn behind the engine contract."""
+
+    name = "exudyn"
+
+    def version(self) -> str:
+        """Version of the library; raises EngineMissing where it is not installed."""
+        return library.version()
+
+    def supports(self, scene: Scene) -> Support:
+        """How exactly Exudyn represents the scene, with the reason."""
+        return supports(scene)
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        """One free body: error-controlled steps; else the trapezoidal rule at three steps, each half the one before.
+
+        Generalised-alpha rings on drive torques (percents at the same step), so it is not the default.
+        """
+        if unconstrained(scene):
+            return tuple(Effort("tolerance", tolerance, EXPLICIT) for tolerance in (1e-7, 1e-9, 1e-11))
+        step = min(STEP, SPIN_PER_STEP / max(_fastest_spin(scene), 1e-9))
+        return tuple(Effort("step", step / refinement, "TrapezoidalIndex2") for refinement in (1, 2, 4))
+
+    def compile(self, scene: Scene) -> Model:
+        """Convert the scene."""
+        from crosscheck.engines.exudyn.model import ExudynModel
+
+        return ExudynModel(scene)
+
+
+def _fastest_spin(scene: Scene) -> float:
+    """Fastest wheel rate (rad/s) at the start or by prescription."""
+    prescribed = [fastest_rate(w.prescribed_rad) for w in scene.wheels if w.prescribed_rad is not None]
+    return float(np.max([0.0, *(abs(w.speed_rad_s) for w in scene.wheels), *prescribed]))

@@ -1,0 +1,204 @@
+"""Hinges, wheel bearings and guides of point masses in Exudyn: chains of one-freedom joints between carriers.
+
+A hinge of several scalar coordinates becomes as many revolute or prismatic joints with massless carriers between them,
+so that springs, motors and prescribed motion act on each coordinate by itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.engines.contract import Array
+from crosscheck.engines.exudyn.carriers import Carrier, Workshop
+from crosscheck.engines.exudyn.motion import Motion, across, across_quaternion, initial
+from crosscheck.engines.functions_of_time import Profile, profile
+from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Spherical
+
+Coordinate = AngularCoordinate | LinearCoordinate
+Outboard = Callable[[Motion], Carrier]
+"""Makes the carrier beyond a link, given the motion of the outboard hinge frame."""
+
+
+@dataclass(frozen=True)
+class Port:
+    """An inboard hinge frame: `position` (3,) on its carrier in Exudyn axes, `zero` (3,3) hinge -> Exudyn axes."""
+
+    carrier: Carrier
+    position: Array
+    zero: Array
+    motion: Motion
+
+
+@dataclass(frozen=True)
+class Stage:
+    """One scalar coordinate: `axis` (3,) in Exudyn axes (the same on both sides), the carriers and points it joins.
+
+    `constraint` is the Exudyn object that prescribes it, along `prescribed`; `motor` the load between both sides.
+    """
+
+    angular: bool
+    axis: Array
+    inboard: Carrier
+    inboard_point: Array
+    outboard: Carrier
+    outboard_point: Array
+    coordinate: Coordinate
+    motor: Callable[[float], Profile] | None
+    prescribed: Callable[[float], Profile] | None
+    constraint: int | None
+
+    @property
+    def stiffness(self) -> float:
+        c = self.coordinate
+        return c.stiffness_Nm_rad if isinstance(c, AngularCoordinate) else c.stiffness_N_m
+
+    @property
+    def rest(self) -> float:
+        return self.coordinate.rest_rad if isinstance(self.coordinate, AngularCoordinate) else self.coordinate.rest_m
+
+
+@dataclass(frozen=True)
+class Link:
+    """All that joins an outboard body to its inboard one, acting on its `marker` at the hinge point.
+
+    `connectors`: Exudyn objects and whether each is a constraint (with multipliers) or a spring-damper.
+    """
+
+    name: str
+    stages: tuple[Stage, ...]
+    connectors: tuple[tuple[int, bool], ...]
+    marker: int | None
+    spherical: tuple[Spherical, Carrier, Carrier] | None = None
+
+
+def free(name: str) -> Link:
+    """No connection."""
+    return Link(name, (), (), None)
+
+
+def weld(shop: Workshop, name: str, port: Port, make: Outboard, point: Array) -> tuple[Link, Carrier]:
+    """Rigid connection; `point` (3,) is the hinge point on the outboard carrier, in Exudyn axes."""
+    carrier = make(port.motion)
+    markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
+    joint = shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
+    return Link(name, (), ((joint, True),), markers[1]), carrier
+
+
+def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, point: Array) -> tuple[Link, Carrier]:
+    """Ball joint, with the isotropic spring and damper of the scene."""
+    carrier = make(across_quaternion(port.motion, hinge))
+    markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
+    connectors = [(shop.mbs.AddObject(shop.items.SphericalJoint(markerNumbers=markers)), True)]
+    if hinge.stiffness_Nm_rad or hinge.damping_Nms_rad:
+        turning = np.diag([0.0] * 3 + [1.0] * 3)
+        spring = shop.items.RigidBodySpringDamper(
+            markerNumbers=markers, stiffness=hinge.stiffness_Nm_rad * turning,
+            damping=hinge.damping_Nms_rad * turning, useIntrinsicFormulation=True,
+        )  # fmt: skip
+        connectors.append((shop.mbs.AddObject(spring), False))
+    return Link(hinge.name, (), tuple(connectors), markers[1], (hinge, port.carrier, carrier)), carrier
+
+
+def chain(
+    shop: Workshop, name: str, port: Port, steps: Sequence[tuple[Array, Coordinate]], make: Outboard, point: Array
+) -> tuple[Link, Carrier]:
+    """One joint for each (axis in the hinge frame, coordinate), in order from the inboard side."""
+    stages, connectors, markers = [], [], [0, 0]
+    inboard, position, motion = port.carrier, port.position, port.motion
+    for k, (axis, coordinate) in enumerate(steps):
+        motion = across(motion, axis, coordinate)
+        last = k == len(steps) - 1
+        outboard = make(motion) if last else shop.rigid(motion, port.zero, None)
+        arrival = point if last else np.zeros(3)
+        markers = _markers(shop, inboard, position, outboard, arrival, port.zero @ axis, coordinate)
+        connectors = [(_joint(shop, markers, coordinate), True)]
+        connectors += [(spring, False) for spring in _spring(shop, markers, coordinate)]
+        motor = _motor(shop, markers, coordinate)
+        prescribed, constraint = _prescribed(shop, inboard, position, outboard, arrival, port.zero @ axis, coordinate)
+        connectors += [] if constraint is None else [(constraint, True)]
+        stages.append(
+            Stage(
+                isinstance(coordinate, AngularCoordinate), port.zero @ axis, inboard, position, outboard, arrival,
+                coordinate, motor, prescribed, constraint,
+            )
+        )  # fmt: skip
+        inboard, position = outboard, arrival
+    return Link(name, tuple(stages), tuple(connectors), markers[1]), inboard
+
+
+def _markers(shop: Workshop, a: Carrier, p: Array, b: Carrier, q: Array, axis: Array, coordinate: Coordinate) -> list:
+    """Markers on both sides with the axis along z (revolute) or x (prismatic), as Exudyn's joints want it."""
+    axes = _axes_with(axis, 2 if isinstance(coordinate, AngularCoordinate) else 0)
+    return [shop.marker(a, p, axes), shop.marker(b, q, axes)]
+
+
+def _joint(shop: Workshop, markers: list[int], coordinate: Coordinate) -> int:
+    kind = shop.items.RevoluteJointZ if isinstance(coordinate, AngularCoordinate) else shop.items.PrismaticJointX
+    return shop.mbs.AddObject(kind(markerNumbers=markers))
+
+
+def _spring(shop: Workshop, markers: list[int], coordinate: Coordinate) -> list[int]:
+    match coordinate:
+        case AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=d, rest_rad=rest) if k or d:
+            memory = shop.angle_memory(initial(coordinate)[0])
+            spring = shop.items.TorsionalSpringDamper(
+                markerNumbers=markers, nodeNumber=memory, stiffness=k, damping=d, offset=rest
+            )
+        case LinearCoordinate(stiffness_N_m=k, damping_Ns_m=d, rest_m=rest) if k or d:
+            spring = shop.items.LinearSpringDamper(markerNumbers=markers, stiffness=k, damping=d, offset=rest)
+        case _:
+            return []
+    return [shop.mbs.AddObject(spring)]
+
+
+def _motor(shop: Workshop, markers: list[int], coordinate: Coordinate) -> Callable[[float], Profile] | None:
+    """A pair of loads along the joint axis, turning with the bodies: + on the outboard side, - on the inboard one."""
+    angular = isinstance(coordinate, AngularCoordinate)
+    function = coordinate.torque_Nm if angular else coordinate.force_N
+    if function is None:
+        return None
+    load = shop.items.LoadTorqueVector if angular else shop.items.LoadForceVector
+    f, axis = profile(function), np.eye(3)[2 if angular else 0]
+    for marker, sign in zip(markers, (-1.0, 1.0), strict=True):
+        along = sign * axis
+        shop.mbs.AddLoad(
+            load(
+                markerNumber=marker, loadVector=list(along), bodyFixed=True,
+                loadVectorUserFunction=lambda mbs, t, unit, along=along: f(t).value * along,
+            )
+        )  # fmt: skip
+    return f
+
+
+def _prescribed(
+    shop: Workshop, a: Carrier, p: Array, b: Carrier, q: Array, axis: Array, coordinate: Coordinate
+) -> tuple[Callable[[float], Profile] | None, int | None]:
+    """A constraint that makes the relative coordinate follow its function of time."""
+    angular = isinstance(coordinate, AngularCoordinate)
+    function = coordinate.prescribed_rad if angular else coordinate.prescribed_m
+    if function is None:
+        return None, None
+    f = profile(function)
+    ends = dict(bodyNumbers=[a.item, b.item], localPosition0=list(p), localPosition1=list(q), axis0=list(axis))
+    if angular:
+        relative = shop.items.MarkerBodiesRelativeRotationCoordinate(nodeNumber=shop.angle_memory(f(0.0).value), **ends)
+    else:
+        relative = shop.items.MarkerBodiesRelativeTranslationCoordinate(**ends)
+    constraint = shop.items.CoordinateConstraint(
+        markerNumbers=[shop.fixed_coordinate, shop.mbs.AddMarker(relative)],
+        offsetUserFunction=lambda mbs, t, item, offset: f(t).value,
+        offsetUserFunction_t=lambda mbs, t, item, offset: f(t).rate,
+    )
+    return f, shop.mbs.AddObject(constraint)
+
+
+def _axes_with(axis: Array, column: int) -> Array:
+    """A rotation (3,3) with `axis` as its column number `column`."""
+    helper = np.eye(3)[np.argmin(np.abs(axis))]
+    second = np.cross(axis, helper)
+    second /= np.linalg.norm(second)
+    columns = [axis, second, np.cross(axis, second)]
+    return np.stack(np.roll(np.array(columns), column, axis=0), axis=1)

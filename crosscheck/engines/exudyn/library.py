@@ -1,0 +1,41 @@
+"""Exudyn itself: imported on first use, silenced, and missed with a message that names the remedy."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib.metadata import PackageNotFoundError
+from importlib.metadata import version as installed_version
+from types import ModuleType
+
+import numpy as np
+
+from crosscheck.engines.contract import Array, EngineMissing
+
+REMEDY = "Exudyn is not installed: `pip install flexmb[peers]`"
+
+
+@cache
+def load() -> ModuleType:
+    """The module `exudyn` with `exudyn.itemInterface` loaded; raises EngineMissing where it is not installed."""
+    try:
+        import exudyn
+        import exudyn.itemInterface
+    except ImportError as error:
+        raise EngineMissing(REMEDY) from error
+    exudyn.special.userInterface.SuppressAll()
+    return exudyn
+
+
+def version() -> str:
+    """Version of the installed library; raises EngineMissing where there is none."""
+    try:
+        return installed_version("exudyn")
+    except PackageNotFoundError as error:
+        raise EngineMissing(REMEDY) from error
+
+
+def matrix(values: Array):
+    """A dense matrix as Exudyn's MatrixContainer."""
+    container = load().MatrixContainer()
+    container.SetWithDenseMatrix(np.asarray(values, dtype=float), useDenseMatrix=True)
+    return container

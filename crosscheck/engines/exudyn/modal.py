@@ -1,0 +1,98 @@
+"""A flexible body for Exudyn's floating frame of reference: points, modes, and their inertia integrals by plain sums."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.engines.contract import Array
+from crosscheck.engines.conventions import cross_matrix, rotation_matrix
+from crosscheck.engines.exudyn.rotations import cross_matrices
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import ModalBody
+from flexmb.scene.tree import node_frame
+
+
+@dataclass(frozen=True)
+class NodeShape:
+    """A node in some body axes: `position` (3,) m, `rotation` (3,3) node -> body at rest, mode shapes (3, m)."""
+
+    position: Array
+    rotation: Array
+    translation: Array
+    rotation_modes: Array
+
+    @property
+    def deforms(self) -> bool:
+        """Whether any mode moves or turns the node."""
+        return bool(np.any(self.translation) or np.any(self.rotation_modes))
+
+
+def node_shape(body: ModalBody, name: str, axes: Array) -> NodeShape:
+    """Node `name` in the axes `axes` @ (body axes). The implicit origin of a clamped body has zero shapes."""
+    rest = node_frame(body, name)
+    translation = rotation = np.zeros((3, modal_arrays(body).translation_modes.shape[2]))
+    for node in body.nodes:
+        if node.name == name:
+            translation, rotation = np.array(node.translation_modes).T, np.array(node.rotation_modes).T
+    return NodeShape(
+        axes @ np.array(rest.position), axes @ rotation_matrix(rest.quaternion), axes @ translation, axes @ rotation
+    )
+
+
+@dataclass(frozen=True)
+class ModalIntegrals:
+    """Inertia integrals over the points (position r, modes Phi (3,m)) of one body, about the frame origin, in its axes.
+
+    With ~ the cross matrix and [Phi~] the (3, 3m) row of cross matrices of the mode columns:
+    mass = sum m; first = sum m r (3,); inertia = sum m r~'r~ (3,3); shape = sum m Phi (3,m);
+    shape_cross = sum m [Phi~] (3,3m); position_shape = sum m r~'Phi (3,m); position_cross = sum m r~'[Phi~] (3,3m);
+    cross_shape = sum m [Phi~]'Phi (3m,m); cross_cross = sum m [Phi~]'[Phi~] (3m,3m); modal = sum m Phi'Phi (m,m).
+    """
+
+    mass: float
+    first: Array
+    inertia: Array
+    shape: Array
+    shape_cross: Array
+    position_shape: Array
+    position_cross: Array
+    cross_shape: Array
+    cross_cross: Array
+    modal: Array
+    stiffness: Array
+    damping: Array
+
+
+def integrals(body: ModalBody, axes: Array) -> ModalIntegrals:
+    """Integrals of a body without rotary inertia of its points, in the axes `axes` @ (body axes)."""
+    arrays = modal_arrays(body)
+    m, r = arrays.mass, arrays.position @ axes.T
+    Phi = np.einsum("ab,pbn->pan", axes, arrays.translation_modes)
+    r_cross = cross_matrices(r)
+    crosses = np.moveaxis(cross_matrices(np.moveaxis(Phi, 2, 1)), 1, 2)  # (points, 3, modes, 3)
+    row = crosses.reshape(len(m), 3, -1)
+
+    def total(a: Array, b: Array) -> Array:
+        """sum m a'b."""
+        return np.einsum("p,pki,pkj->ij", m, a, b)
+
+    return ModalIntegrals(
+        mass=float(m.sum()), first=m @ r, inertia=total(r_cross, r_cross),
+        shape=np.einsum("p,pkn->kn", m, Phi), shape_cross=np.einsum("p,pkn->kn", m, row),
+        position_shape=total(r_cross, Phi), position_cross=total(r_cross, row),
+        cross_shape=total(row, Phi), cross_cross=total(row, row), modal=total(Phi, Phi),
+        stiffness=arrays.stiffness, damping=arrays.damping,
+    )  # fmt: skip
+
+
+def gravity_force(data: ModalIntegrals, g: Array, A: Array, rate_map: Array, eta: Array) -> Array:
+    """Generalised weight [World force; rotation coordinates; modes] of the deformed body.
+
+    Exudyn's own mass-proportional load leaves out the moment of the deformation, A skew(shape eta) G, so that energy
+    drifts. `g` (3,) m/s² in World, `A` (3,3) frame to World, `rate_map` (3,k): angular velocity in body axes = map qdot.
+    """
+    local = A.T @ g
+    moment = cross_matrix(data.first + data.shape @ eta) @ local
+    return np.concatenate([data.mass * g, rate_map.T @ moment, data.shape.T @ local])

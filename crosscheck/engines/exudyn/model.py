@@ -1,0 +1,86 @@
+"""A scene compiled for Exudyn: pointwise evaluation and runs, in the terms of the engine contract."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from crosscheck.engines.contract import Array, Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.exudyn.assembly import Assembly, assemble
+from crosscheck.engines.exudyn.balance import energy_and_momentum
+from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
+from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
+from crosscheck.engines.exudyn.solve import integrate
+from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
+from crosscheck.engines.exudyn.wrench import drives, link_wrenches
+from flexmb.scene.schema import Scene
+
+
+class ExudynModel:
+    """One scene as an Exudyn system."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+        self.assembly = assemble(scene)
+
+    def warm_up(self) -> None:
+        """Nothing to compile."""
+
+    def evaluate(self) -> Snapshot:
+        states = initial_state(self.assembly)
+        paths = self._paths(states)
+        loads, energy, momentum = self._loads_and_balance(states, paths)
+        markers = {
+            marker.name: marker_snapshot(*self._located(marker, paths), np.array(marker.offset_m))
+            for marker in self.scene.markers
+        }
+        first = {name: values[0] for name, values in loads.items()}
+        return Snapshot(
+            markers=markers,
+            loads={name: first[name] for name in self.assembly.hinges},
+            wheel_loads={name: first[name] for name in self.assembly.wheels},
+            drives={name: values[0] for name, values in drives(self.assembly, states).items()},
+            energy={kind: float(values[0]) for kind, values in energy.items()},
+            momentum=momentum[0],
+        )
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        solution = integrate(self.assembly, run.times, effort)
+        states = solution.states
+        # the solvers' own first multipliers are good to 1e-7 only
+        states.multipliers[:1] = initial_state(self.assembly).multipliers
+        paths = self._paths(states)
+        loads, energy, momentum = self._loads_and_balance(states, paths)
+        return Trajectory(
+            status=solution.status, message=solution.message, times=run.times[: len(states.times)],
+            markers={
+                marker.name: marker_path(*self._located(marker, paths), np.array(marker.offset_m))
+                for marker in self.scene.markers
+            },
+            loads={name: loads[name] for name in self.assembly.hinges},
+            wheel_loads={name: loads[name] for name in self.assembly.wheels},
+            drives=drives(self.assembly, states), energy=energy, momentum=momentum,
+            wall_s=solution.wall_s, evaluations=solution.evaluations,
+        )  # fmt: skip
+
+    def mass_matrix(self, body: str | None = None) -> Array:
+        """(m+6, m+6) of a flexible body, [modes; angular; linear] in its body axes; of the only one by default."""
+        name = body or next(name for name, placed in self.assembly.bodies.items() if placed.carrier.flexible is not None)
+        return body_mass_matrix(self.assembly, name)
+
+    def _located(self, item, paths: dict[int, CarrierPath]):
+        placed = self.assembly.bodies[item.body]
+        return paths[placed.carrier.key], placed.shape(item.node)
+
+    def _paths(self, states: States) -> dict[int, CarrierPath]:
+        """Motion of every carrier that a joint holds or that has mass, by its node."""
+        carriers = [self.assembly.shop.ground, *self.assembly.carriers]
+        for link in self.assembly.links.values():
+            carriers += [carrier for stage in link.stages for carrier in (stage.inboard, stage.outboard)]
+            carriers += list(link.spherical[1:]) if link.spherical else []
+        return {key: carrier_path(self.assembly, c, states) for key, c in {c.key: c for c in carriers}.items()}
+
+    def _loads_and_balance(
+        self, states: States, paths: dict[int, CarrierPath]
+    ) -> tuple[dict[str, Array], dict[str, Array], Array]:
+        loads = link_wrenches(self.assembly, states, paths)
+        return loads, *energy_and_momentum(self.assembly, states, paths)

@@ -1,0 +1,96 @@
+"""Where everything is, and how it moves, at t = 0: redundant coordinates need poses and velocities that fit the joints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.engines.contract import Array
+from crosscheck.engines.conventions import axis_rotation, rotation_matrix
+from crosscheck.engines.exudyn.modal import NodeShape
+from crosscheck.engines.exudyn.rotations import exponential, left_jacobian
+from crosscheck.engines.functions_of_time import profile
+from flexmb.scene.hinges import AngularCoordinate, Free, LinearCoordinate, Spherical
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A frame in World: `position` (3,) m, `rotation` (3,3) to World, `angular` rad/s and `linear` m/s in World axes."""
+
+    position: Array
+    rotation: Array
+    angular: Array
+    linear: Array
+
+    def offset(self, position: Array, rotation: Array) -> Motion:
+        """A frame fixed in this one."""
+        arm = self.rotation @ position
+        return Motion(
+            self.position + arm, self.rotation @ rotation, self.angular, self.linear + np.cross(self.angular, arm)
+        )
+
+    def turned(self, axis: Array, angle: float, rate: float) -> Motion:
+        """This frame turned about its own unit `axis`."""
+        spin = rate * (self.rotation @ axis)
+        return Motion(self.position, self.rotation @ axis_rotation(axis, angle), self.angular + spin, self.linear)
+
+    def moved(self, displacement: Array, rate: Array) -> Motion:
+        """This frame displaced by a vector in its own axes that changes at `rate`."""
+        arm = self.rotation @ displacement
+        velocity = self.linear + np.cross(self.angular, arm) + self.rotation @ rate
+        return Motion(self.position + arm, self.rotation, self.angular, velocity)
+
+    def spherical(self, quaternion: Array, rate: Array) -> Motion:
+        """This frame turned by `quaternion`, with the relative angular velocity `rate` in the turned axes."""
+        rotation = self.rotation @ rotation_matrix(quaternion)
+        return Motion(self.position, rotation, self.angular + rotation @ rate, self.linear)
+
+    def node(self, shape: NodeShape, eta: Array, rate: Array) -> Motion:
+        """A node of a flexible body whose frame this is; the node turns by exp(rotation_modes eta)."""
+        theta, theta_rate = shape.rotation_modes @ eta, shape.rotation_modes @ rate
+        moved = self.moved(shape.position + shape.translation @ eta, shape.translation @ rate)
+        rotation = self.rotation @ exponential(theta) @ shape.rotation
+        spin = self.rotation @ left_jacobian(theta) @ theta_rate
+        return Motion(moved.position, rotation, self.angular + spin, moved.linear)
+
+    def body_of(self, node: Motion) -> Motion:
+        """The body frame, where this is a node's motion and `node` the node's motion seen from the body frame."""
+        rotation = self.rotation @ node.rotation.T
+        angular = self.angular - rotation @ node.angular
+        arm = rotation @ node.position
+        linear = self.linear - np.cross(angular, arm) - rotation @ node.linear
+        return Motion(self.position - arm, rotation, angular, linear)
+
+
+AT_REST = Motion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+def initial(coordinate: AngularCoordinate | LinearCoordinate) -> tuple[float, float]:
+    """Value and rate at t = 0: of the prescribed function where there is one, else the scene's initial values."""
+    match coordinate:
+        case AngularCoordinate(prescribed_rad=None):
+            return coordinate.angle_rad, coordinate.rate_rad_s
+        case LinearCoordinate(prescribed_m=None):
+            return coordinate.position_m, coordinate.rate_m_s
+        case AngularCoordinate(prescribed_rad=function) | LinearCoordinate(prescribed_m=function):
+            start = profile(function)(0.0)
+            return start.value, start.rate
+
+
+def across(inboard: Motion, axis: Array, coordinate: AngularCoordinate | LinearCoordinate) -> Motion:
+    """The frame beyond one scalar coordinate about or along `axis` (in the inboard frame)."""
+    value, rate = initial(coordinate)
+    if isinstance(coordinate, AngularCoordinate):
+        return inboard.turned(axis, value, rate)
+    return inboard.moved(value * axis, rate * axis)
+
+
+def across_quaternion(inboard: Motion, hinge: Spherical | Free) -> Motion:
+    """The frame beyond a hinge with a quaternion; a free hinge's velocity is in the outboard axes."""
+    rate = np.array(hinge.angular_velocity_rad_s)
+    if isinstance(hinge, Spherical):
+        return inboard.spherical(hinge.quaternion, rate)
+    to_inboard = rotation_matrix(hinge.quaternion)
+    moved = inboard.moved(np.array(hinge.position_m), to_inboard @ np.array(hinge.velocity_m_s))
+    return moved.spherical(hinge.quaternion, rate)

@@ -1,0 +1,63 @@
+"""Rotations over many samples at once: Euler parameters, rotation vectors and the left Jacobian of SO(3)."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from crosscheck.engines.contract import Array
+from crosscheck.engines.conventions import scalar_first, scalar_last
+
+_SERIES_BELOW = 1e-2
+"""Angle² (rad²) below which four series terms of the Jacobian's coefficients are exact to round-off."""
+
+
+def local_rate_map(p: Array) -> Array:
+    """G (..., 3, 4) of Euler parameters p (..., 4): angular velocity in body axes = G dp/dt, and dp/dt = G' w / 4."""
+    p0, p1, p2, p3 = np.moveaxis(p, -1, 0)
+    rows = [(-p1, p0, p3, -p2), (-p2, -p3, p0, p1), (-p3, p2, -p1, p0)]
+    return 2.0 * np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def matrices(p: Array) -> Array:
+    """Rotation matrices (..., 3, 3), body to World, of Euler parameters (..., 4) (normalised here)."""
+    p = np.asarray(p)
+    return Rotation.from_quat(scalar_last(p.reshape(-1, 4))).as_matrix().reshape(*p.shape[:-1], 3, 3)
+
+
+def quaternions(R: Array) -> Array:
+    """Quaternions wxyz (..., 4) of rotation matrices (..., 3, 3), with no sign jump from one sample to the next."""
+    found = scalar_first(Rotation.from_matrix(R.reshape(-1, 3, 3)).as_quat())
+    sign = np.where(np.einsum("ti,ti->t", found[1:], found[:-1]) < 0.0, -1.0, 1.0)
+    found[1:] *= np.cumprod(sign)[:, None]
+    return found.reshape(*R.shape[:-2], 4)
+
+
+def exponential(theta: Array) -> Array:
+    """exp(skew(theta)) (..., 3, 3) of rotation vectors (..., 3)."""
+    return Rotation.from_rotvec(theta.reshape(-1, 3)).as_matrix().reshape(*theta.shape[:-1], 3, 3)
+
+
+def left_jacobian(theta: Array) -> Array:
+    """J (..., 3, 3): angular velocity = J dtheta/dt, in the axes theta is given in. Analytic in theta."""
+    square = np.sum(theta * theta, axis=-1)
+    small = np.abs(square) < _SERIES_BELOW
+    s = np.where(small, 1.0, square)
+    angle = np.sqrt(s)
+    a = np.where(small, 1 / 2 - square / 24 * (1 - square / 30 * (1 - square / 56)), (1 - np.cos(angle)) / s)
+    b = np.where(small, 1 / 6 - square / 120 * (1 - square / 42 * (1 - square / 72)), (1 - np.sin(angle) / angle) / s)
+    K = cross_matrices(theta)
+    return np.eye(3) + a[..., None, None] * K + b[..., None, None] * (K @ K)
+
+
+def left_jacobian_rate(theta: Array, rate: Array) -> Array:
+    """dJ/dt (..., 3, 3) for theta moving at `rate`, by a complex step (exact to round-off)."""
+    step = 1e-30
+    return left_jacobian(theta + 1j * step * rate).imag / step
+
+
+def cross_matrices(a: Array) -> Array:
+    """skew(a) (..., 3, 3) of vectors (..., 3): skew(a) b = a x b."""
+    x, y, z = np.moveaxis(a, -1, 0)
+    o = np.zeros_like(x)
+    return np.stack([np.stack(r, axis=-1) for r in ((o, -z, y), (z, o, -x), (-y, x, o))], axis=-2)

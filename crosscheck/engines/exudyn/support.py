@@ -1,0 +1,73 @@
+"""Which scenes Exudyn can represent, and how exactly."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from crosscheck.engines.contract import Support
+from crosscheck.engines.exudyn.assembly import deforming, flexible
+from flexmb.scene.hinges import Free
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import BeamBody, Body, ModalBody, Scene, SidBody
+from flexmb.scene.tree import GROUND
+
+NOT_WORKLESS = (
+    "it hangs on a deforming node: Exudyn's marker averages mesh points there, and its joint is not workless "
+    "(2e-5 to 8e-4 of the energy)"
+)
+
+
+def supports(scene: Scene) -> Support:
+    """"no" with the first reason there is, else "surrogate" with the reasons, else "exact"."""
+    for reason in _refusals(scene):
+        return Support("no", reason)
+    weak = tuple(dict.fromkeys(_approximations(scene)))
+    return Support("surrogate", "; ".join(weak)) if weak else Support("exact")
+
+
+def _refusals(scene: Scene) -> Iterator[str]:
+    if scene.closures:
+        yield "loop closures are not supported yet"
+    bodies = {body.name: body for body in scene.bodies}
+    for body in scene.bodies:
+        yield from _body_refusals(body)
+    for hinge in scene.hinges:
+        if not isinstance(hinge, Free) and deforming(bodies[hinge.child], hinge.child_node):
+            yield (
+                f'hinge "{hinge.name}" holds body "{hinge.child}" at a node that deforms: a floating frame must not be '
+                "clamped through its mesh; use modes clamped at the hinge"
+            )
+
+
+def _body_refusals(body: Body) -> Iterator[str]:
+    match body:
+        case SidBody():
+            yield f'body "{body.name}": SID files are not supported yet'
+        case BeamBody() if body.level != "rigid":
+            yield f'body "{body.name}": expand the beam to raw points and modes first'
+        case ModalBody() if body.level not in ("rigid", "full"):
+            yield f'body "{body.name}": Exudyn\'s floating frame has the kinetic energy of level "full", not "{body.level}"'
+        case ModalBody(level="full"):
+            arrays = modal_arrays(body)
+            if arrays.inertia.any() or (arrays.com_offset.any() and arrays.rotation_modes.any()):
+                yield (
+                    f'body "{body.name}": its points have rotary inertia, which Exudyn\'s floating frame cannot turn; '
+                    'use massy section points (points = "section")'
+                )
+            elif arrays.com_offset.any():
+                yield f'body "{body.name}": put the points at their mass centres (com_offset_m = 0)'
+
+
+def _approximations(scene: Scene) -> Iterator[str]:
+    bodies = {body.name: body for body in scene.bodies}
+    for hinge in scene.hinges:
+        outboard_free = isinstance(hinge, Free)
+        if hinge.parent != GROUND and not outboard_free and deforming(bodies[hinge.parent], hinge.parent_node):
+            yield f'hinge "{hinge.name}": {NOT_WORKLESS}'
+    for item in (*scene.wheels, *scene.point_masses):
+        if deforming(bodies[item.body], item.node):
+            yield f'"{item.name}": {NOT_WORKLESS}'
+    for load in scene.loads:
+        turning = load.type == "torque" or load.frame == "node"
+        if turning and flexible(bodies[load.body]) and deforming(bodies[load.body], load.node):
+            yield f'load "{load.name}": Exudyn averages the rotation of a deforming node, to second order'
