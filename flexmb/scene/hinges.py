@@ -117,7 +117,9 @@ class Planar(_Hinge, frozen=True, kw_only=True, tag="planar"):
 
 class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
     """Six freedoms. Coordinates: position of the outboard origin in inboard axes, quaternion.
-    Speeds: [angular velocity; velocity of the outboard origin], both relative to the inboard frame, in outboard axes."""
+
+    Speeds: [angular velocity; velocity of the outboard origin], relative to the inboard frame, in outboard axes.
+    """
 
     position_m: Vector = ZERO
     quaternion: Quaternion = IDENTITY

@@ -131,8 +131,8 @@ class Scene(_Strict, frozen=True, kw_only=True):
 
 __all__ = [
     "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody",
-    "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp",
-    "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass",
-    "Universal", "Vector", "Weld", "Wheel",
+    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
+    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
+    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
+    "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
 ]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import sqrt
 
-from flexmb.scene.bodies import BeamBody, Modes
+from flexmb.scene.bodies import BeamBody, BeamStation, Modes
 from flexmb.scene.check import inertia
 from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Place, Problem
@@ -14,6 +14,9 @@ from flexmb.scene.schema import Scene
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. Wider than any structure
 # that is built, and the soft benchmark beams of the literature (100 m/s) are inside.
 WAVE_SPEED = (50.0, 20_000.0)  # m/s
+THICKEST = 0.5  # radius of gyration over length: beyond it nothing is slender
+# GJ / (EIy + EIz) and GA / EA are below 0.75 for isotropic materials; laminates reach a few times that.
+STIFFEST_SHEAR = 10.0
 STIFFNESS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
 SHEAR = ("GAy_N", "GAz_N")
 
@@ -62,15 +65,30 @@ def _stations(place: Place, body: BeamBody) -> Iterator[Problem]:
                 yield Problem(str(spot.key(i)), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
             elif value is not None and value <= 0.0:
                 yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
-        if station.EA_N > 0.0 and station.mass_per_length_kg_m > 0.0:
-            speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
-            if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
-                what = f"waves would run along the beam at {speed:.3g} m/s: no material does that"
-                remedy = (
-                    f"check the units of EA_N (N) and mass_per_length_kg_m (kg/m), a factor of 1000 for instance: "
-                    f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
-                )
-                yield Problem(str(spot.key(i, "EA_N")), what, remedy)
+        if all(getattr(station, key) > 0.0 for key in (*STIFFNESS, "mass_per_length_kg_m")):
+            yield from _plausible(spot.key(i), station, body.length_m)
+
+
+def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Problem]:
+    """A slip of units in one of the stiffnesses, or between stiffness and mass."""
+    check = "check the units, a factor of 1000 for instance"
+    speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
+    if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
+        what = f"waves would run along the beam at {speed:.3g} m/s: no material does that"
+        window = f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
+        yield Problem(str(spot.key("EA_N")), what, f"{check}: {window}")
+        return
+    for key in ("EIy_Nm2", "EIz_Nm2"):
+        gyration = sqrt(getattr(station, key) / station.EA_N)
+        if gyration > THICKEST * length > 0.0:
+            what = f"the section's radius of gyration would be {gyration:.3g} m in a beam of {length:.3g} m"
+            yield Problem(str(spot.key(key)), what, f"{check}: sqrt(EI / EA) is a fraction of the section's width")
+    for key, limit in (("GJ_Nm2", station.EIy_Nm2 + station.EIz_Nm2), ("GAy_N", station.EA_N), ("GAz_N", station.EA_N)):
+        value = getattr(station, key)
+        if value is not None and value > STIFFEST_SHEAR * limit:
+            counterpart = "EIy + EIz" if key == "GJ_Nm2" else "EA"
+            what = f"{key} is {value / limit:.3g} times {counterpart}"
+            yield Problem(str(spot.key(key)), what, f"{check}: G is smaller than E in every isotropic material")
 
 
 def _along(place: Place, body: BeamBody) -> Iterator[Problem]:
@@ -93,9 +111,6 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Problem]:
     elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
         yield Problem(str(place.key("count")), what, "use more elements, more families, or fewer modes")
-    if modes.static and modes.boundary == "free-free":
-        remedy = "attachment modes need a clamped root: leave static out, or use clamped-free"
-        yield Problem(str(place.key("static")), "static modes of a free-free beam", remedy)
     yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
 
 

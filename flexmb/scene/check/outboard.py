@@ -7,6 +7,7 @@ these by moving hinges.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -32,10 +33,21 @@ from flexmb.scene.hinges import (
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Problem
 from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.tree import Coordinate, coordinates, node_frame
+from flexmb.scene.tree import GROUND, Coordinate, coordinates, node_frame, ordered
 
 Array = NDArray[np.float64]
 Pose = tuple[Rotation, Array]
+
+
+class Cluster(NamedTuple):
+    """A body and all that is welded to it: `inertia` (6,6) in the body's frame, None where it is not known.
+
+    `beyond`: whether mass hangs from these by moving hinges.
+    """
+
+    inertia: Array | None
+    beyond: bool
+
 
 # A moment below this share of the largest leaves no digits of the acceleration.
 NEGLIGIBLE = 1e-12
@@ -45,17 +57,15 @@ GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x
 def moved_inertia(scene: Scene) -> Iterator[Problem]:
     """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be sound."""
     bodies = {body.name: body for body in scene.bodies}
-    outboard: dict[str, list[Hinge]] = {}
-    for hinge in scene.hinges:
-        outboard.setdefault(hinge.parent, []).append(hinge)
-    own = {body.name: _spatial_inertia(scene, body) for body in scene.bodies}
+    clusters = _clusters(scene)
     for place, hinge in entries(scene, "hinges"):
         H = _free_directions(hinge)
-        cluster, beyond = _cluster(hinge.child, bodies, outboard, own)
+        cluster, beyond = clusters[hinge.child]
         if H.shape[1] == 0 or cluster is None or beyond:
             continue
-        X = _motion(_end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion))
-        inertia = np.linalg.inv(X).T @ cluster @ np.linalg.inv(X)
+        end = _end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
+        X = np.linalg.inv(_motion(end))
+        inertia = X.T @ cluster @ X
         D = H.T @ inertia @ H
         mass, moment = float(inertia[5, 5]), float(np.trace(inertia[:3, :3]))
         reference = np.where(np.any(H[:3] != 0.0, axis=0), moment, mass)
@@ -70,27 +80,27 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
             yield Problem(where, what, "start elsewhere, choose another sequence, or use a spherical hinge")
 
 
-def _cluster(
-    name: str, bodies: dict[str, Body], outboard: dict[str, list[Hinge]], own: dict[str, Array | None]
-) -> tuple[Array | None, bool]:
-    """Inertia (6,6) of a body and all that is welded to it, in the body's frame (None: not known), and whether mass
-    hangs from these by moving hinges."""
-    total = own[name]
-    beyond = False
-    for hinge in outboard.get(name, []):
-        welded, further = _cluster(hinge.child, bodies, outboard, own)
+def _clusters(scene: Scene) -> dict[str, Cluster]:
+    """Of every body: what is welded to it and what hangs from these, gathered tip to base."""
+    bodies = {body.name: body for body in scene.bodies}
+    clusters = {name: Cluster(_spatial_inertia(scene, body), False) for name, body in bodies.items()}
+    for body, hinge in reversed(ordered(scene)):
+        if hinge.parent == GROUND:
+            continue
+        total, beyond = clusters[hinge.parent]
+        welded, further = clusters[body.name]
         if not isinstance(hinge, Weld):
             beyond = beyond or further or welded is None or bool(np.any(welded))
-            continue
-        beyond = beyond or further
-        if total is None or welded is None:
-            total = None
-            continue
-        to_parent = _end(bodies[name], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
-        to_child = _end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-        X = np.linalg.solve(_motion(to_child), np.eye(6)) @ _motion(to_parent)
-        total = total + X.T @ welded @ X
-    return total, beyond
+        elif total is None or welded is None:
+            total, beyond = None, beyond or further
+        else:
+            parent = bodies[hinge.parent]
+            to_parent = _end(parent, hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
+            to_child = _end(body, hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
+            X = np.linalg.solve(_motion(to_child), _motion(to_parent))
+            total, beyond = total + X.T @ welded @ X, beyond or further
+        clusters[hinge.parent] = Cluster(total, beyond)
+    return clusters
 
 
 def _spatial_inertia(scene: Scene, body: Body) -> Array | None:

@@ -1,0 +1,119 @@
+"""The builder writes the schema's structs; helpers give the numbers of textbooks."""
+
+import doctest
+import inspect
+
+import numpy as np
+import pytest
+
+from flexmb.scene import build
+from flexmb.scene import schema as s
+from flexmb.scene.build import COLLECTIONS, SceneBuilder, angular
+from flexmb.scene.problems import SceneError
+from flexmb.scene.shapes import beam_section, cuboid_inertia, cylinder_inertia, inertia_moments
+from flexmb.scene.units import split_unit
+
+UNIT = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+def test_the_builder_writes_the_structs():
+    built = (
+        SceneBuilder("pendulum", gravity=np.array([0, 0, -9.81]), description="a rod")
+        .rigid_body("arm", mass=1, com=[0.5, 0, 0], inertia=np.eye(3), nodes={"end": (1, 0, 0)})
+        .revolute("pivot", "ground", "arm", axis=(0, 1, 0), angle=0.3, torque=s.Constant(value=2), child_node="end")
+        .marker("tip", "arm", offset=(1, 0, 0))
+        .scene()
+    )
+    node = s.Node(name="end", position_m=(1.0, 0.0, 0.0))
+    pivot = s.Revolute(
+        name="pivot", parent="ground", child="arm", child_node="end", axis=(0.0, 1.0, 0.0),
+        rotation=s.AngularCoordinate(angle_rad=0.3, torque_Nm=s.Constant(value=2.0)),
+    )  # fmt: skip
+    assert built == s.Scene(
+        name="pendulum", description="a rod", gravity_m_s2=(0.0, 0.0, -9.81), hinges=(pivot,),
+        bodies=(s.RigidBody(name="arm", mass_kg=1.0, com_m=(0.5, 0.0, 0.0), inertia_kg_m2=UNIT, nodes=(node,)),),
+        markers=(s.Marker(name="tip", body="arm", offset_m=(1.0, 0.0, 0.0)),),
+    )  # fmt: skip
+    assert all(isinstance(number, float) for number in built.bodies[0].com_m)
+
+
+def test_the_example_in_the_documentation_runs():
+    assert doctest.testmod(build).failed == 0
+
+
+METHODS = {
+    "rigid_body": s.RigidBody, "beam": s.BeamBody, "modal_body": s.ModalBody, "sid_body": s.SidBody, "weld": s.Weld,
+    "revolute": s.Revolute, "prismatic": s.Prismatic, "cylindrical": s.Cylindrical, "universal": s.Universal,
+    "gimbal": s.Gimbal, "spherical": s.Spherical, "planar": s.Planar, "free": s.Free, "closure": s.Closure,
+    "wheel": s.Wheel, "point_mass": s.PointMass, "force": s.Load, "torque": s.Load, "marker": s.Marker,
+    "modal_state": s.ModalState,
+}  # fmt: skip
+# Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
+REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "prismatic": {"translation"},
+            "force": {"type"}, "torque": {"type"}}  # fmt: skip
+
+
+def test_every_kind_has_a_method():
+    assert set(METHODS.values()) == set(COLLECTIONS)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_every_key_of_the_schema_is_an_argument(method):
+    """By name and without unit; the placement of a hinge is typed by `Placement`."""
+    arguments = set(inspect.signature(getattr(SceneBuilder, method)).parameters)
+    arguments |= set(build.Placement.__annotations__) if "placement" in arguments else set()
+    keys = {split_unit(key)[0] for key in METHODS[method].__struct_fields__}
+    assert keys - arguments == REPLACED.get(method, set())
+
+
+@pytest.mark.parametrize("kind", [s.AngularCoordinate, s.LinearCoordinate])
+def test_every_key_of_a_coordinate_is_an_argument(kind):
+    typed = build.Angle if kind is s.AngularCoordinate else build.Displacement
+    assert {split_unit(key)[0] for key in kind.__struct_fields__} == set(typed.__annotations__)
+
+
+def test_structs_can_be_added_as_they_are():
+    body = s.RigidBody(name="a", mass_kg=1.0, inertia_kg_m2=UNIT)
+    scene = SceneBuilder("x").add(body, s.Free(name="h", parent="ground", child="a")).scene()
+    assert scene.bodies == (body,)
+    with pytest.raises(TypeError, match="Node is not a part of a scene by itself"):
+        SceneBuilder("x").add(s.Node(name="n"))
+
+
+def test_wrong_arguments_are_named():
+    with pytest.raises(TypeError, match='did you mean "parent_node"'):
+        SceneBuilder("x").weld("h", "ground", "a", parent_nod="tip")
+    with pytest.raises(TypeError, match='did you mean "stiffness"'):
+        angular(stifness=1.0)
+    with pytest.raises(SceneError, match=r'\$\.bodies\[0\]\.mass_kg \(body "a"\): Expected `float`, got `str`'):
+        SceneBuilder("x").rigid_body("a", mass="1", inertia=UNIT)
+
+
+def test_a_uniform_beam_has_its_section_at_both_ends():
+    section = beam_section(E=200e9, G=80e9, A=1e-4, Iy=2e-9, Iz=3e-9, rho=7800.0)
+    builder = SceneBuilder("x").beam("boom", length=2.0, elements=4, section=section, modes=2, nodes={"mid": 1.0})
+    (beam,) = builder.free("h", "ground", "boom").scene().bodies
+    assert [station.x_m for station in beam.stations] == [0.0, 2.0]
+    assert beam.stations[1].EIz_Nm2 == 200e9 * 3e-9
+    assert beam.modes.count == 2
+    assert beam.nodes == (s.BeamNode(name="mid", x_m=1.0),)
+
+
+def test_inertia_helpers_against_sums_over_points():
+    """Midpoint sums over n cells in each direction miss 1/n^2 of a moment: the tensor of one cell."""
+    n, size, mass = 20, np.array([1.0, 2.0, 3.0]), 6.0
+    axes = [(np.arange(n) + 0.5) / n * edge - edge / 2 for edge in size]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    tensor = mass * (np.mean(points**2) * 3 * np.eye(3) - points.T @ points / len(points))
+    np.testing.assert_allclose(cuboid_inertia(mass, tuple(size)), tensor, rtol=1.01 / n**2, atol=1e-12)
+
+    radius, length = 0.5, 3.0
+    disc = points[:, :2] / size[:2] * 2 * radius
+    inside = np.hypot(*disc.T) < radius
+    x, y = disc[inside].T
+    z = points[inside, 2] / size[2] * length
+    axial, transverse = mass * np.mean(x**2 + y**2), mass * np.mean(y**2 + z**2)
+    expected = np.diag([axial, transverse, transverse])
+    # a disc cut from an n x n grid is round to its cell: 1/n of its area
+    np.testing.assert_allclose(cylinder_inertia(mass, radius, length, "x"), expected, rtol=1.0 / n, atol=1e-12)
+    np.testing.assert_array_equal(inertia_moments(1, 2, 3, 4, 5, 6), [[1, 4, 5], [4, 2, 6], [5, 6, 3]])
