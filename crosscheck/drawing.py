@@ -161,5 +161,3 @@ def levels(scene: Scene) -> str:
     """The levels of the scene's bodies, as shown in verdicts: "rigid", "full", "full, rigid"."""
     found = {body.level for body in scene.bodies if not isinstance(body, RigidBody)}
     return ", ".join(sorted(found)) if found else "rigid"
-
-

@@ -1,0 +1,161 @@
+"""The command `crosscheck`: thin, it only reads words and shows results."""
+
+from __future__ import annotations
+
+import webbrowser
+from pathlib import Path
+from typing import Annotated, NoReturn
+
+import typer
+from rich.console import Console
+
+from crosscheck import library
+from crosscheck.case import CaseError
+from crosscheck.engine_list import describe_engines
+from crosscheck.live import LiveProgress
+from crosscheck.report import write_all
+from crosscheck.report.console import cases_table, engines_table, print_outcome
+from crosscheck.sweep import sweep
+from crosscheck.verify import sample_times_csv, verify_csv
+
+EXIT_USAGE = 2
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    help="""
+Run the same multibody scene in independent codes and say who **agrees** with whom, on what, by how much, how fast.
+
+Start with `crosscheck run canonical`, then open the report whose path it prints.
+`crosscheck list` shows the cases, `crosscheck engines` the codes that are installed here.
+""",
+)
+console = Console()
+
+Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
+Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
+
+
+@app.command()
+def run(
+    cases: Annotated[
+        list[str],
+        typer.Argument(help="Case names, a tag such as `canonical`, `all`, or folders that hold a run.toml."),
+    ],
+    engine: Annotated[
+        list[str] | None,
+        typer.Option("--engine", "-e", help="Only these engines (repeat it). One alone is compared with its partners."),
+    ] = None,
+    out: Out = Path("out"),
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+    open_report: Open = False,
+) -> None:
+    """
+    Run cases in all engines, judge them, write the report.
+
+    **Writes** into `--out`: `report.html` (open it), `verdicts.json`, `summary.md`, `junit.xml`, `records.jsonl`.
+    A run that was stopped resumes where it was: what is recorded for the same scene and version is not run again.
+
+    **Exit code**: 0 every verdict is the one the case expects and everything asked for ran;
+    1 something is not as expected or did not run; 2 the request itself makes no sense.
+
+    **Examples**: `crosscheck run canonical` · `crosscheck run spin/beam_k -e native -e exudyn` ·
+    `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
+    """
+    chosen = _found(tuple(cases))
+    with LiveProgress(console) as live:
+        sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, listener=live.hear)
+    _conclude(out / "records.jsonl", out, open_report)
+
+
+@app.command("list")
+def list_cases() -> None:
+    """List the shipped cases with their tags, variants and engines."""
+    console.print(cases_table(_found(("all",))))
+
+
+@app.command()
+def engines() -> None:
+    """List the engines: which are installed, in which version, and how to install the others."""
+    console.print(engines_table(describe_engines()))
+
+
+@app.command()
+def report(
+    records: Annotated[Path, typer.Argument(help="A records.jsonl of an earlier run, yours or anybody's.")],
+    out: Out = Path("out"),
+    open_report: Open = False,
+) -> None:
+    """
+    Judge and draw recorded runs again; no engine needs to be installed.
+
+    **Exit code** as of `run`.
+    """
+    if not records.is_file():
+        _refuse(f"{records} is no file")
+    _conclude(records, out, open_report)
+
+
+@app.command()
+def verify(
+    case: Annotated[str, typer.Argument(help="Case name or folder.")],
+    csv: Annotated[Path, typer.Argument(help="Your code's results (see below).")],
+    coarse: Annotated[
+        Path | None,
+        typer.Option(help="The same results at half the accuracy: your U is 3 x the difference, not the case's goal."),
+    ] = None,
+    variant: Annotated[str | None, typer.Option(help="Variant to be held against; by default the first.")] = None,
+    engine: Annotated[str, typer.Option(help="Engine that gives the reference.")] = "native",
+    template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
+) -> None:
+    """
+    Hold a CSV of your own code against a case, without an adapter.
+
+    **Format**: one header line, one line a sample time of the case. Columns: `t` (s); for a marker `tip`
+    `tip.px tip.py tip.pz` (m), `tip.qw tip.qx tip.qy tip.qz`, `tip.vx tip.vy tip.vz` (m/s), `tip.wx tip.wy tip.wz`
+    (rad/s); for a hinge `elbow` `elbow.tx elbow.ty elbow.tz` (Nm) and `elbow.fx elbow.fy elbow.fz` (N), the load on the
+    outboard body about the hinge point. World axes; quaternions scalar-first, body to World. Only whole groups count,
+    any subset of groups will do; `--template` writes a file with the times and all columns to fill in.
+
+    **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
+    """
+    try:
+        (chosen,) = _found((case,))
+        if template:
+            csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
+            console.print(f"Fill in {csv}, then run the command again without --template.")
+            return
+        outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
+    except ValueError as error:
+        _refuse(str(error))
+    raise typer.Exit(print_outcome(console, outcome))
+
+
+def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
+    """The cases asked for, or the end of the program with exit code 2."""
+    try:
+        return library.resolve(words)
+    except CaseError as error:
+        _refuse(str(error))
+
+
+def _conclude(records: Path, out: Path, open_report: bool) -> None:
+    """Judge, write everything, show the table, and leave with the exit code."""
+    outcome, page = write_all(records, out)
+    code = print_outcome(console, outcome)
+    console.print(f"Report: [bold]{page}[/bold]", soft_wrap=True)
+    if open_report:
+        webbrowser.open(page.resolve().as_uri())
+    raise typer.Exit(code)
+
+
+def _refuse(message: str) -> NoReturn:
+    console.print(f"[red]{message}[/red]", soft_wrap=True)
+    raise typer.Exit(EXIT_USAGE)
+
+
+def main() -> None:
+    """Entry point of the console script."""
+    app()

@@ -1,0 +1,81 @@
+"""What is being done right now: a bar over all jobs, a line for each at work, a lasting line for each that ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+
+from crosscheck.plan import Job
+from crosscheck.pool import Event
+from crosscheck.records import RunRecord
+
+MARKS = {
+    "finished": "[green]✓[/green]",
+    "diverged": "[magenta]✕[/magenta]",
+    "failed": "[red]✕[/red]",
+    "refused": "[yellow]⊘[/yellow]",
+    "did not run": "[yellow]–[/yellow]",
+}
+
+
+class LiveProgress:
+    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear."""
+
+    def __init__(self, console: Console) -> None:
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}"),
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=console,
+            transient=True,
+        )
+        self._overall: TaskID | None = None
+        self._lines: dict[int, TaskID] = {}
+        self._records: dict[int, list[RunRecord]] = {}
+        self._started: dict[int, float] = {}
+
+    def __enter__(self) -> LiveProgress:
+        self._progress.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._progress.stop()
+
+    def hear(self, jobs: Sequence[Job], event: Event) -> None:
+        """Show one event."""
+        if self._overall is None:
+            self._overall = self._progress.add_task("[bold]all runs[/bold]", total=len(jobs))
+        title = jobs[event.job].title
+        if event.kind == "started":
+            self._started[event.job] = time.perf_counter()
+            self._records[event.job] = []
+            self._lines[event.job] = self._progress.add_task(f"{title}: starting", total=None)
+        elif event.kind == "emitted" and isinstance(event.content, RunRecord):
+            self._records[event.job].append(event.content)
+        elif event.kind == "emitted":
+            self._progress.update(self._lines[event.job], description=f"{title}: {event.content}")
+        else:
+            self._progress.remove_task(self._lines.pop(event.job))
+            self._progress.advance(self._overall)
+            self._progress.console.print(self._ending(title, event), highlight=False)
+
+    def _ending(self, title: str, event: Event) -> str:
+        """The lasting line of a job."""
+        if event.kind == "crashed":
+            return f"{MARKS['failed']} {title}: {event.content}"
+        records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
+        if not records:
+            return f"{MARKS['finished']} {title}: already recorded"
+        last = records[-1]
+        if last.status != "finished":
+            return (
+                f"{MARKS[last.status]} {title}: {last.status}: {last.message.splitlines()[-1] if last.message else ''}"
+            )
+        efforts = f"{len(records)} effort{'s' if len(records) > 1 else ''}"
+        return f"{MARKS['finished']} {title}: {efforts} in {spent:.1f} s"

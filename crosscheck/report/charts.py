@@ -1,0 +1,155 @@
+"""The numbers behind the report's charts, small enough to be carried in one HTML file.
+
+Signals are thinned to `SAMPLES` instants and stored once each as float32 in base64; distances and drifts are computed
+here in double precision, and thinned by taking the largest of each bin so that no peak is lost. report.js draws them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.channels import distance, family, unit
+from crosscheck.judge import energy_drift
+from crosscheck.report.animation import animations
+from crosscheck.report.store import Store
+from crosscheck.results import CaseResults, Result
+from crosscheck.verdict import Verdict
+from crosscheck.workprecision import WorkPrecision, work_precision
+
+Array = NDArray[np.float64]
+COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
+PANELS = (
+    ("Motion", "marker"),
+    ("Energy", "energy"),
+    ("Momentum", "momentum"),
+    ("Hinge loads", "load"),
+    ("Wheel loads", "wheel_load"),
+    ("Drive loads", "drive"),
+)
+
+
+def payload(cases: Iterable[tuple[CaseResults, list[Verdict]]]) -> dict[str, Any]:
+    """Everything that report.js needs: series by number, and for each case its panels, drifts, charts, animation."""
+    store = Store()
+    described = [_case(store, case, verdicts) for case, verdicts in cases]
+    return {"cases": described, "series": store.series}
+
+
+def _case(store: Store, case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
+    return {
+        "name": case.case.case,
+        "panels": _panels(store, case, verdicts),
+        "drifts": _drifts(store, case),
+        "work": [_work(chart) for item in case.case.run.charts if (chart := work_precision(case, item)) is not None],
+        "animations": animations(store, case),
+    }
+
+
+def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[dict[str, Any]]:
+    """One panel a comparison and kind of channel; each offers its channels to choose from."""
+    groups: dict[str, dict[str, list[Verdict]]] = {}
+    for verdict in verdicts:
+        if verdict.kind == "comparison" and verdict.E is not None:
+            groups.setdefault(verdict.comparison, {}).setdefault(verdict.channel, []).append(verdict)
+    panels = []
+    for name, channels in groups.items():
+        for title, prefix in PANELS:
+            chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == prefix}
+            if chosen:
+                views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
+                panels.append({"comparison": name, "title": title, "channels": views, "first": _telling(chosen)})
+    return panels
+
+
+def _telling(channels: dict[str, list[Verdict]]) -> int:
+    """Number of the channel to show first: the first that moves."""
+    moving = [i for i, verdicts in enumerate(channels.values()) if (verdicts[0].scale or 0.0) > 0.0]
+    return moving[0] if moving else 0
+
+
+def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]) -> dict[str, Any]:
+    """Overlay of all sides of a channel, and for each pair distance and uncertainty over time (SI)."""
+    sides: dict[tuple[str, str], Result] = {}
+    curves = []
+    for verdict in pairs:
+        a = case.get(verdict.variant_a, verdict.engine_a)
+        b = case.get(verdict.variant_b, verdict.engine_b)
+        sides |= {(a.variant, a.engine): a, (b.variant, b.engine): b}
+        across = a.variant != b.variant
+        doubt = a.signal(channel, across).uncertainty.envelope + b.signal(channel, across).uncertainty.envelope
+        curves.append(
+            {
+                "a": _label(a, across),
+                "b": _label(b, across),
+                "times": store.times(a.times),
+                "error": store.peaks(distance(channel, a.values(channel), b.values(channel))),
+                "doubt": store.peaks(doubt),
+                "goal": verdict.goal * verdict.scale if verdict.scale is not None else None,
+            }
+        )
+    several = len({variant for variant, _ in sides}) > 1
+    width = next(iter(sides.values())).values(channel).shape[1]
+    return {
+        "name": channel,
+        "unit": unit(channel),
+        "components": COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
+        "sides": [
+            {
+                "label": _label(result, several),
+                "engine": result.engine,
+                "times": store.times(result.times),
+                "values": store.signal(result, channel),
+            }
+            for result in sides.values()
+        ],
+        "pairs": curves,
+    }
+
+
+def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
+    """Drift of energy (less work) and of momentum of the variants that claim to conserve them, relative."""
+    found = []
+    for item in case.case.run.conservations:
+        curves = []
+        for engine in item.engines:
+            result = case.get(item.variant, engine)
+            channel = {"energy": "energy.total"}.get(item.quantity, f"momentum.{item.quantity.partition('_')[0]}")
+            if channel not in result.channels:
+                continue
+            drift, scale = _drift(result, channel)
+            size = item.scale if item.scale is not None else scale
+            if size > 0.0:
+                values = store.peaks(np.abs(drift) / size)
+                curves.append({"engine": engine, "times": store.times(result.times), "values": values})
+        if curves:
+            title = f"{item.quantity.replace('_', ' ').capitalize()}, {item.variant}"
+            found.append({"title": title, "limit": item.limit, "curves": curves})
+    return found
+
+
+def _drift(result: Result, channel: str) -> tuple[Array, float]:
+    if channel == "energy.total":
+        return energy_drift(result)
+    values = result.values(channel)
+    return np.linalg.norm(values - values[0], axis=1), float(np.max(np.linalg.norm(values, axis=1)))
+
+
+def _work(chart: WorkPrecision) -> dict[str, Any]:
+    return {
+        "title": chart.title,
+        "observable": chart.observable,
+        "reference": chart.reference,
+        "doubt": chart.reference_uncertainty,
+        "scale": chart.scale,
+        "unit": unit(chart.observable),
+        "points": [asdict(point) for point in chart.points],
+    }
+
+
+def _label(result: Result, several: bool) -> str:
+    return f"{result.engine} · {result.variant}" if several else result.engine

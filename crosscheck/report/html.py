@@ -1,0 +1,134 @@
+"""report.html: one file that shows everything and needs nothing, no network and no engine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from jinja2 import Environment, PackageLoader, select_autoescape
+from markupsafe import Markup
+from plotly.offline import get_plotlyjs
+
+from crosscheck.report.charts import payload
+from crosscheck.report.outcome import Outcome
+from crosscheck.report.views import check_table, comparison_tables, overview
+from crosscheck.results import CaseResults, Session
+from crosscheck.verdict import Verdict
+
+
+def write_report(session: Session, outcome: Outcome, file: Path) -> None:
+    """Write the report of a judged session."""
+    templates = Environment(
+        loader=PackageLoader("crosscheck.report"),
+        autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=False,
+    )
+    data = payload([(case, outcome.verdicts[case.case.case]) for case in session.cases])
+    page = templates.get_template("report.html.j2").render(
+        outcome=outcome,
+        counts=outcome.counts(),
+        overview=overview(outcome.verdicts),
+        cases=[_case_view(number, case, outcome) for number, case in enumerate(session.cases)],
+        environment=session.environments[-1] if session.environments else None,
+        engines=_engines(session),
+        style=_inline(templates, "style.css"),
+        scripts=[Markup(get_plotlyjs()), *(_inline(templates, name) for name in ("charts.js", "scene.js", "page.js"))],
+        data=Markup(msgspec.json.encode(data).decode().replace("</", "<\\/")),
+    )
+    file.write_text(page, encoding="utf-8")
+
+
+def _inline(templates: Environment, name: str) -> Markup:
+    """A file of the templates folder as it is."""
+    assert templates.loader is not None
+    return Markup(templates.loader.get_source(templates, name)[0])
+
+
+def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:
+    record = case.case
+    verdicts = outcome.verdicts[record.case]
+    controls = [verdict for verdict in verdicts if verdict.kind == "control"]
+    conserved = [verdict for verdict in verdicts if verdict.kind == "conservation"]
+    return {
+        "number": number,
+        "anchor": f"case-{number}",
+        "name": record.case,
+        "title": record.run.title,
+        "summary": _first_paragraph(record.readme),
+        "provenance": record.provenance,
+        "variants": [_variant_view(case, variant) for variant in record.run.variants],
+        "ok": all(verdict.ok for verdict in verdicts) and not any(a.case == record.case for a in outcome.not_run),
+        "tables": comparison_tables(verdicts),
+        "conservation": check_table(
+            "Conservation",
+            "Drift over the run, relative to the largest magnitude reached.",
+            conserved,
+            [f"{verdict.comparison.capitalize()}, {verdict.variant_a}" for verdict in conserved],
+        ),
+        "controls": check_table(
+            "Negative controls",
+            "Deliberate faults of the scene. A check that does not notice them proves nothing.",
+            controls,
+            [_control_name(verdict) for verdict in controls],
+        ),
+        "absences": [absence for absence in outcome.absences if absence.case == record.case],
+        "timings": _timings(case),
+    }
+
+
+def _variant_view(case: CaseResults, variant: Any) -> dict[str, Any]:
+    info = case.case.variants[variant.name]
+    return {
+        "name": variant.name,
+        "level": info.level,
+        "engines": ", ".join(variant.engines),
+        "how": "" if variant.transform == "none" else _transformation(variant),
+        "duration": variant.duration_s or case.case.run.duration_s,
+        "note": info.error or variant.note,
+    }
+
+
+def _transformation(variant: Any) -> str:
+    if variant.transform == "segments":
+        return f"{variant.segments} rigid segments per flexible body"
+    return {"rigidify": "flexible bodies made rigid", "modal_points": "beams as points and modes"}[variant.transform]
+
+
+def _timings(case: CaseResults) -> list[dict[str, Any]]:
+    """Compile and solve time of each finest run."""
+    return [
+        {
+            "engine": engine,
+            "variant": variant,
+            "effort": result.finest.effort,
+            "compile_s": result.finest.compile_s,
+            "wall_s": result.finest.wall_s,
+            "evaluations": result.finest.evaluations,
+            "support": result.finest.support,
+        }
+        for (variant, engine, role), result in case.results.items()
+        if role == "main" and result.runs
+    ]
+
+
+def _engines(session: Session) -> list[tuple[str, str]]:
+    """Engines with the versions that ran."""
+    found: dict[str, set[str]] = {}
+    for case in session.cases:
+        for (_, engine, _), result in case.results.items():
+            found.setdefault(engine, set()).update(run.version for run in result.runs)
+    return [(engine, ", ".join(sorted(versions)) or "did not run") for engine, versions in sorted(found.items())]
+
+
+def _control_name(verdict: Verdict) -> str:
+    return f"{verdict.comparison}: {verdict.engine_a} with the fault, {verdict.engine_b} without"
+
+
+def _first_paragraph(readme: str) -> str:
+    """The README's first paragraph of plain text."""
+    paragraphs = [part.strip() for part in readme.split("\n\n")]
+    text = [part for part in paragraphs if part and not part.startswith(("#", "!", "|", "`", "-", "<"))]
+    return " ".join(text[0].split()) if text else ""

@@ -1,0 +1,101 @@
+"""The outcome of a session: its verdicts, what did not run, and the one question whether all is as expected."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+
+from crosscheck.judge import judge
+from crosscheck.results import CaseResults, Session
+from crosscheck.verdict import Verdict
+
+NOT_GREEN = ("did not run", "refused", "failed")
+
+
+@dataclass(frozen=True)
+class Absence:
+    """A result that was asked for and is not there."""
+
+    case: str
+    variant: str
+    engine: str
+    role: str
+    status: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """All verdicts of a session, by case; all absences."""
+
+    verdicts: dict[str, list[Verdict]]
+    absences: list[Absence]
+
+    @property
+    def all(self) -> list[Verdict]:
+        """Every verdict."""
+        return [verdict for group in self.verdicts.values() for verdict in group]
+
+    @property
+    def unexpected(self) -> list[Verdict]:
+        """Verdicts that are not what their case expects."""
+        return [verdict for verdict in self.all if not verdict.ok]
+
+    @property
+    def not_run(self) -> list[Absence]:
+        """What was asked for and did not run at all."""
+        return [absence for absence in self.absences if absence.status == "did not run"]
+
+    @property
+    def ok(self) -> bool:
+        """Every verdict is the expected one, everything asked for ran, and there was something to judge."""
+        return bool(self.all) and not self.unexpected and not self.not_run
+
+    @property
+    def headline(self) -> str:
+        """The session in one sentence."""
+        if not self.all:
+            return "Nothing was compared"
+        if self.ok:
+            return f"All {len(self.all)} verdicts are as expected"
+        parts = []
+        if self.unexpected:
+            parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
+        if self.not_run:
+            runs = "run" if len(self.not_run) == 1 else "runs"
+            parts.append(f"{len(self.not_run)} {runs} asked for did not happen")
+        return " and ".join(parts)
+
+    def counts(self) -> Counter[str]:
+        """Number of verdicts of each status."""
+        return Counter(verdict.status for verdict in self.all)
+
+
+def conclude(session: Session) -> Outcome:
+    """Judge every case of a session."""
+    return Outcome(
+        verdicts={case.case.case: judge(case) for case in session.cases},
+        absences=[absence for case in session.cases for absence in _absences(case)],
+    )
+
+
+def write_verdicts(outcome: Outcome, file: Path) -> None:
+    """verdicts.json: a list with one record a verdict."""
+    records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
+    file.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+
+
+def _absences(case: CaseResults) -> list[Absence]:
+    """Every (variant, engine) of the case, and every control, whose result is missing."""
+    run = case.case.run
+    wanted = [(variant.name, engine, "main") for variant in run.variants for engine in variant.engines]
+    wanted += [(control.a.variant, control.a.engine, f"control:{control.name}") for control in run.controls]
+    found = []
+    for variant, engine, role in wanted:
+        result = case.get(variant, engine, role)
+        if result.status in NOT_GREEN:
+            found.append(Absence(case.case.case, variant, engine, role, result.status, result.message))
+    return found

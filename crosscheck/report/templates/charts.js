@@ -1,0 +1,124 @@
+// Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
+"use strict";
+const COLOURS = { native: "#1b62a5", pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00" };
+const SPARE = ["#7a4fb5", "#0f8b8d", "#a44a3f", "#5b6675", "#b5179e", "#3f6212"];
+const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
+const DASHES = ["solid", "dash", "dot"];
+const PAIRS = ["#44546a", "#c2410c", "#6d28d9", "#0e7490", "#9d174d", "#4d7c0f", "#92400e", "#1e40af"];
+const CONFIG = { displayModeBar: false, responsive: true };
+
+function colour(name) {
+  if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - 4) % SPARE.length];
+  return COLOURS[name];
+}
+
+function decode(series) {
+  if (!series.values) {
+    const bytes = Uint8Array.from(atob(series.data), c => c.charCodeAt(0));
+    series.values = new Float32Array(bytes.buffer);
+  }
+  return series.values;
+}
+
+function column(series, j) {
+  const values = decode(series), out = [];
+  for (let i = j; i < values.length; i += series.k) out.push(values[i]);
+  return out;
+}
+
+function layout(extra) {
+  const axis = { gridcolor: "#e8ecf0", zerolinecolor: "#c9d0d8", linecolor: "#c9d0d8", ticks: "outside", tickcolor: "#c9d0d8" };
+  const base = {
+    margin: { l: 64, r: 12, t: 8, b: 40 }, font: { family: "system-ui, sans-serif", size: 11.5, color: "#1c2430" },
+    paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "x unified", legend: { orientation: "h", y: -0.16, yanchor: "top", font: { size: 11 } },
+  };
+  for (const key of Object.keys(extra)) base[key] = /axis/.test(key) ? { ...axis, ...extra[key] } : extra[key];
+  return base;
+}
+
+// Zero has no logarithm: such samples are left out of a logarithmic curve.
+const positive = values => values.map(v => (v > 0 ? v : null));
+
+function sides(channel, series) {
+  const traces = [], wide = channel.sides.length;
+  channel.sides.forEach((side, i) => channel.components.forEach((component, j) => traces.push({
+    x: column(series[side.times], 0), y: column(series[side.values], j), type: "scatter", mode: "lines",
+    name: side.label, legendgroup: side.label, showlegend: j === 0, hovertemplate: "%{y:.6g}",
+    line: { color: colour(side.engine + (side.label === side.engine ? "" : side.label)), width: 1.4 + 2.2 * (wide - 1 - i), dash: DASHES[j % 3] },
+    opacity: i === wide - 1 ? 1 : 0.55,
+  })));
+  return traces;
+}
+
+function distances(channel, series) {
+  const traces = [];
+  channel.pairs.forEach((pair, i) => {
+    const x = column(series[pair.times], 0), name = pair.a + " – " + pair.b, tone = PAIRS[i % PAIRS.length];
+    const common = { x, type: "scatter", mode: "lines", yaxis: "y2", legendgroup: name };
+    traces.push({ ...common, y: positive(column(series[pair.error], 0)), name: "|" + name + "|", line: { color: tone, width: 1.5 },
+      hovertemplate: "E %{y:.2e}" });
+    traces.push({ ...common, y: positive(column(series[pair.doubt], 0)), name: "U", showlegend: false, hovertemplate: "U %{y:.2e}",
+      line: { color: tone, width: 1, dash: "dot" } });
+  });
+  return traces;
+}
+
+function drawChannel(node, channel, series) {
+  const letters = channel.components.length > 1 ? " (" + channel.components.map((c, j) => c + " " + DASHES[j % 3]).join(", ") + ")" : "";
+  Plotly.react(node, [...sides(channel, series), ...distances(channel, series)], layout({
+    xaxis: { title: { text: "time, s", standoff: 4 }, anchor: "y2" },
+    yaxis: { domain: [0.46, 1], title: { text: channel.unit + letters, font: { size: 10.5 } }, exponentformat: "power" },
+    yaxis2: { domain: [0, 0.38], type: "log", title: { text: "E, and U dotted" + (channel.unit ? ", " + channel.unit : ""), font: { size: 10.5 } },
+      exponentformat: "power", nticks: 5 },
+  }), CONFIG);
+}
+
+function drawDrift(node, drift, series) {
+  const traces = drift.curves.map(curve => ({
+    x: column(series[curve.times], 0), y: positive(column(series[curve.values], 0)), type: "scatter", mode: "lines", name: curve.engine,
+    line: { color: colour(curve.engine), width: 1.6 }, hovertemplate: "%{y:.2e}",
+  }));
+  Plotly.react(node, traces, layout({
+    xaxis: { title: { text: "time, s", standoff: 4 } }, yaxis: { type: "log", exponentformat: "power", title: { text: "relative drift" } },
+    shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: drift.limit, y1: drift.limit, line: { color: "#b3261e", width: 1, dash: "dash" } }],
+    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(drift.limit), yanchor: "bottom", showarrow: false, text: "limit", font: { color: "#b3261e", size: 10.5 } }],
+    legend: { orientation: "h", y: -0.24, yanchor: "top" },
+  }), CONFIG);
+}
+
+function drawWork(node, work) {
+  const variants = [...new Set(work.points.map(p => p.variant))], groups = new Map();
+  const errors = work.points.filter(p => p.error > 0).map(p => p.error);
+  const margin = 10 ** (Math.ceil(Math.log10(Math.max(...errors, 1e-16))) + 0.6);
+  for (const point of work.points) {
+    const key = [point.engine, point.variant, point.method].join(" · ");
+    groups.set(key, [...(groups.get(key) || []), point]);
+  }
+  const low = Math.floor(Math.log10(Math.min(...errors, work.doubt))) - 0.7;
+  const text = p => `${p.effort}<br>${p.evaluations || "?"} evaluations<br>${p.message || ""}`;
+  const traces = [];
+  for (const [key, points] of groups) {
+    const good = points.filter(p => p.error > 0), bad = points.filter(p => !(p.error > 0));
+    const marker = { color: colour(points[0].engine), symbol: SYMBOLS[variants.indexOf(points[0].variant) % SYMBOLS.length], size: 8 };
+    traces.push({ x: good.map(p => p.wall_s), y: good.map(p => p.error), text: good.map(text), name: key, legendgroup: key, type: "scatter",
+      mode: "lines+markers", line: { color: marker.color, width: 1 }, marker, hovertemplate: "%{x:.3g} s, error %{y:.2e}<br>%{text}<extra>" + key + "</extra>" });
+    if (bad.length) traces.push({ x: bad.map(p => p.wall_s), y: bad.map(() => margin), text: bad.map(text), name: key + " failed", legendgroup: key,
+      showlegend: !good.length, type: "scatter", mode: "markers", marker: { ...marker, symbol: "x", size: 9 },
+      hovertemplate: "failed after %{x:.3g} s<br>%{text}<extra>" + key + "</extra>" });
+  }
+  const front = work.points.filter(p => p.best && p.error > 0);
+  traces.unshift({ x: front.map(p => p.wall_s), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
+    line: { color: "#c3cad3", width: 7, shape: "hv" }, hoverinfo: "skip" });
+  Plotly.react(node, traces, layout({
+    hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
+    xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)" }, exponentformat: "power" },
+    yaxis: { type: "log", title: { text: "error of " + work.observable + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
+      range: [low, Math.log10(margin) + 0.4] },
+    shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: "#eef1f4", line: { width: 0 }, layer: "below" }],
+    annotations: [
+      { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: "#5b6675" },
+        text: "below the reference's own uncertainty (" + work.reference + ")" },
+      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: "#5b6675" }, text: "× at the top: failed runs" }],
+    legend: { orientation: "v", x: 1.01, y: 1, font: { size: 11 } },
+  }), CONFIG);
+}

@@ -1,0 +1,167 @@
+"""What the report's tables show: verdicts arranged by comparison, kind of channel and pair of engines."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+
+from crosscheck.channels import family
+from crosscheck.report.summary import pair
+from crosscheck.verdict import Verdict
+
+SYMBOLS = {"agree": "✓", "differ": "≠", "unresolved": "?", "refused": "⊘", "failed": "✕", "did not run": "–"}
+GRAVITY = ("did not run", "failed", "refused", "differ", "unresolved", "agree")
+FAMILIES = {
+    "marker.position": "Marker positions",
+    "marker.orientation": "Marker orientations",
+    "marker.velocity": "Marker velocities",
+    "marker.angular_velocity": "Angular velocities",
+    "energy": "Energy",
+    "momentum.linear": "Linear momentum",
+    "momentum.angular": "Angular momentum",
+    "load.torque": "Hinge torques",
+    "load.force": "Hinge forces",
+    "wheel_load.torque": "Wheel bearing torques",
+    "wheel_load.force": "Wheel bearing forces",
+    "drive": "Drive loads",
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One cell: a status with its look ("good", "expected", "bad"), a short text, and the reasons behind it."""
+
+    status: str
+    look: str
+    text: str
+    numbers: str
+    reasons: tuple[str, ...]
+
+    @property
+    def symbol(self) -> str:
+        """A sign that does not rely on colour."""
+        return SYMBOLS.get(self.status, "")
+
+
+EMPTY = Cell("", "empty", "", "", ())
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of cells, one a column of its table, with rows beneath it that it summarises."""
+
+    label: str
+    cells: tuple[Cell, ...]
+    rows: tuple[Row, ...] = ()
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table of verdicts."""
+
+    title: str
+    note: str
+    columns: tuple[str, ...]
+    rows: tuple[Row, ...]
+
+
+def overview(verdicts: dict[str, list[Verdict]]) -> Table:
+    """Cases and their comparisons against pairs of engines, controls and conservation."""
+    everything = [verdict for group in verdicts.values() for verdict in group]
+    columns = list(dict.fromkeys(_column(verdict) for verdict in everything))
+    columns.sort(key=lambda column: column in ("Conservation", "Negative controls"))
+    rows = []
+    for case, group in verdicts.items():
+        comparisons = [verdict for verdict in group if verdict.kind == "comparison"]
+        names = dict.fromkeys(verdict.comparison for verdict in comparisons)
+        below = tuple(
+            Row(name, _cells(columns, [each for each in comparisons if each.comparison == name], _column))
+            for name in names
+        )
+        rows.append(Row(case, _cells(columns, group, _column), below))
+    return Table("Verdicts", "", tuple(columns), tuple(rows))
+
+
+def comparison_tables(verdicts: Iterable[Verdict]) -> list[Table]:
+    """A table for each comparison: kinds of channels, with their channels beneath, against pairs."""
+    groups: dict[str, list[Verdict]] = {}
+    for verdict in verdicts:
+        if verdict.kind == "comparison":
+            groups.setdefault(verdict.comparison, []).append(verdict)
+    return [_comparison_table(name, group) for name, group in groups.items()]
+
+
+def check_table(title: str, note: str, verdicts: list[Verdict], names: list[str]) -> Table | None:
+    """Controls or conservation checks: `names[i]` is the row of verdict i, the columns are who was checked."""
+    if not verdicts:
+        return None
+    columns = list(dict.fromkeys(_checked(verdict) for verdict in verdicts))
+    rows = []
+    for name in dict.fromkeys(names):
+        group = [verdict for verdict, each in zip(verdicts, names, strict=True) if each == name]
+        rows.append(Row(name, _cells(columns, group, _checked)))
+    return Table(title, note, tuple(columns), tuple(rows))
+
+
+def _comparison_table(name: str, group: list[Verdict]) -> Table:
+    columns = list(dict.fromkeys(pair(verdict) for verdict in group))
+    kinds = dict.fromkeys(_kind(verdict.channel) for verdict in group)
+    rows = []
+    for kind in kinds:
+        inside = [verdict for verdict in group if _kind(verdict.channel) == kind]
+        channels = dict.fromkeys(verdict.channel for verdict in inside)
+        below = tuple(
+            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], pair))
+            for channel in channels
+        )
+        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, pair), below))
+    expected = group[0].expected
+    note = "" if expected == "agree" else f"Expected here: {expected}, because {group[0].expected_reason}"
+    return Table(name, note, tuple(columns), tuple(rows))
+
+
+def _cells(columns: Iterable[str], group: list[Verdict], column: Callable[[Verdict], str]) -> tuple[Cell, ...]:
+    return tuple(_cell([verdict for verdict in group if column(verdict) == name]) for name in columns)
+
+
+def _cell(group: list[Verdict]) -> Cell:
+    """Summary of some verdicts: the gravest unexpected one counts, else the gravest."""
+    if not group:
+        return EMPTY
+    bad = [verdict for verdict in group if not verdict.ok]
+    worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
+    good = worst.status == "agree" or worst.kind == "control"
+    look = "bad" if bad else "good" if good else "expected"
+    text = "noticed" if worst.kind == "control" and worst.ok else worst.status
+    if len(group) > 1:
+        text += f" {len(bad)}/{len(group)}" if bad else f" {len(group)}"
+    if worst.expected != "agree" and worst.kind != "control":
+        text += " (expected)" if worst.ok else f" (expected {worst.expected})"
+    shown = bad or [verdict for verdict in group if verdict.status == worst.status]
+    reasons = tuple(f"{verdict.channel}, {pair(verdict)}: {verdict.reason}" for verdict in shown[:12])
+    return Cell(worst.status, look, text, _numbers(worst), reasons)
+
+
+def _numbers(verdict: Verdict) -> str:
+    if verdict.E is None:
+        return ""
+    if verdict.kind == "conservation":
+        return f"drift {verdict.E:.1e} of ≤ {verdict.goal:.0e}"
+    doubt = "unknown" if verdict.U is None else f"{verdict.U:.1e}"
+    return f"E {verdict.E:.1e}  U {doubt}"
+
+
+def _kind(channel: str) -> str:
+    return FAMILIES.get(family(channel), channel)
+
+
+def _column(verdict: Verdict) -> str:
+    if verdict.kind == "conservation":
+        return "Conservation"
+    if verdict.kind == "control":
+        return "Negative controls"
+    return f"{verdict.engine_a} – {verdict.engine_b}"
+
+
+def _checked(verdict: Verdict) -> str:
+    return verdict.engine_a if verdict.kind == "conservation" else verdict.channel
