@@ -1,7 +1,7 @@
 """Second-order jets: the value of an array and its first and second time derivative along a motion.
 
 Products follow Leibniz, functions the chain rule; rotations are matrix-valued jets, from which angular velocity and
-acceleration are read. Arrays may carry leading axes (many points at once).
+acceleration are read. Leading axes are shared: (B, K, ...), K points along B motions that start from one configuration.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from math import factorial
+from types import EllipsisType
 
 import numpy as np
 from numpy.polynomial import Polynomial
@@ -23,7 +24,7 @@ VERSINE = Polynomial([(-1.0) ** k / factorial(2 * k + 2) for k in range(24)])
 
 @dataclass(frozen=True)
 class Jet:
-    """x, dx/dt, d2x/dt2; equal shapes."""
+    """x, dx/dt, d2x/dt2; their shapes broadcast."""
 
     value: Array
     rate: Array
@@ -38,7 +39,7 @@ class Jet:
     def __matmul__(self, other: Jet) -> Jet:
         return product(np.matmul, self, other)
 
-    def __getitem__(self, key: int | None) -> Jet:
+    def __getitem__(self, key: tuple[slice | EllipsisType | None | int, ...] | int) -> Jet:
         return self.map(lambda x: x[key])
 
     def map(self, linear: Callable[[Array], Array]) -> Jet:
@@ -52,7 +53,7 @@ class Jet:
 
 @dataclass(frozen=True)
 class Frame:
-    """A frame that moves: origin (...,3) and rotation (...,3,3), in the axes of the frame it is seen from."""
+    """Frames that move: origins (B,K,3) and rotations (B,K,3,3), in the axes of the frame they are seen from."""
 
     position: Jet
     rotation: Jet
@@ -65,6 +66,11 @@ class Frame:
         """The frame this one is seen from, seen from this one."""
         back = self.rotation.transpose
         return Frame(-turn(back, self.position), back)
+
+    @property
+    def first(self) -> Frame:
+        """Along the first of B motions."""
+        return Frame(self.position[0], self.rotation[0])
 
     def angular_velocity(self) -> Array:
         """w (...,3) with dR/dt = w~ R."""
@@ -81,10 +87,13 @@ def constant(value: ArrayLike) -> Jet:
     return Jet(array, np.zeros_like(array), np.zeros_like(array))
 
 
-def stack(jets: list[Jet]) -> Jet:
-    """Jets of shapes (n, ...) one after the other."""
-    parts = ([jet.value for jet in jets], [jet.rate for jet in jets], [jet.acceleration for jet in jets])
-    return Jet(*map(np.concatenate, parts))
+def join(jets: list[Jet], motions: int) -> Jet:
+    """Jets of the points of several bodies, (1 or B, K, ...), as one along K."""
+
+    def along(parts: list[Array]) -> Array:
+        return np.concatenate([np.broadcast_to(x, (motions, *x.shape[1:])) for x in parts], axis=1)
+
+    return Jet(along([j.value for j in jets]), along([j.rate for j in jets]), along([j.acceleration for j in jets]))
 
 
 def product(operation: Callable[[Array, Array], Array], a: Jet, b: Jet) -> Jet:

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.dense.jets import Frame, Jet, constant, product, rotation_about, rotation_exponential, skew, stack, turn
+from flexmb.dense.jets import Frame, Jet, constant, join, product, rotation_about, rotation_exponential, skew, turn
 from flexmb.dense.tree import Member, Rotor, Seat, Tree
 from flexmb.scene import schema as s
 
@@ -16,11 +16,26 @@ AXES = dict(zip("xyz", np.eye(3), strict=True))
 
 
 class Motion(NamedTuple):
-    """Coordinates q (nq,), speeds u (nu,), and rates of the speeds (nu,)."""
+    """B motions from one configuration: coordinates q (nq,), speeds u (B,nu), rates of the speeds (B,nu)."""
 
     q: Array
     u: Array
     rates: Array
+
+    def hinge(self, member: Member) -> Jet:
+        """Coordinates of a hinge whose speeds are their rates, (B,1,n)."""
+        return self._part(member.q_hinge, member.u_hinge)
+
+    def modes(self, member: Member) -> Jet:
+        """eta, (B,1,m)."""
+        return self._part(member.q_modes, member.u_modes)
+
+    def spin(self, rotor: Rotor) -> Jet:
+        """Angle of a wheel, (B,1)."""
+        return self._part(slice(rotor.q, rotor.q + 1), slice(rotor.u, rotor.u + 1))[..., 0]
+
+    def _part(self, q: slice, u: slice) -> Jet:
+        return Jet(self.q[None, None, q], self.u[:, None, u], self.rates[:, None, u])
 
 
 class Points(NamedTuple):
@@ -48,103 +63,96 @@ def member_frames(tree: Tree, motion: Motion) -> list[Frame]:
     for member in tree.members:
         inboard = seat_frame(tree, frames, member.parent, member.inboard, motion)
         outboard = inboard.carry(hinge_frame(member, motion))
-        frames.append(outboard.carry(_on_body(member.outboard, _eta(member, motion)).inverse()))
+        frames.append(outboard.carry(_on_body(member.outboard, motion.modes(member)).inverse()))
     return frames
-
-
-def hinge_point(tree: Tree, frames: list[Frame], k: int, motion: Motion) -> Frame:
-    """Outboard hinge frame of member k in World."""
-    return seat_frame(tree, frames, k, tree.members[k].outboard, motion)
 
 
 def seat_frame(tree: Tree, frames: list[Frame], k: int, seat: Seat, motion: Motion) -> Frame:
     """A seat on member k (-1: ground) in World."""
     if k < 0:
-        return _on_body(seat, constant(np.zeros(0)))
-    return frames[k].carry(_on_body(seat, _eta(tree.members[k], motion)))
+        return _on_body(seat, constant(np.zeros((1, 1, 0))))
+    return frames[k].carry(_on_body(seat, motion.modes(tree.members[k])))
 
 
 def point_frames(tree: Tree, frames: list[Frame], motion: Motion) -> Frame:
     """Mass centres and axes of all inertia points in World, in the order of `points`."""
     found = [frame.carry(_field(member, motion)) for frame, member in zip(frames, tree.members, strict=True)]
     for rotor in tree.rotors:
-        wheel = seat_frame(tree, frames, rotor.member, rotor.seat, motion).carry(_spin(rotor, motion))
-        found.append(Frame(wheel.position[None], wheel.rotation[None]))
-    return Frame(stack([f.position for f in found]), stack([f.rotation for f in found]))
+        spin = _rotated((rotor.wheel.axis, motion.spin(rotor)))
+        found.append(seat_frame(tree, frames, rotor.member, rotor.seat, motion).carry(spin))
+    count = len(motion.u)
+    return Frame(join([f.position for f in found], count), join([f.rotation for f in found], count))
 
 
 def hinge_frame(member: Member, motion: Motion) -> Frame:
     """Outboard hinge frame seen from the inboard one."""
-    q, u, rates = motion.q[member.q_hinge], motion.u[member.u_hinge], motion.rates[member.u_hinge]
-    match member.hinge:
-        case s.Spherical():
-            return Frame(constant(np.zeros(3)), _attitude(q, u, rates))
-        case s.Free():
-            rotation = _attitude(q[3:], u[:3], rates[:3])
-            R, v = rotation.value, u[3:]
-            return Frame(Jet(q[:3], R @ v, R @ (np.cross(u[:3], v) + rates[3:])), rotation)
-    c = Jet(q, u, rates)
+    c = motion.hinge(member)
     match member.hinge:
         case s.Revolute(axis=axis):
-            return _rotated((axis, c[0]))
+            return _rotated((axis, c[..., 0]))
         case s.Prismatic(axis=axis):
-            return _moved((axis, c[0]))
+            return _moved((axis, c[..., 0]))
         case s.Cylindrical(axis=axis):
-            return _moved((axis, c[1])).carry(_rotated((axis, c[0])))
+            return _moved((axis, c[..., 1])).carry(_rotated((axis, c[..., 0])))
         case s.Universal():
-            return _rotated((AXES["x"], c[0]), (AXES["y"], c[1]))
+            return _rotated((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1]))
         case s.Gimbal(sequence=sequence):
-            return _rotated(*((AXES[axis], c[n]) for n, axis in enumerate(sequence)))
+            return _rotated(*((AXES[axis], c[..., n]) for n, axis in enumerate(sequence)))
         case s.Planar():
-            return _moved((AXES["x"], c[0]), (AXES["y"], c[1])).carry(_rotated((AXES["z"], c[2])))
+            return _moved((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1])).carry(_rotated((AXES["z"], c[..., 2])))
         case s.PointMass(directions=directions):
-            return _moved(*((direction, c[n]) for n, direction in enumerate(directions)))
+            return _moved(*((direction, c[..., n]) for n, direction in enumerate(directions)))
+        case s.Spherical():
+            return Frame(_moved().position, _attitude(c.value, c.rate, c.acceleration))
+        case s.Free():
+            return _floating(c)
     return _rotated()
 
 
 def _rotated(*turns: tuple[ArrayLike, Jet]) -> Frame:
     """Successive rotations about carried axes."""
-    rotation = constant(np.eye(3))
+    rotation = constant(np.eye(3)[None, None])
     for axis, angle in turns:
         rotation = rotation @ rotation_about(axis, angle)
-    return Frame(constant(np.zeros(3)), rotation)
+    return Frame(constant(np.zeros((1, 1, 3))), rotation)
 
 
 def _moved(*steps: tuple[ArrayLike, Jet]) -> Frame:
     """A sum of translations along fixed axes."""
-    position = constant(np.zeros(3))
+    position = constant(np.zeros((1, 1, 3)))
     for axis, distance in steps:
-        position = position + product(np.multiply, constant(axis), distance)
-    return Frame(position, constant(np.eye(3)))
+        position = position + product(np.multiply, constant(axis), distance[..., None])
+    return Frame(position, constant(np.eye(3)[None, None]))
+
+
+def _floating(c: Jet) -> Frame:
+    """q = [p; quaternion], u = [w; v] in turning axes: p' = R v, p'' = R (w x v + dv/dt)."""
+    w, v = c.rate[..., :3], c.rate[..., 3:]
+    rotation = _attitude(c.value[..., 3:], w, c.acceleration[..., :3])
+    back = np.swapaxes(rotation.value, -1, -2)
+    position = Jet(c.value[..., :3], v @ back[0], (np.cross(w, v) + c.acceleration[..., 3:]) @ back[0])
+    return Frame(position, rotation)
 
 
 def _attitude(quaternion: Array, w: Array, w_rate: Array) -> Jet:
     """R of a scalar-first quaternion with angular velocity w in turning axes: R' = R w~, R'' = R (w~ w~ + dw/dt~)."""
-    q0, qv = quaternion[0], quaternion[1:]
-    R = ((q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)) / (quaternion @ quaternion)
+    q0, qv = quaternion[0, 0, 0], quaternion[0, 0, 1:]
+    R = (q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)
+    R = R[None, None] / np.sum(quaternion**2)
     return Jet(R, R @ skew(w), R @ (skew(w) @ skew(w) + skew(w_rate)))
-
-
-def _spin(rotor: Rotor, motion: Motion) -> Frame:
-    angle = Jet(*(np.array(x) for x in (motion.q[rotor.q], motion.u[rotor.u], motion.rates[rotor.u])))
-    return _rotated((rotor.wheel.axis, angle))
-
-
-def _eta(member: Member, motion: Motion) -> Jet:
-    return Jet(motion.q[member.q_modes], motion.u[member.u_modes], motion.rates[member.u_modes])
 
 
 def _on_body(seat: Seat, eta: Jet) -> Frame:
     """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset."""
     node = seat.node
-    moved = constant(node.position) + eta.map(lambda x: node.translation @ x)
-    turned = rotation_exponential(eta.map(lambda x: node.rotation_modes @ x)) @ constant(node.rotation)
+    moved = constant(node.position) + eta.map(lambda x: x @ node.translation.T)
+    turned = rotation_exponential(eta.map(lambda x: x @ node.rotation_modes.T)) @ constant(node.rotation)
     return Frame(moved, turned).carry(Frame(constant(seat.offset), constant(seat.rotation)))
 
 
 def _field(member: Member, motion: Motion) -> Frame:
     """Mass centres and axes of a member's inertia points seen from its body."""
-    model, eta = member.model, _eta(member, motion)
-    rotation = rotation_exponential(eta.map(lambda x: model.rotation @ x))
-    point = constant(model.position) + eta.map(lambda x: model.translation @ x)
+    model, eta = member.model, motion.modes(member)[:, 0]
+    rotation = rotation_exponential(eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x)))
+    point = constant(model.position) + eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
     return Frame(point + turn(rotation, constant(model.com_offset)), rotation)

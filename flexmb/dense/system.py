@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.dense.jets import Frame
-from flexmb.dense.kinematics import Motion, Points, hinge_point, member_frames, point_frames, points, seat_frame
+from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames, points, seat_frame
 from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Scalar, Tree, build
+from flexmb.dense.tree import Scalar, Seat, Tree, build
 from flexmb.scene import schema as s
 
 Array = NDArray[np.float64]
@@ -42,6 +42,24 @@ class Wrenches(NamedTuple):
         force = self.force[chosen]
         torque = self.torque[chosen] + np.cross(self.position[chosen] - origin, force)
         return np.concatenate([torque.sum(axis=0), force.sum(axis=0)])
+
+
+class Snapshot:
+    """One motion at one instant: q (nq,), u (nu,), rates of the speeds (nu,)."""
+
+    def __init__(self, tree: Tree, q: Array, u: Array, rates: Array) -> None:
+        self._tree, self._motion = tree, Motion(q, u[None], rates[None])
+        self._frames = member_frames(tree, self._motion)
+
+    @property
+    def points(self) -> Frame:
+        """Mass centres and axes of all inertia points, (P, ...)."""
+        return point_frames(self._tree, self._frames, self._motion).first
+
+    def seat(self, k: int, seat: Seat) -> Frame:
+        """One frame on member k."""
+        found = seat_frame(self._tree, self._frames, k, seat, self._motion).first
+        return Frame(found.position[0], found.rotation[0])
 
 
 class SiteMotion(NamedTuple):
@@ -69,8 +87,7 @@ class DenseSystem:
 
     def mass_matrix(self, q: Array) -> Array:
         """M (nu,nu) = sum over points m v'v + w' J w."""
-        frames = self._frames(Motion(self._undeformed(q), np.zeros(self.nu), np.zeros(self.nu)))
-        J, I = self._jacobian(q), self._inertia(frames)
+        J, I = self._jacobian(q), self._inertia(self._at(q).points)
         return np.einsum("p,pai,paj->ij", self.points.mass, J.linear, J.linear) + np.einsum(
             "pai,pab,pbj->ij", J.angular, I, J.angular
         )
@@ -136,13 +153,12 @@ class DenseSystem:
         Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes.
         """
         q, u = self.on_profile(q, u, t)
-        motion = self._seen(q, u, rates)
-        frames = member_frames(self.tree, motion)
-        inertial, loads = self._inertial(motion), self._loads(q, t)
+        now = self._seen(q, u, rates)
+        inertial, loads = self._inertial(now), self._loads(q, t)
         found = {}
         for k, member in enumerate(self.tree.members):
             outboard = self._outboard(k)
-            origin = hinge_point(self.tree, frames, k, motion).position.value
+            origin = now.seat(k, member.outboard).position.value
             total = inertial.about(origin, np.isin(self.points.member, outboard))
             for load in self.scene.loads:
                 if self.tree.index(load.body) in outboard:
@@ -163,12 +179,10 @@ class DenseSystem:
     def markers(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, SiteMotion]:
         """Motion of all markers, with the true deformation at every level."""
         q, u = self.on_profile(q, u, t)
-        motion = Motion(q, u, rates)
-        frames = member_frames(self.tree, motion)
+        now = Snapshot(self.tree, q, u, rates)
         found = {}
         for marker in self.scene.markers:
-            k, seat = self.tree.sites[f"marker:{marker.name}"]
-            f = seat_frame(self.tree, frames, k, seat, motion)
+            f = now.seat(*self.tree.sites[f"marker:{marker.name}"])
             velocity = np.concatenate([f.angular_velocity(), f.position.rate])
             acceleration = np.concatenate([f.angular_acceleration(), f.position.acceleration])
             found[marker.name] = SiteMotion(f.position.value, f.rotation.value, velocity, acceleration)
@@ -176,7 +190,7 @@ class DenseSystem:
 
     def energy(self, q: Array, u: Array) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
-        frames = self._frames(Motion(self._undeformed(q), u, np.zeros(self.nu)))
+        frames = self._at(q, u).points
         w, v = frames.angular_velocity(), frames.position.rate
         mass, inertia = self.points.mass, self._inertia(frames)
         spring = sum(0.5 * x.stiffness * (q[x.q] - x.rest) ** 2 for x in self.tree.scalars)
@@ -196,7 +210,7 @@ class DenseSystem:
 
     def momentum(self, q: Array, u: Array) -> Array:
         """(6,) [angular about the World origin; linear]."""
-        frames = self._frames(Motion(self._undeformed(q), u, np.zeros(self.nu)))
+        frames = self._at(q, u).points
         spin = np.einsum("pab,pb->pa", self._inertia(frames), frames.angular_velocity())
         linear = self.points.mass[:, None] * frames.position.rate
         everything = np.ones(len(linear), dtype=bool)
@@ -214,42 +228,41 @@ class DenseSystem:
                 q[member.q_modes] = 0.0
         return q
 
-    def _seen(self, q: Array, u: Array, rates: Array) -> Motion:
-        """The motion as inertia sees it: eta = etadot = 0 for ruthless bodies."""
+    def _seen(self, q: Array, u: Array, rates: Array) -> Snapshot:
+        """As inertia sees the motion: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
             if member.ruthless:
                 u[member.u_modes] = 0.0
-        return Motion(self._undeformed(q), u, rates)
+        return Snapshot(self.tree, self._undeformed(q), u, rates)
 
-    def _frames(self, motion: Motion) -> Frame:
-        return point_frames(self.tree, member_frames(self.tree, motion), motion)
+    def _at(self, q: Array, u: Array | None = None) -> Snapshot:
+        """Configuration and velocities: eta = 0 for ruthless bodies, at rest without u."""
+        zero = np.zeros(self.nu)
+        return Snapshot(self.tree, self._undeformed(q), zero if u is None else u, zero)
 
     def _inertia(self, frames: Frame) -> Array:
         """(P,3,3) in World axes."""
         R = frames.rotation.value
         return R @ self.points.inertia @ np.swapaxes(R, -1, -2)
 
-    def _unit_motions(self, q: Array) -> list[Motion]:
-        zero = np.zeros(self.nu)
-        return [Motion(self._undeformed(q), unit, zero) for unit in np.eye(self.nu)]
+    def _unit_motions(self, q: Array) -> Motion:
+        return Motion(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
 
     def _jacobian(self, q: Array) -> Jacobian:
-        """Column j is the points' velocity for u = e_j."""
-        columns = [self._frames(motion) for motion in self._unit_motions(q)]
-        return _columns(columns)
+        """Of all inertia points."""
+        motion = self._unit_motions(q)
+        return _columns(point_frames(self.tree, member_frames(self.tree, motion), motion))
 
     def _site_jacobian(self, name: str, q: Array) -> Jacobian:
-        k, seat = self.tree.sites[name]
-        columns = [
-            seat_frame(self.tree, member_frames(self.tree, motion), k, seat, motion)
-            for motion in self._unit_motions(q)
-        ]
-        return _columns([Frame(f.position[None], f.rotation[None]) for f in columns])
+        """Of one load's node."""
+        motion = self._unit_motions(q)
+        frames = member_frames(self.tree, motion)
+        return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
-    def _inertial(self, motion: Motion) -> Wrenches:
+    def _inertial(self, now: Snapshot) -> Wrenches:
         """What each point needs to move so, beyond gravity: m (a - g), J alpha + w x J w."""
-        frames = self._frames(motion)
+        frames = now.points
         J, w, alpha = self._inertia(frames), frames.angular_velocity(), frames.angular_acceleration()
         torque = np.einsum("pab,pb->pa", J, alpha) + np.cross(w, np.einsum("pab,pb->pa", J, w))
         force = self.points.mass[:, None] * (frames.position.acceleration - self._gravity)
@@ -257,11 +270,10 @@ class DenseSystem:
 
     def _loads(self, q: Array, t: float) -> dict[str, Wrenches]:
         """Loads at nodes by name, one point each."""
-        motion = Motion(self._undeformed(q), np.zeros(self.nu), np.zeros(self.nu))
-        frames = member_frames(self.tree, motion)
+        now = self._at(q)
         found = {}
         for load in self.scene.loads:
-            site = seat_frame(self.tree, frames, *self.tree.sites[f"load:{load.name}"], motion)
+            site = now.seat(*self.tree.sites[f"load:{load.name}"])
             direction = np.array(load.direction)
             if load.frame == "node":
                 direction = site.rotation.value @ direction
@@ -284,7 +296,7 @@ def rotation_vector(quaternion: Array) -> Array:
     return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
 
 
-def _columns(frames: list[Frame]) -> Jacobian:
-    return Jacobian(
-        np.stack([f.angular_velocity() for f in frames], axis=-1), np.stack([f.position.rate for f in frames], axis=-1)
-    )
+def _columns(frames: Frame) -> Jacobian:
+    """Column j is the velocity of the K frames for u = e_j."""
+    rates = np.broadcast_to(frames.position.rate, frames.angular_velocity().shape)
+    return Jacobian(np.moveaxis(frames.angular_velocity(), 0, -1), np.moveaxis(rates, 0, -1))

@@ -1,0 +1,292 @@
+"""Random scenes: trees with every hinge kind, rigid and flexible bodies, wheels, point masses, springs and loads.
+
+Same seed, same scene. Initial values are random too, so that the scene's own initial state is a random state in every
+code.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.random import Generator
+from scipy.spatial.transform import Rotation
+
+from flexmb.scene import schema as s
+from flexmb.scene.build import SceneBuilder, angular, linear
+from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.shapes import beam_section
+
+KINDS = (
+    "revolute", "spherical", "prismatic", "universal", "free", "cylindrical", "gimbal", "planar", "weld", "gimbal2",
+)  # fmt: skip
+CARRIERS = ("rigid", "modal", "beam", "floating")
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """What a random scene contains.
+
+    `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam".
+    `conservative` leaves out dampers, motors, loads and prescribed motion. `hinges`: kinds drawn in turn.
+    """
+
+    bodies: int = 10
+    carriers: tuple[str, ...] = CARRIERS
+    levels: tuple[s.Level, ...] = ("full",)
+    hinges: tuple[str, ...] = KINDS
+    branching: bool = True
+    grounded: bool = True
+    conservative: bool = False
+    prescribed: bool = True
+    wheels: int = 2
+    point_masses: int = 2
+    beam_points: tuple[str, ...] = ("section", "rotary", "line")
+    deformation: float = 0.1
+
+
+RIGID = Recipe(carriers=("rigid",))
+FULL = Recipe()
+RUTHLESS = Recipe(levels=("ruthless",))
+MIXED = Recipe(levels=("full", "ruthless", "rigid"))
+CONSERVATIVE = Recipe(conservative=True, prescribed=False)
+FREE_FLYING = replace(CONSERVATIVE, grounded=False)
+
+
+def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
+    """A checked scene of `recipe`; bodies "b0", "b1" ..., their hinges "h0" ..., markers "m0" ... at random nodes."""
+    rng = np.random.default_rng(seed)
+    gravity = vector(rng, 5.0) if recipe.grounded else np.zeros(3)
+    scene = SceneBuilder(f"random tree {seed}", gravity=gravity)
+    kinds = list(rng.permutation(recipe.hinges))
+    carriers = list(rng.permutation(recipe.carriers))
+    nodes: list[list[str]] = []
+    for k in range(recipe.bodies):
+        carrier = carriers[k % len(carriers)]
+        level = recipe.levels[k % len(recipe.levels)]
+        nodes.append(_body(scene, rng, f"b{k}", carrier, level, recipe))
+        parent = int(rng.integers(-1 if recipe.grounded else 0, k)) if k > 1 and recipe.branching else k - 1
+        kind = "free" if k == 0 and not recipe.grounded else kinds[k % len(kinds)]
+        at = {} if parent < 0 else {"parent_node": str(rng.choice(nodes[parent]))}
+        child_node = str(rng.choice(nodes[k]))
+        place = _placement(rng) | at | {"child_node": child_node}
+        _hinge(scene, rng, kind, f"h{k}", "ground" if parent < 0 else f"b{parent}", f"b{k}", place, recipe)
+        scene.marker(f"m{k}", f"b{k}", node=str(rng.choice(nodes[k])), offset=vector(rng, 0.2))
+    _wheels(scene, rng, nodes, recipe)
+    _point_masses(scene, rng, nodes, recipe)
+    if not recipe.conservative:
+        _loads(scene, rng, nodes)
+    return scene.scene()
+
+
+def vector(rng: Generator, size: float) -> np.ndarray:
+    """Uniform in a cube of half edge `size`."""
+    return rng.uniform(-size, size, 3)
+
+
+def direction(rng: Generator) -> np.ndarray:
+    """A random unit vector."""
+    x = rng.normal(size=3)
+    return x / np.linalg.norm(x)
+
+
+def quaternion(rng: Generator) -> np.ndarray:
+    """A random unit quaternion, scalar first."""
+    return Rotation.random(random_state=rng).as_quat(scalar_first=True, canonical=True)
+
+
+def inertia(rng: Generator, mass: float, size: float) -> np.ndarray:
+    """Tensor (3,3) of a homogeneous cuboid of random edges and attitude: it fulfils the triangle inequality."""
+    x, y, z = rng.uniform(0.3 * size, size, 3) ** 2
+    R = Rotation.random(random_state=rng).as_matrix()
+    tensor = R @ np.diag([y + z, x + z, x + y]) @ R.T * mass / 12.0
+    return 0.5 * (tensor + tensor.T)
+
+
+def _body(
+    scene: SceneBuilder, rng: Generator, name: str, carrier: str, level: s.Level, recipe: Recipe
+) -> list[str]:
+    """Append a body; returns the nodes that hinges may use."""
+    if carrier == "rigid":
+        mass = rng.uniform(0.5, 2.0)
+        corner = s.Node(name="corner", position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)))
+        scene.rigid_body(name, mass=mass, com=vector(rng, 0.2), inertia=inertia(rng, mass, 0.6), nodes=[corner])
+        return ["origin", "corner"]
+    if carrier == "beam":
+        modes = _beam(scene, rng, name, level, recipe)
+        nodes = ["root", "tip", "middle"]
+    else:
+        modes = 3
+        _modal(scene, rng, name, level, modes, floating=carrier == "floating")
+        nodes = ["a", "b"] if carrier == "floating" else ["origin", "a", "b"]
+    if level != "rigid":
+        size = recipe.deformation if carrier != "beam" else 0.3 * recipe.deformation
+        scene.modal_state(name, coordinates=rng.uniform(-size, size, modes), rates=rng.uniform(-size, size, modes))
+    return nodes
+
+
+def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe: Recipe) -> int:
+    length = rng.uniform(0.8, 1.5)
+    root = beam_section(E=2e9, G=8e8, A=9e-4, Iy=8e-8, Iz=5e-8, rho=1500.0)
+    tip = beam_section(E=2e9, G=8e8, A=6e-4, Iy=5e-8, Iz=3e-8, rho=1500.0, x=length)
+    lump = s.TipMass(
+        x_m=length, mass_kg=0.2, com_m=tuple(vector(rng, 0.05)), inertia_kg_m2=matrix(inertia(rng, 0.2, 0.1))
+    )
+    middle = s.BeamNode(name="middle", x_m=0.55 * length, quaternion=tuple(quaternion(rng)))
+    scene.beam(
+        name, length=length, elements=3, section=[root, tip], level=level, tip_masses=[lump], nodes=[middle],
+        modes=s.Modes(count=4, damping_ratio=0.0 if recipe.conservative else 0.02),
+        points=str(rng.choice(recipe.beam_points)),
+    )  # fmt: skip
+    return 4
+
+
+def _modal(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes: int, *, floating: bool) -> None:
+    """Points with mass, offset mass centres and turning tensors, moved by arbitrary assumed modes."""
+    n = 5
+    masses = rng.uniform(0.1, 0.4, n)
+    points = inertia_points(
+        masses, rng.uniform(-0.6, 0.6, (n, 3)), rng.uniform(-1.0, 1.0, (n, 3, modes)),
+        rotation_modes=rng.uniform(-2.0, 2.0, (n, 3, modes)),
+        inertia=np.array([inertia(rng, m, 0.3) for m in masses]), com_offset=rng.uniform(-0.1, 0.1, (n, 3)),
+    )  # fmt: skip
+    root = rng.normal(size=(modes, modes))
+    loss = rng.normal(size=(modes, modes))
+    nodes = [
+        s.ModalNode(
+            name=node, position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)),
+            translation_modes=matrix(rng.uniform(-1.0, 1.0, (modes, 3))),
+            rotation_modes=matrix(rng.uniform(-2.0, 2.0, (modes, 3))),
+        )
+        for node in ("a", "b")
+    ]  # fmt: skip
+    scene.modal_body(
+        name, points=points, stiffness=300.0 * (root @ root.T + np.eye(modes)), damping=0.2 * loss @ loss.T,
+        boundary="free-free" if floating else "clamped-free", level=level, nodes=nodes,
+    )  # fmt: skip
+
+
+def matrix(rows: np.ndarray) -> tuple[tuple[float, ...], ...]:
+    """Rows of an array as the schema's tuples."""
+    return tuple(tuple(map(float, row)) for row in rows)
+
+
+def _placement(rng: Generator) -> dict:
+    return {
+        "parent_position": vector(rng, 0.3), "parent_quaternion": quaternion(rng),
+        "child_position": vector(rng, 0.2), "child_quaternion": quaternion(rng),
+    }  # fmt: skip
+
+
+def _profile(rng: Generator, size: float) -> s.Function:
+    sine = s.Sine(amplitude=size, angular_frequency_rad_s=rng.uniform(1.0, 3.0), phase_rad=rng.uniform(-1.0, 1.0))
+    times = np.linspace(0.0, 4.0, 9)
+    table = s.Table(times_s=tuple(times), values=tuple(rng.uniform(-0.3 * size, 0.3 * size, len(times))))
+    step = s.SmoothStep(start_value=0.0, end_value=size, start_s=-0.5, duration_s=2.0)
+    return (sine, table, step, s.SpinUp(rate=size, duration_s=2.0))[rng.integers(4)]
+
+
+def _angle(rng: Generator, recipe: Recipe) -> s.AngularCoordinate:
+    """A random state with a spring; unless conservative a damper and a motor, or prescribed motion."""
+    if recipe.prescribed and rng.random() < 0.25:
+        return angular(prescribed=_profile(rng, 1.0))
+    lossy = {} if recipe.conservative else {"damping": rng.uniform(0.1, 1.0), "torque": _profile(rng, 2.0)}
+    return angular(
+        angle=rng.uniform(-1.2, 1.2), rate=rng.uniform(-2, 2), stiffness=rng.uniform(1, 20), rest=0.2, **lossy
+    )
+
+
+def _displacement(rng: Generator, recipe: Recipe) -> s.LinearCoordinate:
+    if recipe.prescribed and rng.random() < 0.25:
+        return linear(prescribed=_profile(rng, 0.3))
+    lossy = {} if recipe.conservative else {"damping": rng.uniform(0.1, 1.0), "force": _profile(rng, 2.0)}
+    return linear(
+        position=rng.uniform(-0.3, 0.3), rate=rng.uniform(-1, 1), stiffness=rng.uniform(20, 90), rest=0.1, **lossy
+    )
+
+
+def _hinge(
+    scene: SceneBuilder, rng: Generator, kind: str, name: str, parent: str, child: str, place: dict, recipe: Recipe
+) -> None:
+    def angle() -> s.AngularCoordinate:
+        return _angle(rng, recipe)
+
+    def displacement() -> s.LinearCoordinate:
+        return _displacement(rng, recipe)
+
+    joint = {"name": name, "parent": parent, "child": child} | _struct_placement(place)
+    axis = tuple(direction(rng))
+    loss = 0.0 if recipe.conservative else 0.3
+    match kind:
+        case "weld":
+            scene.add(s.Weld(**joint))
+        case "revolute":
+            scene.add(s.Revolute(**joint, axis=axis, rotation=angle()))
+        case "prismatic":
+            scene.add(s.Prismatic(**joint, axis=axis, translation=displacement()))
+        case "cylindrical":
+            scene.add(s.Cylindrical(**joint, axis=axis, rotation=angle(), translation=displacement()))
+        case "universal":
+            scene.add(s.Universal(**joint, first=angle(), second=angle()))
+        case "gimbal":
+            sequence = str(rng.choice(["xyz", "zxz", "yzx"]))
+            # the middle angle of zxz stays away from zero, that of xyz from a right angle
+            middle = angular(angle=rng.uniform(0.5, 1.0), rate=rng.uniform(-1, 1), stiffness=5.0)
+            scene.add(s.Gimbal(**joint, sequence=sequence, rotations=(angle(), middle, angle())))
+        case "gimbal2":
+            scene.add(s.Gimbal(**joint, sequence="zy", rotations=(angle(), angle())))
+        case "planar":
+            scene.add(s.Planar(**joint, x=displacement(), y=displacement(), rotation=angle()))
+        case "spherical":
+            scene.spherical(
+                name, parent, child, **place, quaternion=quaternion(rng), angular_velocity=vector(rng, 2.0),
+                stiffness=5.0, damping=loss,
+            )  # fmt: skip
+        case "free":
+            scene.free(
+                name, parent, child, **place, position=vector(rng, 1.0), quaternion=quaternion(rng),
+                angular_velocity=vector(rng, 2.0), velocity=vector(rng, 1.0),
+            )  # fmt: skip
+
+
+def _struct_placement(place: dict) -> dict:
+    """Builder keywords as schema keys."""
+    units = {"parent_position": "parent_position_m", "child_position": "child_position_m"}
+    return {units.get(key, key): value if isinstance(value, str) else tuple(value) for key, value in place.items()}
+
+
+def _seat(rng: Generator, nodes: list[list[str]]) -> dict:
+    k = int(rng.integers(len(nodes)))
+    return {"body": f"b{k}", "node": str(rng.choice(nodes[k])), "offset": vector(rng, 0.1)}
+
+
+def _wheels(scene: SceneBuilder, rng: Generator, nodes: list[list[str]], recipe: Recipe) -> None:
+    for i in range(recipe.wheels):
+        motion = {"angle": rng.uniform(-1, 1), "speed": rng.uniform(-20, 20)}
+        if recipe.prescribed and i == 0:
+            motion = {"prescribed": _profile(rng, 5.0)}
+        elif not recipe.conservative:
+            motion |= {"friction": 0.01, "torque": _profile(rng, 0.5)}
+        scene.wheel(
+            f"w{i}", **_seat(rng, nodes), axis=direction(rng), mass=0.3, axial_inertia=0.02, transverse_inertia=0.012,
+            **motion,
+        )  # fmt: skip
+
+
+def _point_masses(scene: SceneBuilder, rng: Generator, nodes: list[list[str]], recipe: Recipe) -> None:
+    for i in range(recipe.point_masses):
+        free = 1 + i % 3
+        directions = Rotation.random(random_state=rng).as_matrix()[:free]
+        scene.point_mass(
+            f"p{i}", **_seat(rng, nodes), mass=0.2, directions=directions,
+            coordinates=[_displacement(rng, recipe) for _ in range(free)],
+        )  # fmt: skip
+
+
+def _loads(scene: SceneBuilder, rng: Generator, nodes: list[list[str]]) -> None:
+    for i, (add, frame) in enumerate([(scene.force, "world"), (scene.force, "node"), (scene.torque, "node")]):
+        seat = _seat(rng, nodes)
+        del seat["offset"]
+        add(f"l{i}", **seat, direction=direction(rng), frame=frame, function=_profile(rng, 3.0))
+
+
