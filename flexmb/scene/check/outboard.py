@@ -69,15 +69,15 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
         D = H.T @ inertia @ H
         mass, moment = float(inertia[5, 5]), float(np.trace(inertia[:3, :3]))
         reference = np.where(np.any(H[:3] != 0.0, axis=0), moment, mass)
-        where, child = str(place), hinge.child
-        if np.any(np.diag(D) <= NEGLIGIBLE * reference):
-            turning = bool(np.any(H[:3, np.diag(D) <= NEGLIGIBLE * reference]))
-            noun = "inertia about" if turning else "mass along"
-            what = f'body "{child}" and what is welded to it have no {noun} a free direction of this hinge'
-            yield Problem(where, what, f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate")
-        elif np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
+        still = np.diag(D) <= NEGLIGIBLE * reference
+        if np.linalg.svd(H, compute_uv=False)[-1] <= NEGLIGIBLE:
             what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
-            yield Problem(where, what, "start elsewhere, choose another sequence, or use a spherical hinge")
+            yield Problem(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
+        elif np.any(still) or np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
+            noun = "mass along" if np.any(still) and not np.any(H[:3, still]) else "inertia about"
+            what = f'body "{hinge.child}" and what is welded to it have no {noun} a free direction of this hinge'
+            remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"
+            yield Problem(str(place), what, remedy)
 
 
 def _clusters(scene: Scene) -> dict[str, Cluster]:

@@ -291,6 +291,8 @@ BAD = {
     "point mass on its own axis": (hang(POINT, "revolute"), ['hinge "extra"'], ["inertia about"],
                                    ["give them inertia"]),
     "point mass on a spherical hinge": (hang(POINT, "spherical"), ['hinge "extra"'], ["inertia about"], ["weld"]),
+    "point mass off the origin of a free hinge": (
+        hang(POINT | {"com_m": [1.0, 2.0, 3.0]}, "free"), ['hinge "extra"'], ["inertia about"], ["give them inertia"]),
     "massless slider": (hang(MASSLESS, "prismatic"), ['hinge "extra"'], ["mass along"], ["give them mass"]),
     "free rod without inertia about itself": (
         both(hang(POINT | {"inertia_kg_m2": np.diag([0.0, 1.0, 1.0]).tolist()}, "free")),
