@@ -40,9 +40,7 @@ class PinocchioModel:
         states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
         reached = run.times[: len(states)]
-        samples = [
-            self._observer.observe(t, self._dynamics.state(t, y)) for t, y in zip(reached, states, strict=True)
-        ]
+        samples = [self._observer.observe(t, self._dynamics.state(t, y)) for t, y in zip(reached, states, strict=True)]
         status: Status = "finished" if len(states) == len(run.times) else "diverged"
         work = np.array([y[-1] for y in states])
         return stack(

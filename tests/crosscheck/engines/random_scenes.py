@@ -1,4 +1,4 @@
-"""Random scenes of rigid bodies: every hinge kind, turned node frames, springs, dampers, motors, wheels, point masses."""
+"""Random scenes of rigid bodies: every hinge kind, turned frames, springs, dampers, motors, wheels, point masses."""
 
 from __future__ import annotations
 
@@ -127,28 +127,28 @@ def _coordinate(rng: Generator, motor: str, driven: bool, dissipative: bool) -> 
 
 def _add_extras(builder: SceneBuilder, rng: Generator, body: str, i: int, driven: bool) -> None:
     """By turns: a wheel, a moving point mass and a fixed one, a load."""
+    wave = Sine(amplitude=1.0, angular_frequency_rad_s=2.0, phase_rad=0.5)
+    offset = rng.normal(size=3) * 0.1
     match i % 4:
         case 0:
+            motion = {"prescribed": wave} if driven else {"torque": Constant(value=0.3)}
             builder.wheel(
-                f"wheel{i}", body, node="n", offset=rng.normal(size=3) * 0.1, axis=unit(rng), mass=rng.uniform(0.1, 0.5),
-                axial_inertia=0.02, transverse_inertia=0.013, friction=0.002,
-                torque=None if driven else Constant(value=0.3),
-                prescribed=Sine(amplitude=2.0, angular_frequency_rad_s=3.0, phase_rad=0.2) if driven else None,
+                f"wheel{i}", body, node="n", offset=offset, axis=unit(rng), mass=rng.uniform(0.1, 0.5),
+                axial_inertia=0.02, transverse_inertia=0.013, friction=0.002, **motion,
             )  # fmt: skip
         case 1:
-            directions = rotation(rng)[: rng.integers(1, 4)]
+            directions = list(rotation(rng)[: rng.integers(1, 4)])
             springs = [linear(stiffness=rng.uniform(5.0, 20.0), damping=0.1) for _ in directions]
             builder.point_mass(
-                f"point{i}", body, node="n", mass=0.2, directions=list(directions), coordinates=springs,
-                offset=rng.normal(size=3) * 0.1,
+                f"point{i}", body, node="n", mass=0.2, offset=offset, directions=directions, coordinates=springs
             )  # fmt: skip
-            builder.point_mass(f"fixed{i}", body, mass=0.1, offset=rng.normal(size=3) * 0.1)
+            builder.point_mass(f"fixed{i}", body, mass=0.1, offset=-offset)
         case 2:
-            builder.force(f"force{i}", body, node="n", direction=unit(rng), function=Constant(value=1.5))
-            builder.force(f"follower{i}", body, node="n", direction=unit(rng), function=Constant(value=0.7), frame="node")
+            builder.force(f"force{i}", body, node="n", direction=unit(rng), function=wave)
+            builder.force(f"follower{i}", body, node="n", direction=unit(rng), function=wave, frame="node")
         case 3:
-            builder.torque(f"torque{i}", body, direction=unit(rng), function=Sine(amplitude=1.0, angular_frequency_rad_s=2.0, phase_rad=0.5))  # noqa: E501
-            builder.torque(f"turning{i}", body, node="n", direction=unit(rng), function=Constant(value=0.4), frame="node")
+            builder.torque(f"torque{i}", body, direction=unit(rng), function=wave)
+            builder.torque(f"turning{i}", body, node="n", direction=unit(rng), function=wave, frame="node")
 
 
 def _quaternion(rng: Generator) -> np.ndarray:

@@ -1,0 +1,241 @@
+"""Scene to scene: flexible bodies as chains of rigid segments, as rigid bodies, or as raw points and modes.
+
+A surrogate is given to every engine alike, so that lumping is never mistaken for a difference between engines.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from crosscheck.engines.lumping import beam_piece, quadrature, rigid_body, rigid_equivalent, section_properties
+from flexmb.modal import flexible_model
+from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.schema import (
+    AngularCoordinate,
+    BeamBody,
+    Gimbal,
+    Hinge,
+    LinearCoordinate,
+    ModalBody,
+    ModalNode,
+    Node,
+    Prismatic,
+    Revolute,
+    RigidBody,
+    Scene,
+    SidBody,
+    Vector,
+)
+from flexmb.scene.tree import rest_frames
+
+Array = NDArray[np.float64]
+
+_X: Vector = (1.0, 0.0, 0.0)
+# A family of motion that turns sections: axis letter, its vector, station stiffness. Order of the successive turns.
+_TURNS = {
+    "bending_y": ("z", (0.0, 0.0, 1.0), "EIz_Nm2"),
+    "bending_z": ("y", (0.0, 1.0, 0.0), "EIy_Nm2"),
+    "torsion": ("x", _X, "GJ_Nm2"),
+}
+
+
+@dataclass(frozen=True)
+class _Cut:
+    """A hinge between two segments at x (m), carrying the compliance of the beam from `start` to `end`."""
+
+    x: float
+    start: float
+    end: float
+    kind: Literal["turn", "axial"]
+
+
+def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
+    """The beam `body` (all beams if None) as rigid segments joined by sprung hinges.
+
+    The beam is divided into n elements of length l with a hinge in the middle of each (so half an element is rigid at
+    the root and at the tip): springs EI/l for each bending plane and GJ/l for torsion among the beam's mode families,
+    more exactly the inverse of the compliance integrated over the element. If "axial" is among them, slides at the
+    element boundaries carry EA/l. The first frequency is off by O(n^-2). Segments are named `<beam>.seg00` ... and
+    hinges `<beam>.h01` ... (slides `<beam>.a01` ...) from the root. Modal damping becomes proportional to stiffness,
+    exact for the first mode. Raises ValueError for what segments cannot carry: Timoshenko shear, initial modal states.
+    """
+    beams = [each for each in scene.bodies if isinstance(each, BeamBody) and body in (None, each.name)]
+    if body is not None and not beams:
+        raise ValueError(f'scene "{scene.name}" has no beam "{body}"')
+    for beam in beams:
+        scene = _segmented(scene, beam, n)
+    return scene
+
+
+def rigidify(scene: Scene) -> Scene:
+    """Every flexible body replaced by the rigid body with the same inertia and nodes; modal states are dropped."""
+    bodies = tuple(each if isinstance(each, SidBody) else rigid_equivalent(each) for each in scene.bodies)
+    return replace(scene, bodies=bodies, modal_states=())
+
+
+def modal_points(scene: Scene) -> Scene:
+    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same."""
+    return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
+
+
+def _modal(beam: BeamBody) -> ModalBody:
+    model = flexible_model(beam)
+    quaternions = {name: frame.quaternion for name, frame in rest_frames(beam).items()}
+    free = beam.modes.boundary == "free-free"
+    nodes = tuple(
+        ModalNode(
+            name=name, position_m=_floats(node.position), quaternion=quaternions[name],
+            translation_modes=tuple(map(_floats, node.translation.T)),
+            rotation_modes=tuple(map(_floats, node.rotation_modes.T)),
+        )
+        for name, node in model.nodes.items()
+        if free or name != "origin"
+    )  # fmt: skip
+    return ModalBody(
+        name=beam.name, nodes=nodes, boundary=beam.modes.boundary, level=beam.level,
+        points=inertia_points(
+            model.mass, model.position, model.translation, model.rotation, model.inertia, model.com_offset
+        ),
+        stiffness=tuple(map(_floats, model.stiffness)), damping=tuple(map(_floats, model.damping)),
+    )  # fmt: skip
+
+
+def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
+    if beam.theory == "timoshenko":
+        raise ValueError(f'beam "{beam.name}": finite segments carry no shear; use theory "euler-bernoulli"')
+    if any(state.body == beam.name for state in scene.modal_states):
+        raise ValueError(f'beam "{beam.name}": finite segments start undeformed; leave out its modal state')
+    cuts = _cuts(beam, n)
+    ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
+    places = {name: (_piece_at(ends, frame.position[0]), name) for name, frame in rest_frames(beam).items()}
+    inboard = next(hinge for hinge in scene.hinges if hinge.child == beam.name)
+    root = places[inboard.child_node][0]
+
+    def moved(item, body_key: str, node_key: str):
+        """The same hinge, wheel, load ... on the segment that carries its node."""
+        if getattr(item, body_key) != beam.name:
+            return item
+        piece, node = places[getattr(item, node_key)]
+        return replace(item, **{body_key: _segment_name(beam, piece), node_key: node})
+
+    hinges = []
+    for hinge in scene.hinges:
+        hinges.append(moved(moved(hinge, "child", "child_node"), "parent", "parent_node"))
+        if hinge is inboard:
+            hinges += _hinges(beam, cuts, ends, root)
+    bodies = []
+    for each in scene.bodies:
+        bodies += _segments(beam, ends, places) if each is beam else [each]
+    on_bodies = {
+        key: tuple(moved(item, "body", "node") for item in getattr(scene, key))
+        for key in ("wheels", "point_masses", "loads", "markers")
+    }
+    return replace(scene, bodies=tuple(bodies), hinges=tuple(hinges), **on_bodies)
+
+
+def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
+    """Hinges along the beam: turning ones in the middles of the elements, slides at the boundaries between them.
+
+    The outer slides also carry the compliance of the half elements beyond them, so that the whole stretches as the beam
+    does under a tip load.
+    """
+    if n < 2:
+        raise ValueError(f'beam "{beam.name}": finite segments need at least 2 elements, got {n}')
+    length = beam.length_m / n
+    cuts = []
+    if any(family in _TURNS for family in beam.modes.families):
+        cuts += [_Cut((i + 0.5) * length, i * length, (i + 1) * length, "turn") for i in range(n)]
+    if "axial" in beam.modes.families:
+        for i in range(1, n):
+            start = 0.0 if i == 1 else (i - 0.5) * length
+            end = beam.length_m if i == n - 1 else (i + 0.5) * length
+            cuts.append(_Cut(i * length, start, end, "axial"))
+    return sorted(cuts, key=lambda cut: cut.x)
+
+
+def _segments(beam: BeamBody, ends: list[float], places: dict[str, tuple[int, str]]) -> list[RigidBody]:
+    """Rigid pieces between the cuts; each frame at its root end with the beam's axes."""
+    frames = rest_frames(beam)
+    segments = []
+    for piece, (start, end) in enumerate(zip(ends, ends[1:], strict=False)):
+        inertia = beam_piece(beam, start, end)
+        own = dataclasses.replace(inertia, com=inertia.com - [start, 0.0, 0.0])
+        nodes = tuple(
+            Node(name=name, position_m=(frames[name].position[0] - start, 0.0, 0.0), quaternion=frames[name].quaternion)
+            for name, (where, _) in places.items()
+            if where == piece and name != "origin"
+        )
+        segments.append(rigid_body(_segment_name(beam, piece), own, nodes))
+    return segments
+
+
+def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> list[Hinge]:
+    """The hinges of the chain, outward from the segment `root` that carries the beam's inboard hinge."""
+    lag = _stiffness_damping(beam)
+    count = {"turn": 0, "axial": 0}
+    hinges = []
+    for piece, cut in enumerate(cuts):
+        count[cut.kind] += 1
+        inner, outer = _segment_name(beam, piece), _segment_name(beam, piece + 1)
+        at_end: Vector = (ends[piece + 1] - ends[piece], 0.0, 0.0)
+        name = f"{beam.name}.{'h' if cut.kind == 'turn' else 'a'}{count[cut.kind]:02d}"
+        if piece >= root:
+            placement = {"name": name, "parent": inner, "child": outer, "parent_position_m": at_end}
+        else:
+            placement = {"name": name, "parent": outer, "child": inner, "child_position_m": at_end}
+        hinges.append(_slide(beam, cut, lag, placement) if cut.kind == "axial" else _turn(beam, cut, lag, placement))
+    # From the root outward on the tip side, then on the root side: parents come before their children.
+    return hinges[root:] + hinges[:root][::-1]
+
+
+def _slide(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
+    k = _spring(beam, "EA_N", cut)
+    return Prismatic(**placement, axis=_X, translation=LinearCoordinate(stiffness_N_m=k, damping_Ns_m=lag * k))
+
+
+def _turn(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
+    """A hinge with one turn for each family that turns sections: revolute for one, else a gimbal."""
+    letters, axes, turns = "", [], []
+    for family, (letter, axis, key) in _TURNS.items():
+        if family in beam.modes.families:
+            k = _spring(beam, key, cut)
+            letters += letter
+            axes.append(axis)
+            turns.append(AngularCoordinate(stiffness_Nm_rad=k, damping_Nms_rad=lag * k))
+    if len(turns) == 1:
+        return Revolute(**placement, axis=axes[0], rotation=turns[0])
+    return Gimbal(**placement, sequence=letters, rotations=tuple(turns))
+
+
+def _spring(beam: BeamBody, key: str, cut: _Cut) -> float:
+    """Stiffness between the ends of the cut's piece of beam: the inverse of its integrated compliance."""
+    x, weight = quadrature(beam, (cut.start, cut.end))
+    (section,) = section_properties(beam, x, key)
+    return float(1.0 / np.sum(weight / section))
+
+
+def _stiffness_damping(beam: BeamBody) -> float:
+    """c/k (s) of every spring: 2 zeta/omega of the first mode, whose damping it reproduces."""
+    if not np.any(beam.modes.damping_ratio):
+        return 0.0
+    model = flexible_model(beam)
+    return float(model.damping[0, 0] / model.stiffness[0, 0])
+
+
+def _segment_name(beam: BeamBody, piece: int) -> str:
+    return f"{beam.name}.seg{piece:02d}"
+
+
+def _piece_at(ends: list[float], x: float) -> int:
+    """The piece that holds x; on a cut, the one toward the tip."""
+    return min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)

@@ -1,0 +1,205 @@
+"""Surrogates: the segment chain converges to the beam, keeps its mass and its nodes, and is a sound scene."""
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+from crosscheck.engines.contract import EngineMissing
+from crosscheck.engines.lumping import beam_piece, combine, inertia_of, rigid_equivalent
+from crosscheck.engines.registry import engines
+from crosscheck.surrogate import finite_segments, modal_points, rigidify
+from flexmb.modal import flexible_model
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.check import check_scene
+from flexmb.scene.functions import Constant
+from flexmb.scene.schema import BeamStation, Gimbal, Modes, Prismatic, Revolute, TipMass
+from flexmb.scene.tree import node_frame, ordered
+
+LENGTH = 2.0
+SECTION = BeamStation(
+    x_m=0.0, EA_N=1e5, EIy_Nm2=30.0, EIz_Nm2=12.0, GJ_Nm2=9.0, mass_per_length_kg_m=0.7,
+    rotary_y_kg_m=1e-4, rotary_z_kg_m=2e-4,
+)  # fmt: skip
+LUMP = ((2e-3, 0.0, 0.0), (0.0, 3e-3, 0.0), (0.0, 0.0, 4e-3))
+FIRST_ROOT = 1.8751040687119611  # of cos x cosh x = -1
+
+
+def beam_scene(families=("bending_y",), child_node="root", boundary="clamped-free", damping=0.0, **beam):
+    """A beam on a weld with a panel hinged to a node in the middle, a wheel, a load and a marker at the tip."""
+    modes = Modes(count=2, families=families, boundary=boundary, damping_ratio=damping)
+    section = {"section": SECTION} | beam
+    return (
+        SceneBuilder("beam", gravity=(0.0, -9.81, 0.0))
+        .beam("boom", length=LENGTH, elements=8, modes=modes, nodes={"middle": 0.9}, **section)
+        .rigid_body("panel", mass=0.4, com=(0.2, 0.0, 0.0), inertia=(0.01, 0.02, 0.02))
+        .weld("root", "ground", "boom", child_node=child_node)
+        .revolute("panel hinge", "boom", "panel", parent_node="middle", stiffness=2.0)
+        .wheel("wheel", "boom", node="tip", axis=(0, 0, 1), mass=0.1, axial_inertia=0.01, transverse_inertia=0.006)
+        .force("load", "boom", node="tip", direction=(0, 1, 0), function=Constant(value=1.0))
+        .marker("tip", "boom", node="tip")
+        .marker("middle", "boom", node="middle", offset=(0.0, 0.1, 0.0))
+        .scene()
+    )
+
+
+def cantilever(families, points):
+    """A uniform beam welded to the ground at its root."""
+    modes = Modes(count=1, families=families)
+    builder = SceneBuilder("cantilever")
+    builder.beam("b", length=LENGTH, elements=8, section=SECTION, points=points, modes=modes)
+    return builder.weld("w", "ground", "b")
+
+
+def rest_positions(scene):
+    """World position of every marker's node with all hinges at zero, by the tree's frames alone."""
+    pose = {"ground": np.zeros(3)}
+    for body, hinge in ordered(scene):
+        inboard = pose[hinge.parent] + np.array(hinge.parent_position_m)
+        if hinge.parent != "ground":
+            parent = next(each for each in scene.bodies if each.name == hinge.parent)
+            inboard = inboard + node_frame(parent, hinge.parent_node).position
+        pose[body.name] = inboard - hinge.child_position_m - np.array(node_frame(body, hinge.child_node).position)
+    bodies = {body.name: body for body in scene.bodies}
+    return {
+        marker.name: pose[marker.body] + node_frame(bodies[marker.body], marker.node).position + marker.offset_m
+        for marker in scene.markers
+    }
+
+
+@pytest.mark.parametrize("child_node", ["root", "middle", "tip"])
+@pytest.mark.parametrize("families", [("bending_y",), ("bending_y", "bending_z", "torsion", "axial")])
+def test_segments_make_a_sound_scene_with_every_item_at_its_place(families, child_node):
+    whole = beam_scene(families, child_node, "free-free")
+    chain = finite_segments(whole, None, 5)
+    check_scene(chain)
+    assert len(ordered(chain)) == len(chain.bodies)
+    for name, position in rest_positions(whole).items():
+        assert rest_positions(chain)[name] == pytest.approx(position, abs=1e-15 * LENGTH * 10)
+
+
+def test_names_and_kinds_of_hinges():
+    chain = finite_segments(beam_scene(), "boom", 3)
+    assert [body.name for body in chain.bodies] == ["boom.seg00", "boom.seg01", "boom.seg02", "boom.seg03", "panel"]
+    assert [h.name for h in chain.hinges if isinstance(h, Revolute)] == [
+        "boom.h01", "boom.h02", "boom.h03", "panel hinge",
+    ]  # fmt: skip
+    both = finite_segments(beam_scene(("bending_y", "bending_z", "axial")), "boom", 2)
+    assert [(h.name, type(h)) for h in both.hinges if h.name.startswith("boom.")] == [
+        ("boom.h01", Gimbal), ("boom.a01", Prismatic), ("boom.h02", Gimbal),
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("points", ["line", "section"])
+def test_segments_carry_the_inertia_of_the_beam(points):
+    lump = TipMass(x_m=LENGTH, mass_kg=0.3, com_m=(0.1, 0.0, 0.02), inertia_kg_m2=LUMP)
+    scene = beam_scene(("bending_y", "bending_z", "torsion"), points=points, tip_masses=[lump])
+    beam = scene.bodies[0]
+    chain = finite_segments(scene, "boom", 4)
+    starts = [0.0, 0.25, 0.75, 1.25, 1.75]
+    parts = [inertia_of(body) for body in chain.bodies[:-1]]
+    total = combine([type(p)(p.mass, p.com + [x, 0, 0], p.inertia) for p, x in zip(parts, starts, strict=True)])
+    whole = beam_piece(beam, 0.0, LENGTH)
+    for key in ("mass", "com", "inertia"):
+        assert getattr(total, key) == pytest.approx(getattr(whole, key), rel=1e-13, abs=1e-16)
+
+
+@pytest.mark.parametrize("points", ["line", "rotary", "section"])
+@pytest.mark.parametrize("mass", ["consistent", "lumped"])
+def test_rigid_equivalent_has_the_inertia_of_the_modal_points(points, mass):
+    taper = [SECTION, replace(SECTION, x_m=LENGTH, mass_per_length_kg_m=0.3, rotary_y_kg_m=3e-5)]
+    lump = TipMass(x_m=1.5, mass_kg=0.3, com_m=(0.1, 0.0, 0.02), inertia_kg_m2=LUMP)
+    beam = beam_scene(section=taper, points=points, mass=mass, tip_masses=[lump]).bodies[0]
+    own, model = inertia_of(rigid_equivalent(beam)), flexible_model(beam)
+    points = zip(model.mass, model.position + model.com_offset, model.inertia, strict=True)
+    summed = combine([type(own)(*point) for point in points])
+    for key in ("mass", "com", "inertia"):
+        assert getattr(own, key) == pytest.approx(getattr(summed, key), rel=1e-12, abs=1e-15)
+
+
+def first_frequency(n):
+    """Of the clamped chain, from its segments: small angles, M and K of the hinge angles."""
+    chain = finite_segments(cantilever(("bending_y",), "line").scene(), "b", n)
+    l = LENGTH / n  # noqa: E741
+    hinge_x = (np.arange(n) + 0.5) * l
+    M = np.zeros((n, n))
+    for piece, body in enumerate(chain.bodies):
+        start = 0.0 if piece == 0 else hinge_x[piece - 1]
+        turned = np.where(hinge_x <= start + 1e-12, 1.0, 0.0) if piece else np.zeros(n)
+        arm = turned * (start + body.com_m[0] - hinge_x)
+        M += body.mass_kg * np.outer(arm, arm) + body.inertia_kg_m2[2][2] * np.outer(turned, turned)
+    K = np.diag([h.rotation.stiffness_Nm_rad for h in chain.hinges if isinstance(h, Revolute)])
+    return np.sqrt(np.linalg.eigvals(np.linalg.solve(M, K)).real.min())
+
+
+def test_first_frequency_converges_with_order_two():
+    exact = FIRST_ROOT**2 * np.sqrt(SECTION.EIz_Nm2 / (SECTION.mass_per_length_kg_m * LENGTH**4))
+    error = np.array([first_frequency(n) / exact - 1.0 for n in (8, 16, 32)])
+    assert np.log2(error[:-1] / error[1:]) == pytest.approx(2.0, abs=0.1)
+    assert error == pytest.approx([3.6e-3, 9.0e-4, 2.2e-4], rel=0.05)  # as published for half a rigid segment at the root
+
+
+def test_static_tip_deflection_in_a_peer():
+    """A chain in equilibrium under a tip force stays there: hinge angles from the compliance, checked by an engine."""
+    whole = cantilever(("bending_y", "bending_z", "torsion"), "rotary").marker("tip", "b", node="tip")
+    whole.force("f", "b", node="tip", direction=(0, 1, 0), function=Constant(value=1e-6))
+    chain = finite_segments(whole.scene(), "b", 6)
+    l = LENGTH / 6  # noqa: E741
+    x = (np.arange(6) + 0.5) * l
+    angles = iter(1e-6 * (LENGTH - x) / (SECTION.EIz_Nm2 / l))
+    hinges = tuple(
+        replace(hinge, rotations=(replace(hinge.rotations[0], angle_rad=next(angles)), *hinge.rotations[1:]))
+        if isinstance(hinge, Gimbal)
+        else hinge
+        for hinge in chain.hinges
+    )
+    engine = engines()["pinocchio"]
+    try:
+        snapshot = engine.compile(replace(chain, hinges=hinges)).evaluate()
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    deflection = snapshot.markers["tip"].position[1]
+    assert deflection == pytest.approx(1e-6 * LENGTH**3 / (3 * SECTION.EIz_Nm2), rel=1 / (4 * 6**2) + 1e-3)
+    # Unbalanced acceleration: second order in angles of 1e-7, against 1e-6 N on 1e-2 kg of tip segment.
+    assert np.abs(snapshot.markers["tip"].acceleration).max() < 1e-9
+
+
+def test_damping_is_that_of_the_first_mode():
+    chain = finite_segments(beam_scene(damping=0.01), "boom", 4)
+    hinge = next(h for h in chain.hinges if h.name == "boom.h01")
+    model = flexible_model(beam_scene().bodies[0])
+    omega = np.sqrt(model.stiffness[0, 0])
+    ratio = hinge.rotation.damping_Nms_rad / hinge.rotation.stiffness_Nm_rad
+    assert ratio == pytest.approx(2 * 0.01 / omega, rel=1e-12)
+
+
+def test_refusals():
+    with pytest.raises(ValueError, match="no beam"):
+        finite_segments(beam_scene(), "panel", 4)
+    with pytest.raises(ValueError, match="at least 2"):
+        finite_segments(beam_scene(), "boom", 1)
+    section = replace(SECTION, GAy_N=1e4, GAz_N=1e4)
+    with pytest.raises(ValueError, match="shear"):
+        finite_segments(beam_scene(section=section, theory="timoshenko"), "boom", 4)
+    bent = SceneBuilder("bent").beam("b", length=1.0, elements=4, section=SECTION, modes=1).weld("w", "ground", "b")
+    with pytest.raises(ValueError, match="undeformed"):
+        finite_segments(bent.modal_state("b", coordinates=[0.1]).scene(), "b", 4)
+
+
+def test_modal_points_are_the_beams_own():
+    scene = beam_scene(("bending_y", "bending_z"))
+    raw = modal_points(scene)
+    check_scene(raw)
+    ours, theirs = flexible_model(scene.bodies[0]), flexible_model(raw.bodies[0])
+    for key in ("mass", "position", "com_offset", "inertia", "translation", "rotation", "stiffness", "damping"):
+        assert np.array_equal(getattr(ours, key), getattr(theirs, key)), key
+    assert ours.nodes.keys() == theirs.nodes.keys()
+    for name, node in ours.nodes.items():
+        assert np.array_equal(node.translation, theirs.nodes[name].translation)
+        assert np.array_equal(node.rotation_modes, theirs.nodes[name].rotation_modes)
+
+
+def test_rigidify_keeps_nodes_and_needs_no_modes():
+    rigid = rigidify(beam_scene())
+    check_scene(rigid)
+    assert rest_positions(rigid)["tip"] == pytest.approx([LENGTH, 0.0, 0.0])
+    assert rigid.modal_states == ()
