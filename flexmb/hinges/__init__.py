@@ -1,0 +1,15 @@
+"""Hinges: one file per kind, each with the same three kernels.
+
+``pose(q, i, sequence)``
+    Relative pose of the outboard frame O in the inboard frame O+: R (9) maps O components to O+ components, p (3) is
+    O's origin in O+ axes.
+``motion(q, i, u, j, sequence, H)``
+    Fills the hinge map H (6 x n, outboard axes, velocity at O's origin; the transpose of Jain's) and returns
+    (w, v, alpha, a): relative velocity V = H u and the relative acceleration left when udot = 0, as seen from O+, in O
+    axes. The linear part belongs to O's origin.
+``rate(q, i, u, j, sequence, dq)``
+    Configuration rate qdot(q, u), written to dq[i:i+nq].
+
+q and u are the whole vectors; the hinge's coordinates begin at q[i], its speeds at u[j]. `sequence` (3,) holds the axis
+numbers of a gimbal. Axes of one-axis kinds are z: `flexmb.system` turns the hinge frames so at build time.
+"""

@@ -19,6 +19,15 @@ class ModalNode:
     translation: Array
     rotation_modes: Array
 
+    def seen_from(self, origin: Array, turn: Array) -> ModalNode:
+        """The same node in axes R_new_old = `turn` about `origin` (3,), old axes."""
+        return ModalNode(
+            turn @ (self.position - origin),
+            turn @ self.rotation,
+            turn @ self.translation,
+            turn @ self.rotation_modes,
+        )
+
 
 @dataclass(frozen=True)
 class FlexibleModel:

@@ -1,0 +1,191 @@
+"""The arrays kernels work on: one table of names, shapes and units.
+
+N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
+W wheels; L loads; F functions of time; m the largest number of modes; nq, nu lengths of q and u. Everything about a body
+is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal frame.
+Angular components come first. Units are SI. Every table is an array of records: a kernel is handed a few pointers, and
+code reads like ``c.body[k].parent``.
+
+A *port* is a frame fixed to a point of a body that may deform: where a hinge, wheel, load or marker sits.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Real = NDArray[np.float64]
+Index = NDArray[np.int64]
+Record = NDArray[np.void]
+
+RIGID, RUTHLESS, FULL = range(3)
+FORCE, TORQUE = range(2)
+WORLD_AXES, NODE_AXES = range(2)
+
+_F, _I = np.float64, np.int64
+
+
+def _record(*fields: tuple) -> np.dtype:
+    return np.dtype(list(fields), align=True)
+
+
+BODY = _record(
+    ("parent", _I),  # -1 for ground
+    ("level", _I),  # RIGID, RUTHLESS or FULL
+    ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
+    ("sequence", _I, (3,)),  # axis numbers of a gimbal
+    ("q_index", _I),  # first hinge coordinate in q
+    ("u_index", _I),  # first hinge speed in u
+    ("nv", _I),  # number of hinge speeds
+    ("modes", _I),  # number of modes
+    ("eta_index", _I),  # first modal coordinate in q
+    ("etad_index", _I),  # first modal speed in u
+    ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming
+    ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
+    ("placement_position", _F, (3,)),  # O+ in the parent's frame
+    ("placement_rotation", _F, (9,)),  # R_parent_O+
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; level full: of the polynomial part
+    ("rigid", _F, (10,)),
+    ("ball_spring", _F),  # stiffness of a spherical hinge
+    ("point_start", _I),
+    ("point_stop", _I),
+    ("port_start", _I),
+    ("port_stop", _I),
+    ("wheel_start", _I),
+    ("wheel_stop", _I),
+    ("load_start", _I),
+    ("load_stop", _I),
+)
+MODE = _record(  # mode n of a body
+    ("mfr", _F, (6,)),  # coupling to [angular; linear] at rest
+    ("moment", _F, (9,)),  # P0_n = sum m phi_n r', r at rest
+    ("gyration", _F, (6,)),  # ruthless: symmetric B_n, centrifugal force w' B_n w on the mode
+)
+PAIR = _record(  # modes n, i of a body
+    ("mff", _F),  # modal mass matrix
+    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'
+    ("stiffness", _F),
+    ("damping", _F),
+)
+POINT = _record(  # summed at run time (level full): points with rotating inertia or an offset mass centre
+    ("mass", _F),  # 0 where the mass is in the polynomial part
+    ("position", _F, (3,)),
+    ("offset", _F, (3,)),  # mass centre from the point, in point axes
+    ("inertia", _F, (6,)),  # about the mass centre
+)
+PORT = _record(
+    ("position", _F, (3,)),
+    ("offset", _F, (3,)),  # in node axes (parallel to the body's at rest)
+    ("frame", _F, (9,)),  # rotation port -> node axes
+)
+SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # mode shape at a port or point
+WHEEL = _record(
+    ("port", _I),
+    ("q_index", _I),
+    ("u_index", _I),
+    ("axis", _F, (3,)),  # unit, in port axes
+    ("mass", _F),
+    ("axial", _F),
+    ("transverse", _F),
+)
+LOAD = _record(
+    ("port", _I),
+    ("type", _I),  # FORCE or TORQUE
+    ("frame", _I),  # WORLD_AXES or NODE_AXES
+    ("function", _I),
+    ("direction", _F, (3,)),
+)
+SPEED = _record(
+    ("coordinate", _I),  # its scalar coordinate's place in q; -1 for speeds of a quaternion or of a mode
+    ("motor", _I),  # function, -1 for none
+    ("prescribed", _I),  # function of the coordinate's value, -1 where it is free
+    ("stiffness", _F),
+    ("damping", _F),
+    ("rest", _F),
+)
+FUNCTION = _record(
+    ("kind", _I),
+    ("data", _F, (4,)),
+    ("start", _I),  # its rows of `table`
+    ("stop", _I),
+)
+
+
+class Constants(NamedTuple):
+    """Everything that does not change in a run."""
+
+    gravity: Real  # (3,) World axes, m/s^2
+    body: Record  # (N,) BODY
+    mode: Record  # (N,m) MODE
+    pair: Record  # (N,m,m) PAIR
+    point: Record  # (S,) POINT
+    point_mode: Record  # (S,m) SHAPE
+    port: Record  # (P,) PORT
+    port_mode: Record  # (P,m) SHAPE
+    wheel: Record  # (W,) WHEEL
+    load: Record  # (L,) LOAD
+    speed: Record  # (nu,) SPEED
+    function: Record  # (F,) FUNCTION
+    table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
+
+
+BODY_STATE = _record(
+    ("rotation", _F, (9,)),  # R_parent_body
+    ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
+    ("hinge_map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
+    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
+    ("velocity", _F, (6,)),  # of the body frame, body axes
+    ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
+    ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
+    ("accel_hinge", _F, (6,)),  # of O without the deformation part, minus gravity, body axes
+    ("pose_rotation", _F, (9,)),  # R_World_body
+    ("pose_position", _F, (3,)),
+    ("inertia", _F, (21,)),  # rigid block of the articulated inertia about the body origin
+    ("force", _F, (6,)),  # rigid part of the bias force
+    ("hinge_inertia", _F, (21,)),  # P_R about O
+    ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
+    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)' by free speed
+    ("hinge_factor", _F, (6, 6)),  # Cholesky factor of D_R
+    ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
+    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
+    ("free_count", _I),
+    ("load", _F, (6,)),  # load across the hinge on the body about O, body axes
+)
+MODE_STATE = _record(  # mode n of a body
+    ("eta", _F),  # as the level sees it: 0 for ruthless
+    ("etad", _F),
+    ("etadd", _F),
+    ("zf", _F),  # modal bias force, then L^-1 of it
+    ("pfr", _F, (6,)),  # coupling, then L^-1 of it
+)
+PORT_STATE = _record(
+    ("r", _F, (3,)),  # position from the body origin
+    ("R", _F, (9,)),  # R_body_port
+    ("v", _F, (6,)),  # velocity relative to the body
+    ("a", _F, (6,)),  # acceleration relative to the body at etaddot = 0
+)
+COLUMN = _record(("W", _F, (3,)), ("L", _F, (3,)))  # angular and linear velocity per modal speed
+SPEED_STATE = _record(
+    ("acceleration", _F),  # udot
+    ("applied", _F),  # spring + damper + motor
+    ("drive", _F),  # drive load of a prescribed coordinate, beyond springs and motors
+)
+
+
+class Workspace(NamedTuple):
+    """What one evaluation writes. One workspace per thread."""
+
+    q: Real  # (nq,) quaternions normalised, prescribed coordinates exact
+    u: Real  # (nu,)
+    ground: Real  # (3,) acceleration of the ground, World axes: -gravity
+    body: Record  # (N,) BODY_STATE
+    mode: Record  # (N,m) MODE_STATE
+    pff: Real  # (N,m,m) modal block of the articulated inertia, then its Cholesky factor
+    port: Record  # (P,) PORT_STATE
+    port_mode: Record  # (P,m) COLUMN
+    point_mode: Record  # (m,) COLUMN, scratch of one summed point
+    speed: Record  # (nu,) SPEED_STATE
+    function: Real  # (F,3) value, rate, acceleration
+    fault: Index  # (1,) body where an evaluation failed

@@ -1,0 +1,297 @@
+"""From links to the arrays of flexmb.arrays: numbering of coordinates, ports, wheels, loads, functions."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+
+from flexmb import arrays as a
+from flexmb.functions import pack
+from flexmb.hinges import catalogue
+from flexmb.links import Link, Port, port
+from flexmb.modal.cross import cross_matrix
+from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
+from flexmb.modal.model import FlexibleModel
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import IDENTITY, ZERO
+from flexmb.scene.tree import GROUND
+
+AXIS_VECTORS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+def six(m: a.Real) -> list[float]:
+    """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
+    return [float(m[i, j]) for i, j in AXIS_VECTORS]
+
+
+class Numbering:
+    """Places of all coordinates in q and speeds in u: body by body hinge, modes, wheels."""
+
+    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
+        self.q: dict[str, slice] = {}
+        self.u: dict[str, slice] = {}
+        self.nq = self.nu = 0
+        for link in chain:
+            kind = catalogue.KINDS[link.kind]
+            self._append(link.hinge.name, kind.NQ, kind.NV)
+            self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
+            for wheel in wheels.get(link.name, ()):
+                self._append(wheel.name, 1, 1)
+        for link in chain:
+            self.q[f"{link.name}.hinge"] = self.q[link.hinge.name]
+            self.u[f"{link.name}.hinge"] = self.u[link.hinge.name]
+
+    def _append(self, name: str, nq: int, nu: int) -> None:
+        self.q[name] = slice(self.nq, self.nq + nq)
+        self.u[name] = slice(self.nu, self.nu + nu)
+        self.nq += nq
+        self.nu += nu
+
+
+class Functions:
+    """Functions of time by number, each stored once."""
+
+    def __init__(self) -> None:
+        self.all: list[s.Function] = []
+
+    def number(self, function: s.Function | None) -> int:
+        if function is None:
+            return -1
+        if function not in self.all:
+            self.all.append(function)
+        return self.all.index(function)
+
+
+class Ports:
+    """Ports by body; numbered when all are known."""
+
+    def __init__(self, chain: list[Link]) -> None:
+        self.by_body: list[list[Port]] = [[] for _ in chain]
+
+    def add(self, body: int, at: Port) -> tuple[int, int]:
+        self.by_body[body].append(at)
+        return body, len(self.by_body[body]) - 1
+
+    def number(self, place: tuple[int, int] | None) -> int:
+        """Number of a port once all are added; -1 for none."""
+        if place is None:
+            return -1
+        body, i = place
+        return sum(len(ports) for ports in self.by_body[:body]) + i
+
+    def all(self) -> list[Port]:
+        return [port for ports in self.by_body for port in ports]
+
+
+def group(items: Iterable, key: str) -> dict[str, list]:
+    """Items by the value of an attribute, in order."""
+    found: dict[str, list] = {}
+    for item in items:
+        found.setdefault(getattr(item, key), []).append(item)
+    return found
+
+
+def body_port(link: Link, node: str, offset: s.Vector) -> Port:
+    """Port at a node of a link for wheels, loads and markers, in the link's frame."""
+    return port(link.model, node, offset, IDENTITY, np.eye(3))
+
+
+def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a.Constants, dict[str, tuple[int, int]]]:
+    """Constants of the scene, and (body, port) of every marker."""
+    index = {link.name: k for k, link in enumerate(chain)}
+    functions, ports = Functions(), Ports(chain)
+    wheels = [wheel for link in chain for wheel in scene.wheels if wheel.body == link.name]
+    loads = [load for link in chain for load in scene.loads if load.body == link.name]
+
+    def place(item: s.Wheel | s.Load | s.Marker) -> tuple[int, int]:
+        k = index[item.body]
+        return ports.add(k, body_port(chain[k], item.node, getattr(item, "offset_m", ZERO)))
+
+    inboard = [
+        link.inboard if link.parent == GROUND else _moved(link.inboard, chain[index[link.parent]]) for link in chain
+    ]
+    inboard_ports = [
+        ports.add(index[link.parent], at) if at.deforms else None for link, at in zip(chain, inboard, strict=True)
+    ]
+    outboard_ports = [ports.add(k, link.outboard) if link.outboard.deforms else None for k, link in enumerate(chain)]
+    wheel_ports, load_ports = [place(wheel) for wheel in wheels], [place(load) for load in loads]
+    marker_ports = {marker.name: place(marker) for marker in scene.markers}
+
+    m = max((link.model.mode_count for link in chain), default=0)
+    inertia, points = _inertia(chain, m)
+    body = inertia.pop("body")
+    body["parent"] = [index.get(link.parent, -1) for link in chain]
+    body["level"] = [link.level for link in chain]
+    body["hinge_kind"] = [link.kind for link in chain]
+    body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
+    body["q_index"] = [numbering.q[link.hinge.name].start for link in chain]
+    body["u_index"] = [numbering.u[link.hinge.name].start for link in chain]
+    body["nv"] = [catalogue.KINDS[link.kind].NV for link in chain]
+    body["modes"] = [link.model.mode_count for link in chain]
+    body["eta_index"] = [numbering.q[f"{link.name}.modes"].start for link in chain]
+    body["etad_index"] = [numbering.u[f"{link.name}.modes"].start for link in chain]
+    body["inboard_port"] = [ports.number(at) for at in inboard_ports]
+    body["outboard_port"] = [ports.number(at) for at in outboard_ports]
+    body["placement_position"] = [at.node.position + at.offset for at in inboard]
+    body["placement_rotation"] = [at.frame.ravel() for at in inboard]
+    _group(body, "port", [len(each) for each in ports.by_body])
+    _group(body, "wheel", [sum(wheel.body == link.name for wheel in wheels) for link in chain])
+    _group(body, "load", [sum(load.body == link.name for load in loads) for link in chain])
+    speed = _speeds(chain, wheels, numbering, functions, body)
+    load = _loads(loads, [ports.number(at) for at in load_ports], functions)
+    function, table = pack(functions.all)
+    constants = a.Constants(
+        gravity=np.array(scene.gravity_m_s2, float),
+        body=body,
+        port=_ports(ports),
+        port_mode=_shapes([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
+        wheel=_wheels(wheels, [ports.number(at) for at in wheel_ports], numbering),
+        load=load,
+        speed=speed,
+        function=function,
+        table=table,
+        **inertia,
+        **points,
+    )
+    return constants, {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
+
+
+def _moved(inboard: Port, parent: Link) -> Port:
+    """An inboard port in its parent's link frame (the parent may have been referred to its own hinge frame)."""
+    if parent.outboard.deforms:
+        return inboard
+    back, origin = parent.outboard.frame.T, parent.outboard.origin
+    return Port(inboard.node.seen_from(origin, back), back @ inboard.offset, back @ inboard.frame)
+
+
+def _group(body: a.Record, name: str, counts: list[int]) -> None:
+    """Consecutive groups of items by body: their start and stop."""
+    stop = np.cumsum(counts)
+    body[f"{name}_stop"] = stop
+    body[f"{name}_start"] = stop - counts
+
+
+def _shapes(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Record:
+    """SHAPE records (len, m) of (translation, rotation) mode shapes (3, modes)."""
+    out = np.zeros((len(shapes), m), a.SHAPE)
+    for i, (translation, rotation) in enumerate(shapes):
+        out["translation"][i, : translation.shape[1]] = translation.T
+        out["rotation"][i, : rotation.shape[1]] = rotation.T
+    return out
+
+
+def _ports(ports: Ports) -> a.Record:
+    out = np.zeros(len(ports.all()), a.PORT)
+    for row, at in zip(out, ports.all(), strict=True):
+        row["position"], row["offset"], row["frame"] = at.node.position, at.offset, at.frame.ravel()
+    return out
+
+
+def _wheels(wheels: list[s.Wheel], ports: list[int], numbering: Numbering) -> a.Record:
+    out = np.zeros(len(wheels), a.WHEEL)
+    for row, wheel, at in zip(out, wheels, ports, strict=True):
+        row["port"], row["axis"] = at, wheel.axis
+        row["q_index"], row["u_index"] = numbering.q[wheel.name].start, numbering.u[wheel.name].start
+        row["mass"], row["axial"] = wheel.mass_kg, wheel.axial_inertia_kg_m2
+        row["transverse"] = wheel.transverse_inertia_kg_m2
+    return out
+
+
+def _loads(loads: list[s.Load], ports: list[int], functions: Functions) -> a.Record:
+    out = np.zeros(len(loads), a.LOAD)
+    for row, load, at in zip(out, loads, ports, strict=True):
+        row["port"], row["direction"], row["function"] = at, load.direction, functions.number(load.function)
+        row["type"] = a.FORCE if load.type == "force" else a.TORQUE
+        row["frame"] = a.WORLD_AXES if load.frame == "world" else a.NODE_AXES
+    return out
+
+
+def _speeds(
+    chain: list[Link], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
+) -> a.Record:
+    """Springs, dampers, motors and prescribed motion by speed; isotropic springs of spherical hinges by body."""
+    out = np.zeros(numbering.nu, a.SPEED)
+    for name in ("coordinate", "motor", "prescribed"):
+        out[name] = -1
+    for k, link in enumerate(chain):
+        q, u = numbering.q[link.hinge.name].start, numbering.u[link.hinge.name].start
+        if isinstance(link.hinge, s.Spherical):
+            body["ball_spring"][k] = link.hinge.stiffness_Nm_rad
+            out["damping"][u : u + 3] = link.hinge.damping_Nms_rad
+        for n, (_, c) in enumerate(link.scalar):
+            if isinstance(c, s.AngularCoordinate):
+                spring, motor, prescribed = (
+                    (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad),
+                    c.torque_Nm,
+                    c.prescribed_rad,
+                )
+            else:
+                spring, motor, prescribed = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
+            out[u + n] = (q + n, functions.number(motor), functions.number(prescribed), *spring)
+    for wheel in wheels:
+        out[numbering.u[wheel.name].start] = (
+            numbering.q[wheel.name].start,
+            functions.number(wheel.torque_Nm),
+            functions.number(wheel.prescribed_rad),
+            0.0,
+            wheel.friction_Nms_rad,
+            0.0,
+        )
+    return out
+
+
+def _inertia(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict[str, a.Record]]:
+    """Inertia at rest and modal integrals by body; the points left to sum at run time."""
+    body = np.zeros(len(chain), a.BODY)
+    mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
+    turning: list[tuple[TurningPoints, int]] = []
+    counts = []
+    for k, link in enumerate(chain):
+        integrals = modal_integrals(link.model)
+        n = integrals.mode_count
+        _body_inertia(link, integrals, body[k], mode[k, :n], pair[k, :n, :n])
+        summed = range(len(integrals.turning.mass)) if link.level == a.FULL else range(0)
+        turning += [(integrals.turning, i) for i in summed]
+        counts.append(len(summed))
+    _group(body, "point", counts)
+    point = np.zeros(len(turning), a.POINT)
+    for row, (p, i) in zip(point, turning, strict=True):
+        row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
+        row["inertia"] = six(p.inertia[i])
+    shapes = _shapes([(p.translation[i], p.rotation[i]) for p, i in turning], m)
+    return {"body": body, "mode": mode, "pair": pair}, {"point": point, "point_mode": shapes}
+
+
+def _body_inertia(link: Link, i: ModalIntegrals, body: a.Record, mode: a.Record, pair: a.Record) -> None:
+    """One body: all its inertia at rest, or for level full the polynomial part."""
+    n = i.mode_count
+    if link.level == a.FULL:
+        body["rigid"] = [i.mass, *i.s0, *six(i.J0)]
+        pair["mff"], mode["mfr"] = i.M_ff, np.hstack([i.C0.T, i.s1.T])
+    else:
+        block = i.spatial_mass
+        rr = block[n:, n:]
+        body["rigid"] = [rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]
+        pair["mff"], mode["mfr"] = block[:n, :n], block[:n, n:]
+    mode["moment"] = _from_cross_products(i.J1).reshape(n, 9)
+    mode["gyration"] = _gyration(link.model)
+    pair["product"] = _from_cross_products(i.J2).reshape(n, n, 9)
+    pair["stiffness"], pair["damping"] = i.stiffness, i.damping
+
+
+def _from_cross_products(J: a.Real) -> a.Real:
+    """sum m a b' from sum m a~' b~ = (a.b) 1 - b a', over the leading axes."""
+    half_trace = 0.5 * np.trace(J, axis1=-2, axis2=-1)
+    return np.swapaxes(half_trace[..., None, None] * np.eye(3) - J, -1, -2)
+
+
+def _gyration(model: FlexibleModel) -> a.Real:
+    """B_n, symmetric: centrifugal force on mode n of the undeformed body, sum phi . (w x (w x r)) m + psi . (w x J w)."""
+    centre = model.position + model.com_offset
+    moves = model.translation + cross_matrix(model.com_offset).swapaxes(-1, -2) @ model.rotation
+    P = np.einsum("p,pan,pb->nab", model.mass, moves, centre)
+    B = P - np.trace(P, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    B = B - np.einsum("pnac,pcb->nab", cross_matrix(np.swapaxes(model.rotation, 1, 2)), model.inertia)
+    B = 0.5 * (B + np.swapaxes(B, 1, 2))
+    return np.array([six(b) for b in B]).reshape(-1, 6)

@@ -1,0 +1,122 @@
+"""Entry points of the compiled dynamics: right-hand side, projection, and everything observable at one state."""
+
+from flexmb.balance import energy_and_momentum, power
+from flexmb.jain import inverse
+from flexmb.jain.kinematics import (
+    acceleration_sweep,
+    configuration_rate,
+    load_state,
+    normalise_quaternions,
+    port_acceleration,
+    port_velocity,
+    pose_sweep,
+    velocity_sweep,
+)
+from flexmb.jain.sweeps import forward_dynamics
+from flexmb.functions import evaluate
+from flexmb.kernel import kernel
+from flexmb.loads import drive_loads, hinge_loads, wheel_load
+from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
+from flexmb.status import OK
+
+
+@kernel
+def rhs(t, y, dy, c, w):
+    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    load_state(t, y, c, w)
+    status = forward_dynamics(c, w)
+    if status != OK:
+        return status
+    drive_loads(c, w)
+    configuration_rate(y, dy, c, w)
+    nq = w.q.shape[0]
+    nu = w.u.shape[0]
+    for j in range(nu):
+        dy[nq + j] = w.speed[j].acceleration
+    dy[nq + nu] = power(c, w)
+    return OK
+
+
+@kernel
+def project(t, y, c):
+    """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
+    normalise_quaternions(y, c)
+    nu = c.speed.shape[0]
+    nq = y.shape[0] - nu - 1
+    for j in range(nu):
+        f = c.speed[j].prescribed
+        if f >= 0:
+            value, rate, _ = evaluate(
+                c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
+            )
+            y[c.speed[j].coordinate] = value
+            y[nq + j] = rate
+
+
+@kernel
+def accelerations(t, y, c, w):
+    """udot into w.acceleration; returns a status code."""
+    load_state(t, y, c, w)
+    return forward_dynamics(c, w)
+
+
+@kernel
+def inverse_dynamics(t, y, rates, c, w, tau):
+    """tau (nu,) = M rates + c: inertia, gravity, elasticity and node loads."""
+    load_state(t, y, c, w)
+    for j in range(rates.shape[0]):
+        w.speed[j].acceleration = rates[j]
+    inverse.inverse_dynamics(c, w, tau)
+
+
+@kernel
+def mass_matrix(t, y, c, w, M):
+    """M (nu,nu) at the configuration of y."""
+    load_state(t, y, c, w)
+    inverse.mass_matrix(c, w, M)
+
+
+@kernel
+def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, energy, momentum):
+    """Everything observable at one state; w.acceleration and w.drive are filled as well. Returns a status code.
+
+    markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6) and
+    wheel_loads (W,6): [torque; force] in World axes; energy (4,), momentum (6,) as in flexmb.balance.
+    """
+    load_state(t, y, c, w)
+    status = forward_dynamics(c, w)
+    if status != OK:
+        return status
+    hinge_loads(c, w)
+    drive_loads(c, w)
+    for k in range(c.body.shape[0]):
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            tau, f = wheel_load(c, w, k, i)
+            store3(wheel_loads[i], 0, tau)
+            store3(wheel_loads[i], 3, f)
+    pose_sweep(c, w)
+    energy_and_momentum(c, w, energy, momentum)
+    # markers move with the true deformation, also on bodies that the dynamics sees undeformed
+    velocity_sweep(c, w, True)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    for k in range(c.body.shape[0]):
+        R = mat3(w.body[k].pose_rotation, 0)
+        for i in (0, 3):
+            store3(loads[k], i, times(R, vec3(w.body[k].load, i)))
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            for n in (0, 3):
+                store3(wheel_loads[i], n, times(R, vec3(wheel_loads[i], n)))
+    for i in range(marker_port.shape[0]):
+        k = marker_body[i]
+        port = marker_port[i]
+        R = mat3(w.body[k].pose_rotation, 0)
+        omega, v = port_velocity(w, k, port)
+        alpha, a = port_acceleration(c, w, k, port)
+        store3(markers[i], 0, add(vec3(w.body[k].pose_position, 0), times(R, vec3(w.port[port].r, 0))))
+        store9(markers[i], 3, matmul(R, mat3(w.port[port].R, 0)))
+        store3(markers[i], 12, times(R, omega))
+        store3(markers[i], 15, times(R, v))
+        store3(markers[i], 18, times(R, alpha))
+        store3(markers[i], 21, add(times(R, a), vec3(c.gravity, 0)))
+    return OK

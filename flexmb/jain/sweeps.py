@@ -1,0 +1,326 @@
+"""Articulated-body forward dynamics of trees with rigid and flexible bodies, O(N): Jain & Rodriguez (63), (64).
+
+Per body the modes are eliminated first (explicit D_f by Cholesky), then the hinge. The dense Lemma-level operators are
+another room; here every quantity is a scalar tuple or a row of the workspace. Bodies are numbered base to tip, hence the
+inward sweep runs from N-1 to 0. Gravity enters as acceleration -g of the ground.
+"""
+
+from math import sqrt
+
+from flexmb.arrays import FULL, RUTHLESS
+from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
+from flexmb.jain.forces import elastic_forces, hinge_forces, node_loads, wheel_forces
+from flexmb.jain.kinematics import (
+    inboard_acceleration,
+    motion_column,
+    port_acceleration,
+    pose_sweep,
+    store_body_acceleration,
+    velocity_sweep,
+)
+from flexmb.kernel import helper
+from flexmb.levels import full, rigid, ruthless
+from flexmb.spatial.inertia import (
+    add_inertia,
+    inertia_column,
+    inertia_times,
+    load_inertia,
+    outer_inertia,
+    rotate_inertia,
+    shift_force,
+    shift_inertia,
+    store_inertia,
+    sum_inertia,
+)
+from flexmb.spatial.vector import add, add3, cross, dot, mat3, scale, store3, sub, times, vec3
+from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+
+SINGLE = -1  # free_count of a hinge with one free speed along z: no small matrices
+
+
+@helper
+def forward_dynamics(c, w):
+    """Accelerations udot into w.acceleration from the state in w.q, w.u; returns a status code."""
+    hinge_forces(c, w)
+    velocity_sweep(c, w, False)
+    if c.load.shape[0] > 0:
+        pose_sweep(c, w)
+    for k in range(c.body.shape[0]):
+        body_inertia(c, w, k)
+        elastic_forces(c, w, k)
+        node_loads(c, w, k)
+        wheel_forces(c, w, k)
+    for k in range(c.body.shape[0] - 1, -1, -1):
+        if not (_eliminate_modes(c, w, k) and _eliminate_hinge(c, w, k)):
+            w.fault[0] = k
+            return NOT_POSITIVE_DEFINITE
+    _outward(c, w)
+    return OK
+
+
+@helper
+def body_inertia(c, w, k):
+    """M_m and b_m of body k at its level."""
+    if c.body[k].level == FULL:
+        full.inertia_and_bias(c, w, k)
+    elif c.body[k].level == RUTHLESS:
+        ruthless.inertia_and_bias(c, w, k)
+    else:
+        rigid.inertia_and_bias(c, w, k)
+
+
+@helper
+def _eliminate_modes(c, w, k):
+    """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
+    nm = c.body[k].modes
+    if c.body[k].outboard_port >= 0:
+        _refer_to_hinge(c, w, k)
+    p = load_inertia(w.body[k].inertia, 0)
+    store_inertia(w.body[k].hinge_inertia, 0, p)
+    for i in range(6):
+        w.body[k].hinge_force[i] = w.body[k].force[i]
+    if nm == 0:
+        return True
+    if not cholesky(w.pff[k], nm):
+        return False
+    for n in range(nm):
+        for i in range(n):
+            w.mode[k, n].zf -= w.pff[k, n, i] * w.mode[k, i].zf
+            for b in range(6):
+                w.mode[k, n].pfr[b] -= w.pff[k, n, i] * w.mode[k, i].pfr[b]
+        s = 1.0 / w.pff[k, n, n]
+        w.mode[k, n].zf *= s
+        for b in range(6):
+            w.mode[k, n].pfr[b] *= s
+            w.body[k].hinge_force[b] -= w.mode[k, n].pfr[b] * w.mode[k, n].zf
+        add_inertia(
+            w.body[k].hinge_inertia, 0, outer_inertia(vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), -1.0)
+        )
+    return True
+
+
+@helper
+def cholesky(a, n):
+    """Lower Cholesky factor of a[:n,:n] in place; False where it is not positive definite (or NaN)."""
+    for j in range(n):
+        d = a[j, j]
+        for i in range(j):
+            d -= a[j, i] * a[j, i]
+        if not d > 0.0:
+            return False
+        d = sqrt(d)
+        a[j, j] = d
+        for m in range(j + 1, n):
+            s = a[m, j]
+            for i in range(j):
+                s -= a[m, i] * a[j, i]
+            a[m, j] = s / d
+    return True
+
+
+@helper
+def _refer_to_hinge(c, w, k):
+    """Refer P and z from the body origin to O on the deforming node d: the congruence with H_f of (13), (17).
+
+    With V_body = X V_O - B etadot, B = X [W; L], X the shift from O to the origin: P_ff - B'P_rf - P_fr B + B'P_rr B,
+    (P_fr - B'P_rr) X, X'P_rr X; z_f - B'z_r, X'z_r.
+    """
+    nm = c.body[k].modes
+    i = c.body[k].outboard_port
+    r = vec3(w.port[i].r, 0)
+    p = load_inertia(w.body[k].inertia, 0)
+    tau, f = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
+    for n in range(nm):
+        angular = vec3(w.port_mode[i, n].W, 0)
+        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+        w.mode[k, n].zf -= dot(angular, tau) + dot(linear, f)
+        momentum = inertia_times(p, angular, linear)
+        for m in range(nm):
+            angular_m = vec3(w.port_mode[i, m].W, 0)
+            linear_m = sub(vec3(w.port_mode[i, m].L, 0), cross(angular_m, r))
+            across = dot(angular, vec3(w.mode[k, m].pfr, 0)) + dot(linear, vec3(w.mode[k, m].pfr, 3))
+            w.pff[k, n, m] += dot(momentum[0], angular_m) + dot(momentum[1], linear_m) - across
+            w.pff[k, m, n] -= across
+    back = scale(-1.0, r)
+    for n in range(nm):
+        angular = vec3(w.port_mode[i, n].W, 0)
+        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+        momentum = inertia_times(p, angular, linear)
+        tau_n = sub(vec3(w.mode[k, n].pfr, 0), momentum[0])
+        f_n = sub(vec3(w.mode[k, n].pfr, 3), momentum[1])
+        tau_n, f_n = shift_force(tau_n, f_n, back)
+        store3(w.mode[k, n].pfr, 0, tau_n)
+        store3(w.mode[k, n].pfr, 3, f_n)
+    store_inertia(w.body[k].inertia, 0, shift_inertia(p, back))
+    tau, f = shift_force(tau, f, back)
+    store3(w.body[k].force, 0, tau)
+    store3(w.body[k].force, 3, f)
+
+
+@helper
+def _eliminate_hinge(c, w, k):
+    """D_R, G_R, P_R^+ and z_R^+ of (63), (64); hands both to the parent. Prescribed speeds act as bias, not as freedom."""
+    p = load_inertia(w.body[k].hinge_inertia, 0)
+    kind = c.body[k].hinge_kind
+    j = c.body[k].u_index
+    single = (kind == REVOLUTE or kind == PRISMATIC) and c.body[k].outboard_port < 0
+    for n in range(c.body[k].nv):
+        f = c.speed[j + n].prescribed
+        if f >= 0:
+            angular, linear = motion_column(c, w, k, n)
+            w.speed[j + n].acceleration = w.function[f, 2]
+            add3(w.body[k].bias, 0, scale(w.function[f, 2], angular))
+            add3(w.body[k].bias, 3, scale(w.function[f, 2], linear))
+    moved = inertia_times(p, vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3))
+    tau = add(vec3(w.body[k].hinge_force, 0), moved[0])
+    f = add(vec3(w.body[k].hinge_force, 3), moved[1])
+    if single and c.speed[j].prescribed < 0:
+        # the axis is z: H picks one row
+        row = 2 if kind == REVOLUTE else 5
+        u_angular, u_linear = inertia_column(p, row)
+        d = u_angular[2] if kind == REVOLUTE else u_linear[2]
+        if not d > 0.0:
+            return False
+        epsilon = w.speed[j].applied - (tau[2] if kind == REVOLUTE else f[2])
+        s = 1.0 / d
+        w.body[k].free_count = SINGLE
+        w.body[k].hinge_residual[0] = epsilon * s
+        store3(w.body[k].hinge_gain[0], 0, scale(s, u_angular))
+        store3(w.body[k].hinge_gain[0], 3, scale(s, u_linear))
+        tau = add(tau, scale(epsilon * s, u_angular))
+        f = add(f, scale(epsilon * s, u_linear))
+        if c.body[k].parent >= 0:
+            _to_parent(c, w, k, sum_inertia(p, outer_inertia(u_angular, u_linear, -s)), tau, f)
+        return True
+    return _eliminate_several(c, w, k, p, tau, f)
+
+
+@helper
+def _eliminate_several(c, w, k, p, tau, f):
+    """The general hinge: D_R = L L' over its free speeds; gains are kept as L^-1 (P_R H)'."""
+    j = c.body[k].u_index
+    free = 0
+    for n in range(c.body[k].nv):
+        if c.speed[j + n].prescribed < 0:
+            w.body[k].free_speed[free] = n
+            free += 1
+    w.body[k].free_count = free
+    store_inertia(w.body[k].inertia, 0, p)
+    D = w.body[k].hinge_factor
+    G = w.body[k].hinge_gain
+    for a in range(free):
+        n = w.body[k].free_speed[a]
+        angular, linear = motion_column(c, w, k, n)
+        u_angular, u_linear = inertia_times(p, angular, linear)
+        store3(G[a], 0, u_angular)
+        store3(G[a], 3, u_linear)
+        w.body[k].hinge_residual[a] = w.speed[j + n].applied - dot(angular, tau) - dot(linear, f)
+        for b in range(a + 1):
+            angular_b, linear_b = motion_column(c, w, k, w.body[k].free_speed[b])
+            D[a, b] = dot(u_angular, angular_b) + dot(u_linear, linear_b)
+    if not cholesky(D, free):
+        return False
+    for a in range(free):
+        for b in range(a):
+            w.body[k].hinge_residual[a] -= D[a, b] * w.body[k].hinge_residual[b]
+            for i in range(6):
+                G[a, i] -= D[a, b] * G[b, i]
+        s = 1.0 / D[a, a]
+        w.body[k].hinge_residual[a] *= s
+        for i in range(6):
+            G[a, i] *= s
+        u_angular, u_linear = vec3(G[a], 0), vec3(G[a], 3)
+        add_inertia(w.body[k].inertia, 0, outer_inertia(u_angular, u_linear, -1.0))
+        tau = add(tau, scale(w.body[k].hinge_residual[a], u_angular))
+        f = add(f, scale(w.body[k].hinge_residual[a], u_linear))
+    if c.body[k].parent >= 0:
+        _to_parent(c, w, k, load_inertia(w.body[k].inertia, 0), tau, f)
+    return True
+
+
+@helper
+def _to_parent(c, w, k, p, tau, f):
+    """Gamma = P_R^+ in parent axes at the parent's reference; P += A Gamma A', z += A z_R^+ with A = [Pi'; phi]."""
+    parent = c.body[k].parent
+    R = mat3(w.body[k].rotation, 0)
+    arm = vec3(w.body[k].arm, 0)
+    gamma = shift_inertia(rotate_inertia(R, p), arm)
+    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    i = c.body[k].inboard_port
+    if i >= 0:
+        r = vec3(w.port[i].r, 0)
+        nm = c.body[parent].modes
+        for n in range(nm):
+            angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+            tau_n, f_n = inertia_times(gamma, angular, linear)
+            for m in range(nm):
+                w.pff[parent, n, m] += dot(tau_n, vec3(w.port_mode[i, m].W, 0)) + dot(f_n, vec3(w.port_mode[i, m].L, 0))
+            tau_n, f_n = shift_force(tau_n, f_n, r)
+            add3(w.mode[parent, n].pfr, 0, tau_n)
+            add3(w.mode[parent, n].pfr, 3, f_n)
+            w.mode[parent, n].zf += dot(angular, tau) + dot(linear, f)
+        gamma = shift_inertia(gamma, r)
+        tau, f = shift_force(tau, f, r)
+    add_inertia(w.body[parent].inertia, 0, gamma)
+    add3(w.body[parent].force, 0, tau)
+    add3(w.body[parent].force, 3, f)
+
+
+@helper
+def _outward(c, w):
+    """Outward half of (64): udot, modal accelerations, loads across hinges, drive loads, wheel accelerations."""
+    for k in range(c.body.shape[0]):
+        alpha, a = inboard_acceleration(c, w, k)
+        alpha, a = _hinge_acceleration(c, w, k, alpha, a)
+        # back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha)
+        for n in range(c.body[k].modes - 1, -1, -1):
+            s = w.mode[k, n].zf + dot(vec3(w.mode[k, n].pfr, 0), alpha) + dot(vec3(w.mode[k, n].pfr, 3), a)
+            for i in range(n + 1, c.body[k].modes):
+                s += w.pff[k, i, n] * w.mode[k, i].etadd
+            w.mode[k, n].etadd = -s / w.pff[k, n, n]
+            w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd
+        store_body_acceleration(c, w, k, alpha, a)
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            _wheel_acceleration(c, w, k, i)
+
+
+@helper
+def _hinge_acceleration(c, w, k, alpha, a):
+    """Rates of the hinge's free speeds from alpha^+ = Phi' alpha_m; returns alpha^+ + H udot + a_m."""
+    j = c.body[k].u_index
+    free = w.body[k].free_count
+    G = w.body[k].hinge_gain
+    full_alpha = add(alpha, vec3(w.body[k].bias, 0))
+    full_a = add(a, vec3(w.body[k].bias, 3))
+    if free == SINGLE:
+        rate = w.body[k].hinge_residual[0] - dot(vec3(G[0], 0), alpha) - dot(vec3(G[0], 3), a)
+        w.speed[j].acceleration = rate
+        if c.body[k].hinge_kind == REVOLUTE:
+            return (full_alpha[0], full_alpha[1], full_alpha[2] + rate), full_a
+        return full_alpha, (full_a[0], full_a[1], full_a[2] + rate)
+    D = w.body[k].hinge_factor
+    for n in range(free - 1, -1, -1):
+        s = w.body[k].hinge_residual[n] - dot(vec3(G[n], 0), alpha) - dot(vec3(G[n], 3), a)
+        for i in range(n + 1, free):
+            s -= D[i, n] * w.speed[j + w.body[k].free_speed[i]].acceleration
+        w.speed[j + w.body[k].free_speed[n]].acceleration = s / D[n, n]
+    for n in range(free):
+        angular, linear = motion_column(c, w, k, w.body[k].free_speed[n])
+        rate = w.speed[j + w.body[k].free_speed[n]].acceleration
+        full_alpha = add(full_alpha, scale(rate, angular))
+        full_a = add(full_a, scale(rate, linear))
+    return full_alpha, full_a
+
+
+@helper
+def _wheel_acceleration(c, w, k, i):
+    """I (thetadd + q . alpha_node) = torque: the rate of a free wheel."""
+    j = c.wheel[i].u_index
+    f = c.speed[j].prescribed
+    if f >= 0:
+        w.speed[j].acceleration = w.function[f, 2]
+        return
+    port = c.wheel[i].port
+    axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
+    alpha, _ = port_acceleration(c, w, k, port)
+    w.speed[j].acceleration = w.speed[j].applied / c.wheel[i].axial - dot(axis, alpha)

@@ -1,0 +1,18 @@
+"""Level ruthless (Jain & Rodriguez, Appendix B): M_m at eta = 0, b_m at eta = etadot = 0."""
+
+from flexmb.kernel import helper
+from flexmb.levels import rigid
+from flexmb.spatial.vector import dot, sym6, sym_times, vec3
+
+
+@helper
+def inertia_and_bias(c, w, k):
+    """The rigid body at rest shape, constant modal blocks, and the centrifugal force w' B_n w on each mode."""
+    rigid.inertia_and_bias(c, w, k)
+    omega = vec3(w.body[k].velocity, 0)
+    for n in range(c.body[k].modes):
+        for i in range(c.body[k].modes):
+            w.pff[k, n, i] = c.pair[k, n, i].mff
+        for i in range(6):
+            w.mode[k, n].pfr[i] = c.mode[k, n].mfr[i]
+        w.mode[k, n].zf = dot(omega, sym_times(sym6(c.mode[k, n].gyration, 0), omega))

@@ -1,0 +1,188 @@
+"""Spatial inertias as scalar tuples: symmetric 6x6 matrices [[A, B], [B', C]], angular block first.
+
+Stored as 21 numbers: A (6, symmetric), B (9), C (6, symmetric). With V = [w; v] at a point, 2T = V' P V.
+"""
+
+from flexmb.kernel import helper
+from flexmb.spatial.vector import (
+    add,
+    cross,
+    mat3,
+    rotate_mat,
+    rotate_sym,
+    sym6,
+    sym_add,
+    sym_times,
+    times,
+    times_t,
+)
+
+
+@helper
+def load_inertia(a, i):
+    """Elements i .. i+20 of a 1-D array."""
+    return sym6(a, i), mat3(a, i + 6), sym6(a, i + 15)
+
+
+@helper
+def store_inertia(a, i, p):
+    for n in range(6):
+        a[i + n] = p[0][n]
+        a[i + 15 + n] = p[2][n]
+    for n in range(9):
+        a[i + 6 + n] = p[1][n]
+
+
+@helper
+def add_inertia(a, i, p):
+    for n in range(6):
+        a[i + n] += p[0][n]
+        a[i + 15 + n] += p[2][n]
+    for n in range(9):
+        a[i + 6 + n] += p[1][n]
+
+
+@helper
+def sum_inertia(p, q):
+    """P + Q."""
+    b, d = p[1], q[1]
+    middle = (
+        b[0] + d[0],
+        b[1] + d[1],
+        b[2] + d[2],
+        b[3] + d[3],
+        b[4] + d[4],
+        b[5] + d[5],
+        b[6] + d[6],
+        b[7] + d[7],
+        b[8] + d[8],
+    )
+    return sym_add(p[0], q[0]), middle, sym_add(p[2], q[2])
+
+
+@helper
+def rigid_inertia(m, s, j):
+    """Spatial inertia of a rigid body: mass m, first moment s = m c, inertia j (6) about the reference point."""
+    return j, (0.0, -s[2], s[1], s[2], 0.0, -s[0], -s[1], s[0], 0.0), (m, m, m, 0.0, 0.0, 0.0)
+
+
+@helper
+def rotate_inertia(r, p):
+    """Components in axes A from components in axes B with r = R_AB."""
+    return rotate_sym(r, p[0]), rotate_mat(r, p[1]), rotate_sym(r, p[2])
+
+
+@helper
+def _cross_sym(p, c):
+    """skew(p) C for a symmetric 6-tuple C, as a 9-tuple."""
+    x, y, z = p
+    return (
+        y * c[4] - z * c[3],
+        y * c[5] - z * c[1],
+        y * c[2] - z * c[5],
+        z * c[0] - x * c[4],
+        z * c[3] - x * c[5],
+        z * c[4] - x * c[2],
+        x * c[3] - y * c[0],
+        x * c[1] - y * c[3],
+        x * c[5] - y * c[4],
+    )
+
+
+@helper
+def _times_cross(m, p):
+    """M skew(p)."""
+    x, y, z = p
+    return (
+        m[1] * z - m[2] * y,
+        m[2] * x - m[0] * z,
+        m[0] * y - m[1] * x,
+        m[4] * z - m[5] * y,
+        m[5] * x - m[3] * z,
+        m[3] * y - m[4] * x,
+        m[7] * z - m[8] * y,
+        m[8] * x - m[6] * z,
+        m[6] * y - m[7] * x,
+    )
+
+
+@helper
+def shift_inertia(p, d):
+    """phi P phi': inertia about Q of a body known about O, with d from Q to O (same axes).
+
+    C_Q = C, B_Q = B + skew(d) C, A_Q = A - B skew(d) - (B skew(d))' - skew(d) C skew(d).
+    """
+    a, b, c = p
+    dc = _cross_sym(d, c)
+    bq = (
+        b[0] + dc[0],
+        b[1] + dc[1],
+        b[2] + dc[2],
+        b[3] + dc[3],
+        b[4] + dc[4],
+        b[5] + dc[5],
+        b[6] + dc[6],
+        b[7] + dc[7],
+        b[8] + dc[8],
+    )
+    # A_Q = A - B_Q skew(d) - (B skew(d))'
+    m = _times_cross(bq, d)
+    n = _times_cross(b, d)
+    aq = (
+        a[0] - m[0] - n[0],
+        a[1] - m[4] - n[4],
+        a[2] - m[8] - n[8],
+        a[3] - m[1] - n[3],
+        a[4] - m[2] - n[6],
+        a[5] - m[5] - n[7],
+    )
+    return aq, bq, c
+
+
+@helper
+def inertia_times(p, w, v):
+    """P [w; v] as a pair (torque, force)."""
+    return add(sym_times(p[0], w), times(p[1], v)), add(times_t(p[1], w), sym_times(p[2], v))
+
+
+@helper
+def outer_inertia(x, y, s):
+    """s [x; y] [x; y]' as a spatial inertia."""
+    return (
+        (s * x[0] * x[0], s * x[1] * x[1], s * x[2] * x[2], s * x[0] * x[1], s * x[0] * x[2], s * x[1] * x[2]),
+        (
+            s * x[0] * y[0],
+            s * x[0] * y[1],
+            s * x[0] * y[2],
+            s * x[1] * y[0],
+            s * x[1] * y[1],
+            s * x[1] * y[2],
+            s * x[2] * y[0],
+            s * x[2] * y[1],
+            s * x[2] * y[2],
+        ),
+        (s * y[0] * y[0], s * y[1] * y[1], s * y[2] * y[2], s * y[0] * y[1], s * y[0] * y[2], s * y[1] * y[2]),
+    )
+
+
+@helper
+def shift_force(tau, f, d):
+    """phi F: torque about Q of a force known about O, with d from Q to O."""
+    return add(tau, cross(d, f)), f
+
+
+@helper
+def inertia_column(p, j):
+    """Column j of the 6x6 matrix as (torque, force)."""
+    a, b, c = p
+    if j == 0:
+        return (a[0], a[3], a[4]), (b[0], b[1], b[2])
+    if j == 1:
+        return (a[3], a[1], a[5]), (b[3], b[4], b[5])
+    if j == 2:
+        return (a[4], a[5], a[2]), (b[6], b[7], b[8])
+    if j == 3:
+        return (b[0], b[3], b[6]), (c[0], c[3], c[4])
+    if j == 4:
+        return (b[1], b[4], b[7]), (c[3], c[1], c[5])
+    return (b[2], b[5], b[8]), (c[4], c[5], c[2])

@@ -1,0 +1,295 @@
+"""A compiled scene: its arrays, its state vectors, and pointwise mechanics.
+
+    system = compile(scene)
+    state = system.initial_state
+    acc = system.accelerations(state)
+
+q holds, body by body (depth-first, point masses last), hinge coordinates, modal coordinates and wheel angles; u the
+speeds in the same order. `system.coordinate(name)` and `system.speed(name)` give the places of a hinge, "<body>.hinge",
+"<body>.modes", a wheel or a point mass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flexmb import arrays, dynamics
+from flexmb.arrays import Constants, Real, Workspace
+from flexmb.assemble import Numbering, assemble, group
+from flexmb.links import Link, links
+from flexmb.scene import schema as s
+from flexmb.scene.check import check_scene
+from flexmb.status import OK, Status
+
+Algorithm = Literal["articulated", "composite"]
+ENERGIES = ("kinetic", "strain", "spring", "gravity")
+
+
+class State:
+    """Coordinates q (nq,), speeds u (nu,) and time t (s)."""
+
+    def __init__(self, q: Real, u: Real, t: float = 0.0) -> None:
+        self.q, self.u, self.t = q, u, t
+
+
+@dataclass(frozen=True)
+class MarkerMotion:
+    """World axes: position (3,), rotation (3,3) marker -> World, velocity and classical acceleration (6,) [w; v]."""
+
+    position: Real
+    rotation: Real
+    velocity: Real
+    acceleration: Real
+
+    @property
+    def quaternion(self) -> Real:
+        """Scalar first, unit."""
+        return Rotation.from_matrix(self.rotation).as_quat(scalar_first=True, canonical=True)
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Everything observable at one state.
+
+    accelerations (nu,); markers by name; loads by hinge (6,) [torque; force] on the outboard body about the outboard
+    hinge point, World axes; wheel_loads by wheel (6,) about its centre; drives by hinge, point mass or wheel (k,), one
+    for each prescribed coordinate; energy by kind (J); momentum (6,) [angular about the World origin; linear].
+    """
+
+    accelerations: Real
+    markers: dict[str, MarkerMotion]
+    loads: dict[str, Real]
+    wheel_loads: dict[str, Real]
+    drives: dict[str, Real]
+    energy: dict[str, float]
+    momentum: Real
+
+
+class DynamicsError(ArithmeticError):
+    """The accelerations do not exist at this state; the message names the body and the remedy."""
+
+
+class System:
+    """A scene turned into arrays; made by `compile`. Not safe to share between threads: it owns one workspace."""
+
+    def __init__(self, scene: s.Scene) -> None:
+        self.scene = scene
+        self._links = links(scene)
+        self._wheels = group(scene.wheels, "body")
+        self._numbering = Numbering(self._links, self._wheels)
+        self.constants, self._markers = assemble(scene, self._links, self._numbering)
+        self.nq, self.nu = self._numbering.nq, self._numbering.nu
+        self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
+        self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
+        self._w = self.workspace()
+        self.rhs, self.project = dynamics.rhs, dynamics.project
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Bodies in the order of the dynamics, point masses last."""
+        return tuple(link.name for link in self._links)
+
+    def coordinate(self, name: str) -> slice:
+        """Place in q of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self._numbering.q, name)
+
+    def speed(self, name: str) -> slice:
+        """Place in u of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self._numbering.u, name)
+
+    def state(self, q: Real, u: Real, t: float = 0.0) -> State:
+        """State from q (nq,) and u (nu,); ValueError where lengths do not fit."""
+        q, u = np.array(q, float), np.array(u, float)
+        if q.shape != (self.nq,) or u.shape != (self.nu,):
+            raise ValueError(f"this system has q of {self.nq} and u of {self.nu} entries, got {q.shape} and {u.shape}")
+        return State(q, u, t)
+
+    @property
+    def initial_state(self) -> State:
+        """The scene's state at t = 0; prescribed coordinates have their functions' values."""
+        q, u = np.zeros(self.nq), np.zeros(self.nu)
+        for link in self._links:
+            _initial_hinge(link, q[self.coordinate(link.hinge.name)], u[self.speed(link.hinge.name)])
+        for wheel in self.scene.wheels:
+            q[self.coordinate(wheel.name)], u[self.speed(wheel.name)] = wheel.angle_rad, wheel.speed_rad_s
+        for modal in self.scene.modal_states:
+            name = f"{modal.body}.modes"
+            if self.coordinate(name).stop > self.coordinate(name).start:
+                q[self.coordinate(name)] = modal.coordinates
+                u[self.speed(name)] = modal.rates or 0.0
+        y = np.concatenate([q, u, [0.0]])
+        self.project(0.0, y, self.constants)
+        return State(y[: self.nq], y[self.nq : -1])
+
+    def workspace(self) -> Workspace:
+        """A fresh workspace for `rhs`; one per thread."""
+        return _workspace(self.constants, self.nq, self.nu)
+
+    def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
+        """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
+
+        "articulated": the O(N) recursion; "composite": mass matrix and inverse dynamics, partitioned for prescribed
+        speeds. Raises DynamicsError where an inertia is not positive definite.
+        """
+        if algorithm not in get_args(Algorithm):
+            raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
+        self._check(dynamics.accelerations(state.t, _pack(state), self.constants, self._w))
+        if algorithm == "composite":
+            return self._composite(state, self._w.speed["acceleration"].copy(), self._w.speed["applied"].copy())
+        return self._w.speed["acceleration"].copy()
+
+    def _composite(self, state: State, rates: Real, applied: Real) -> Real:
+        fixed = self.constants.speed["prescribed"] >= 0
+        free = ~fixed
+        M, c = self.mass_matrix(state), self.bias(state)
+        right = applied - c - M[:, fixed] @ rates[fixed]
+        rates[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
+        return rates
+
+    def mass_matrix(self, state: State) -> Real:
+        """M (nu,nu)."""
+        M = np.zeros((self.nu, self.nu))
+        dynamics.mass_matrix(state.t, _pack(state), self.constants, self._w, M)
+        return M
+
+    def bias(self, state: State) -> Real:
+        """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
+        return self.inverse_dynamics(state, np.zeros(self.nu))
+
+    def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
+        """tau (nu,) = M udot + c. Modal rows vanish where the accelerations are those of an undriven structure."""
+        tau = np.zeros(self.nu)
+        dynamics.inverse_dynamics(state.t, _pack(state), np.asarray(accelerations), self.constants, self._w, tau)
+        return tau
+
+    def applied(self, state: State) -> Real:
+        """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
+        self._check(dynamics.accelerations(state.t, _pack(state), self.constants, self._w))
+        return self._w.speed["applied"].copy()
+
+    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
+
+        `accelerations` are those of the free motion at this state, or None: the recursion finds them either way.
+        """
+        if accelerations is not None:
+            residual = self.inverse_dynamics(state, accelerations) - self.applied(state)
+            free = self.constants.speed["prescribed"] < 0
+            scale = np.abs(self.mass_matrix(state)) @ np.abs(accelerations) + np.abs(self.bias(state))
+            if np.any(np.abs(residual[free]) > 1e-6 * (scale[free] + np.finfo(float).tiny)):
+                raise ValueError("these accelerations are not those of the motion at this state: see inverse_dynamics")
+        return self.evaluate(state.t, state.q, state.u).loads
+
+    def energy(self, state: State) -> dict[str, float]:
+        """Kinetic, strain, spring and gravity energy (J)."""
+        return self.evaluate(state.t, state.q, state.u).energy
+
+    def momentum(self, state: State) -> Real:
+        """(6,) [angular about the World origin; linear], World axes."""
+        return self.evaluate(state.t, state.q, state.u).momentum
+
+    def evaluate(self, t: float, q: Real, u: Real) -> Evaluation:
+        """Everything observable at one state; DynamicsError where the accelerations do not exist."""
+        c, w = self.constants, self._w
+        markers, loads = np.zeros((len(self._markers), 24)), np.zeros((len(self._links), 6))
+        wheel_loads, energy, momentum = np.zeros((len(c.wheel), 6)), np.zeros(4), np.zeros(6)
+        y = np.concatenate([q, u, [0.0]])
+        self._check(
+            dynamics.observe(
+                t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
+            )
+        )
+        return Evaluation(
+            accelerations=w.speed["acceleration"].copy(),
+            markers={
+                name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
+                for name, row in zip(self._markers, markers, strict=True)
+            },
+            loads={link.hinge.name: loads[k] for k, link in enumerate(self._links)},
+            wheel_loads=dict(zip(self._wheel_names, wheel_loads, strict=True)),
+            drives=self._drives(w.speed["drive"]),
+            energy=dict(zip(ENERGIES, energy.tolist(), strict=True)),
+            momentum=momentum,
+        )
+
+    @property
+    def _wheel_names(self) -> list[str]:
+        return [wheel.name for link in self._links for wheel in self._wheels.get(link.name, ())]
+
+    def _drives(self, drive: Real) -> dict[str, Real]:
+        found = {}
+        for name in [*(link.hinge.name for link in self._links), *self._wheel_names]:
+            place = self.speed(name)
+            driven = self.constants.speed["prescribed"][place] >= 0
+            if np.any(driven):
+                found[name] = drive[place][driven].copy()
+        return found
+
+    def _check(self, status: int) -> None:
+        if status != OK:
+            body = self.body_names[int(self._w.fault[0])]
+            raise DynamicsError(Status(status).advice.format(body=f'"{body}"'))
+
+
+def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as flexmb.compile)
+    """Check a scene and turn it into arrays.
+
+    Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
+    supported yet (loop closures, SID files, levels "linear" and "stiffened").
+    """
+    check_scene(scene)
+    if scene.closures:
+        raise NotImplementedError(f'closure "{scene.closures[0].name}": loop closures are not supported yet')
+    return System(scene)
+
+
+def _find(places: dict[str, slice], name: str) -> slice:
+    if name not in places:
+        raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
+    return places[name]
+
+
+def _pack(state: State) -> Real:
+    """y = [q, u, work]."""
+    return np.concatenate([state.q, state.u, [0.0]])
+
+
+def _initial_hinge(link: Link, q: Real, u: Real) -> None:
+    """Initial coordinates and speeds of one hinge, in place."""
+    match link.hinge:
+        case s.Spherical(quaternion=quaternion, angular_velocity_rad_s=w):
+            q[:], u[:] = quaternion, w
+        case s.Free(position_m=p, quaternion=quaternion, angular_velocity_rad_s=w, velocity_m_s=v):
+            q[:], u[:] = (*p, *quaternion), (*w, *v)
+        case _:
+            for n, (_, c) in enumerate(link.scalar):
+                if isinstance(c, s.AngularCoordinate):
+                    q[n], u[n] = c.angle_rad, c.rate_rad_s
+                else:
+                    q[n], u[n] = c.position_m, c.rate_m_s
+
+
+def _workspace(c: Constants, nq: int, nu: int) -> Workspace:
+    """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
+    n, m = c.mode.shape
+    w = Workspace(
+        q=np.zeros(nq),
+        u=np.zeros(nu),
+        ground=-c.gravity,
+        body=np.zeros(n, arrays.BODY_STATE),
+        mode=np.zeros((n, m), arrays.MODE_STATE),
+        pff=np.zeros((n, m, m)),
+        port=np.zeros(len(c.port), arrays.PORT_STATE),
+        port_mode=np.zeros((len(c.port), m), arrays.COLUMN),
+        point_mode=np.zeros(m, arrays.COLUMN),
+        speed=np.zeros(nu, arrays.SPEED_STATE),
+        function=np.zeros((len(c.function), 3)),
+        fault=np.zeros(1, np.int64),
+    )
+    w.port["r"] = c.port["position"] + c.port["offset"]
+    w.port["R"] = c.port["frame"]
+    return w
