@@ -1,4 +1,4 @@
-"""Compilation of kernels: the only file that names numba.
+"""Compilation of kernels: with `bundle.py`, the only file that names numba.
 
 `kernel` marks an entry point: compiled for the argument types of its first call, callable from Python, cached on disk.
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper and

@@ -1,0 +1,120 @@
+"""Many arrays as one argument of a kernel: a class of named arrays whose address is all that is passed.
+
+A kernel that takes a NamedTuple of sixty arrays hands a thousand words to each function it calls, and counts references
+to every array it touches. That costs far more than the mechanics, to compile and to run. A bundle is one pointer to a
+table of addresses and shapes. Its arrays are borrowed: whoever calls the kernel holds the bundle, hence its arrays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, fields
+from typing import Any, TypeVar, dataclass_transform
+
+import numpy as np
+from llvmlite import ir
+from numba import from_dtype, types
+from numba.core import cgutils
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
+from numba.np.arrayobj import populate_array
+
+Class = TypeVar("Class", bound=type)
+
+_DIMENSIONS = 4  # the most an array of a bundle may have
+_ROW = 1 + _DIMENSIONS  # words of the table for one array: address, shape
+
+
+@dataclass_transform(frozen_default=True)
+def bundle(cls: Class) -> Class:
+    """Make a class of annotated arrays a frozen dataclass that kernels take as one argument.
+
+    Inside a kernel `b.name` is the array; in Python too. The arrays must be C-contiguous; kernels may write to them.
+    """
+    cls.__post_init__ = _describe  # type: ignore[attr-defined]
+    cls.__reduce__ = _reduce  # type: ignore[method-assign]
+    return dataclass(frozen=True, eq=False)(cls)
+
+
+def _describe(self: Any) -> None:
+    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers."""
+    names = [field.name for field in fields(self)]
+    table, kinds = np.zeros((len(names), _ROW), np.int64), []
+    for name, row in zip(names, table, strict=True):
+        array = getattr(self, name)
+        if not array.flags.c_contiguous or array.ndim > _DIMENSIONS:
+            raise ValueError(f"{name}: a bundle holds C-contiguous arrays of at most {_DIMENSIONS} dimensions")
+        row[0] = array.ctypes.data
+        row[1 : 1 + array.ndim] = array.shape
+        kinds.append((name, types.Array(from_dtype(array.dtype), array.ndim, "C")))
+    object.__setattr__(self, "_table", table)
+    object.__setattr__(self, "_address", table.ctypes.data)
+    object.__setattr__(self, "_numba_type_", BundleType(type(self).__qualname__, tuple(kinds)))
+
+
+def _reduce(self: Any) -> tuple[Any, ...]:
+    """Pickle the arrays only: addresses are of one process."""
+    return type(self), tuple(getattr(self, field.name) for field in fields(self))
+
+
+class BundleType(types.Type):
+    """Type of a bundle: the names and types of its arrays. Its name is short, for it is part of every symbol."""
+
+    def __init__(self, name: str, kinds: tuple[tuple[str, types.Array], ...]) -> None:
+        self.kinds = kinds
+        digest = hashlib.sha256(repr([(key, str(kind)) for key, kind in kinds]).encode()).hexdigest()[:8]
+        super().__init__(name=f"{name}_{digest}")
+
+    def place(self, name: str) -> int:
+        """Row of an array in the table."""
+        return [key for key, _ in self.kinds].index(name)
+
+
+register_model(BundleType)(models.OpaqueModel)
+
+
+@unbox(BundleType)
+def _unbox(typ, obj, c):
+    """A bundle enters a kernel as the address of its table."""
+    address = c.pyapi.object_getattr_string(obj, "_address")
+    pointer = c.pyapi.long_as_voidptr(address)
+    c.pyapi.decref(address)
+    return NativeValue(pointer, is_error=cgutils.is_not_null(c.builder, c.pyapi.err_occurred()))
+
+
+@infer_getattr
+class _BundleAttribute(AttributeTemplate):
+    key = BundleType
+
+    def generic_resolve(self, typ, attr):
+        return dict(typ.kinds).get(attr)
+
+
+@lower_getattr_generic(BundleType)
+def _array_of(context, builder, typ, value, attr):
+    """Build the array structure from its row; "invariant" lets LLVM load each address once per function."""
+    place = typ.place(attr)
+    kind = typ.kinds[place][1]
+    word = ir.IntType(64)
+    table = builder.bitcast(value, word.as_pointer())
+
+    def load(column):
+        loaded = builder.load(builder.gep(table, [word(place * _ROW + column)]))
+        loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
+        return loaded
+
+    array = context.make_array(kind)(context, builder)
+    shape = [load(1 + i) for i in range(kind.ndim)]
+    itemsize = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    strides = [itemsize]
+    for extent in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], extent))
+    populate_array(
+        array,
+        data=builder.inttoptr(load(0), array.data.type),
+        shape=cgutils.pack_array(builder, shape, ty=word),
+        strides=cgutils.pack_array(builder, strides, ty=word),
+        itemsize=itemsize,
+        meminfo=None,
+    )
+    return array._getvalue()

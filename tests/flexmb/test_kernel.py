@@ -1,0 +1,100 @@
+"""Bundles of arrays, and the disk cache that must not survive an edit."""
+
+import os
+import pickle
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexmb.kernel
+from flexmb.bundle import bundle
+from flexmb.kernel import helper, kernel, source_hash
+
+
+@bundle
+class Pair:
+    values: np.ndarray  # (n, 3)
+    counts: np.ndarray  # (m,)
+
+
+@helper
+def scaled(pair, i, factor):
+    return factor * pair.values[i, 2]
+
+
+@kernel
+def fill(pair, factor):
+    """Doubles the counts; returns the sum of the last column times `factor`."""
+    total = 0.0
+    for i in range(pair.values.shape[0]):
+        total += scaled(pair, i, factor)
+    for i in range(pair.counts.shape[0]):
+        pair.counts[i] *= 2
+    return total
+
+
+def pair(rows: int = 4) -> Pair:
+    return Pair(values=np.arange(3.0 * rows).reshape(rows, 3), counts=np.arange(5))
+
+
+@pytest.mark.parametrize("rows", [4, 7])
+def test_kernels_read_and_write_the_arrays_of_a_bundle(rows):
+    arrays = pair(rows)
+    assert fill(arrays, 2.0) == 2.0 * arrays.values[:, 2].sum()
+    assert arrays.counts.tolist() == [0, 2, 4, 6, 8]
+
+
+def test_a_pickled_bundle_has_its_own_arrays():
+    original = pair()
+    copied = pickle.loads(pickle.dumps(original))
+    fill(copied, 1.0)
+    assert original.counts.tolist() == [0, 1, 2, 3, 4]
+    assert copied.counts.tolist() == [0, 2, 4, 6, 8]
+
+
+def test_bundles_refuse_arrays_they_cannot_describe():
+    with pytest.raises(ValueError, match="values: a bundle holds C-contiguous arrays"):
+        Pair(values=np.zeros((4, 6))[:, ::2], counts=np.zeros(2))
+
+
+def test_any_edit_of_the_sources_changes_the_cache(tmp_path):
+    (tmp_path / "room").mkdir()
+    source = tmp_path / "room" / "a.py"
+    source.write_text("x = 1\n")
+    before = source_hash(tmp_path)
+    assert source_hash(tmp_path) == before
+    source.write_text("x = 2\n")
+    edited = source_hash(tmp_path)
+    source.rename(tmp_path / "room" / "b.py")
+    assert len({before, edited, source_hash(tmp_path)}) == 3
+
+
+PROBE = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
+
+
+def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached(tmp_path):
+    package = tmp_path / "flexmb"
+    package.mkdir()
+    (package / "__init__.py").write_text("")
+    shutil.copy(Path(flexmb.kernel.__file__), package / "kernel.py")
+    (package / "entry.py").write_text(
+        "from flexmb.kernel import kernel\nfrom flexmb.part import part\n@kernel\ndef entry(x):\n    return part(x)\n"
+    )
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(factor: float) -> str:
+        (package / "part.py").write_text(
+            f"from flexmb.kernel import helper\n@helper\ndef part(x):\n    return {factor} * x\n"
+        )
+        done = subprocess.run(
+            [sys.executable, "-c", PROBE], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        return done.stdout.strip()
+
+    assert run(2.0) == "2.0 0"
+    assert run(2.0) == "2.0 1"
+    assert run(3.0) == "3.0 0"
