@@ -11,10 +11,12 @@ A *port* is a frame fixed to a point of a body that may deform: where a hinge, w
 
 from __future__ import annotations
 
-from typing import NamedTuple
+
 
 import numpy as np
 from numpy.typing import NDArray
+
+from flexmb.bundle import bundle
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -113,7 +115,8 @@ FUNCTION = _record(
 )
 
 
-class Constants(NamedTuple):
+@bundle
+class Constants:
     """Everything that does not change in a run."""
 
     gravity: Real  # (3,) World axes, m/s^2
@@ -174,7 +177,8 @@ SPEED_STATE = _record(
 )
 
 
-class Workspace(NamedTuple):
+@bundle
+class Workspace:
     """What one evaluation writes. One workspace per thread."""
 
     q: Real  # (nq,) quaternions normalised, prescribed coordinates exact
