@@ -1,0 +1,201 @@
+"""The one entry point that runs a scene: integrate in the compiled loop, then evaluate what is observable."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from time import perf_counter
+from typing import Literal, NamedTuple, get_args
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flexmb import propagate
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
+from flexmb.labels import state_names
+from flexmb.scene.check import check_scene
+from flexmb.scene.check.walk import values
+from flexmb.scene.convert import ROOT
+from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
+from flexmb.scene.schema import Scene
+from flexmb.status import Status
+from flexmb.system import ENERGIES, DynamicsError, Evaluation, System, compile
+from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
+
+Method = Literal["dop853", "rk4"]
+FINEST_RTOL = 100 * np.finfo(float).eps
+
+
+class _Raw(NamedTuple):
+    """What an integrator leaves: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
+
+    states: Array
+    status: Status
+    fault: int
+    t: float
+    counts: list[int]
+    compile_s: float
+    run_s: float
+
+
+def simulate(
+    scene: Scene | System,
+    t_end: float,
+    method: Method = "dop853",
+    *,
+    rtol: float = 1e-10,
+    atol: float = 1e-12,
+    step: float | None = None,
+    samples: int | Sequence[float] | Array = 201,
+    max_steps: int = 1_000_000,
+) -> Trajectory:
+    """Simulate a scene from its initial state at t = 0 to `t_end` (s).
+
+    method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol, in the root mean
+    square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s).
+    samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
+
+    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
+    not supported yet, ValueError for settings that make no sense. A run that fails raises nothing: `status` and
+    `message` of the trajectory say why it stopped, and what was reached is kept.
+    """
+    check_scene(scene.scene if isinstance(scene, System) else scene, t_end)
+    _check_settings(method, rtol, atol, step, max_steps)
+    times = _sample_times(samples, t_end)
+    system = scene if isinstance(scene, System) else compile(scene)
+    raw = _integrate(system, times, method, rtol, atol, step, max_steps)
+    return _observed(system, times, raw)
+
+
+def switch_times(scene: Scene, t_end: float) -> list[float]:
+    """Times in (0, t_end) where a function of the scene jumps or is no longer smooth: no step may cross one (s)."""
+    found: set[float] = set()
+    for _, _, function in values(ROOT, scene):
+        match function:
+            case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
+                found |= {start, start + duration}
+            case SpinUp(duration_s=duration):
+                found.add(duration)
+    return sorted(time for time in found if 0.0 < time < t_end)
+
+
+def _check_settings(method: Method, rtol: float, atol: float, step: float | None, max_steps: int) -> None:
+    if method not in get_args(Method):
+        raise ValueError(f"method is {method!r}: use one of {', '.join(map(repr, get_args(Method)))}")
+    if method == "rk4" and (step is None or not (np.isfinite(step) and step > 0.0)):
+        raise ValueError(f'method "rk4" takes fixed steps, but step is {step}: give a positive step in seconds')
+    if method == "dop853" and step is not None:
+        raise ValueError('method "dop853" chooses its own steps: leave step out and set rtol and atol, or use "rk4"')
+    if not FINEST_RTOL <= rtol < 1.0:
+        raise ValueError(
+            f"rtol is {rtol:g}: double precision resolves {FINEST_RTOL:.1e}; use a value from there to 1e-3"
+        )
+    if not (np.isfinite(atol) and atol > 0.0):
+        raise ValueError(f"atol is {atol:g}: give a positive one, or a coordinate that passes zero stops the run")
+    if max_steps < 1:
+        raise ValueError(f"max_steps is {max_steps}: allow at least one step")
+
+
+def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array:
+    if isinstance(samples, int | np.integer):
+        if samples < 2:
+            raise ValueError(f"samples is {samples}: ask for at least 2 output times, the start and the end")
+        return np.linspace(0.0, t_end, int(samples))
+    times = np.array(samples, float)
+    if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or times[-1] != t_end or np.any(np.diff(times) <= 0.0):
+        raise ValueError(f"the output times must increase from 0 to t_end = {t_end:g} s: sort them and add both ends")
+    return times
+
+
+def _integrate(
+    system: System, times: Array, method: Method, rtol: float, atol: float, step: float | None, max_steps: int
+) -> _Raw:
+    """Run once over no time at all, which compiles, and then in earnest."""
+    initial = system.initial_state
+    ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
+
+    def run(times: Array, ends: Array) -> _Raw:
+        y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
+        counts, workspace = np.zeros(4, np.int64), system.workspace()
+        start = perf_counter()
+        if method == "rk4":
+            status, t = propagate.run_rk4(y, times, ends, step, max_steps, system.constants, workspace, out, counts)
+        else:
+            controlled = system.nq + system.nu
+            status, t = propagate.run_dop853(
+                y, times, ends, rtol, atol, controlled, max_steps, system.constants, workspace, out, counts
+            )
+        seconds = perf_counter() - start
+        return _Raw(out[: counts[SAMPLES]], Status(status), int(workspace.fault[0]), t, counts.tolist(), 0.0, seconds)
+
+    compiled = run(times[:1], ends[:0])
+    return run(times, ends)._replace(compile_s=compiled.run_s)
+
+
+def _observed(system: System, times: Array, raw: _Raw) -> Trajectory:
+    """Evaluate everything observable at the samples reached."""
+    start = perf_counter()
+    status, stopped_at, seen = raw.status, raw.t, list[Evaluation]()
+    message = _message(system, raw)
+    for t, y in zip(times, raw.states, strict=False):
+        try:
+            seen.append(system.evaluate(t, y[: system.nq], y[system.nq : -1]))
+        except DynamicsError as error:  # fixed steps may have jumped over the place where the dynamics ends
+            status, stopped_at, message = Status.NOT_POSITIVE_DEFINITE, float(t), f"stopped at t = {t:g} s: {error}"
+            break
+    states = raw.states[: len(seen)]
+    first = seen[0] if seen else None
+    q_names, u_names = state_names(system)
+    return Trajectory(
+        scene=system.scene.name,
+        status=status,
+        message=message,
+        stopped_at=stopped_at,
+        t=times[: len(seen)],
+        q=states[:, : system.nq],
+        u=states[:, system.nq : -1],
+        q_names=q_names,
+        u_names=u_names,
+        markers={marker.name: _marker_path(seen, marker.name) for marker in system.scene.markers},
+        loads={name: np.array([e.loads[name] for e in seen]) for name in (first.loads if first else ())},
+        wheel_loads={
+            name: np.array([e.wheel_loads[name] for e in seen]) for name in (first.wheel_loads if first else ())
+        },
+        drives={name: np.array([e.drives[name] for e in seen]) for name in (first.drives if first else ())},
+        energy={kind: np.array([e.energy[kind] for e in seen]) for kind in ENERGIES},
+        momentum=np.array([e.momentum for e in seen]).reshape(-1, 6),
+        work=states[:, -1],
+        statistics=Statistics(
+            evaluations=raw.counts[EVALUATIONS],
+            accepted_steps=raw.counts[ACCEPTED],
+            rejected_steps=raw.counts[REJECTED],
+            compile_s=raw.compile_s,
+            run_s=raw.run_s,
+            output_s=perf_counter() - start,
+        ),
+    )
+
+
+def _message(system: System, raw: _Raw) -> str:
+    if raw.status is Status.OK:
+        return f"finished at t = {raw.t:g} s"
+    body = f'"{system.body_names[raw.fault]}"'
+    return f"stopped at t = {raw.t:g} s: {raw.status.advice.format(body=body)}"
+
+
+def _marker_path(seen: list[Evaluation], name: str) -> MarkerPath:
+    motions = [evaluation.markers[name] for evaluation in seen]
+    return MarkerPath(
+        position=np.array([m.position for m in motions]).reshape(-1, 3),
+        quaternion=_continuous_quaternions(np.array([m.rotation for m in motions]).reshape(-1, 3, 3)),
+        velocity=np.array([m.velocity for m in motions]).reshape(-1, 6),
+        acceleration=np.array([m.acceleration for m in motions]).reshape(-1, 6),
+    )
+
+
+def _continuous_quaternions(rotations: Array) -> Array:
+    """Scalar-first quaternions of (T,3,3) rotations, each with the sign that is closer to the one before."""
+    if not len(rotations):
+        return np.empty((0, 4))
+    quaternions = Rotation.from_matrix(rotations).as_quat(canonical=True, scalar_first=True)
+    turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
+    return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
