@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.random import Generator
 
@@ -50,12 +52,12 @@ def inertia(rng: Generator, mass: float) -> np.ndarray:
 
 
 def random_scene(
-    rng: Generator, kinds: tuple[str, ...], *, driven: bool = False, extras: bool = True, dissipative: bool = True
+    rng: Generator, kinds: Sequence[str], *, driven: bool = False, extras: bool = True, nodes: bool = True
 ) -> Scene:
     """A tree with one body per entry of `kinds`, at a random state.
 
-    `driven` prescribes some coordinates; `extras` adds wheels, point masses and loads; `dissipative` adds dampers and
-    motors to the springs.
+    `driven` prescribes some coordinates; `extras` adds wheels, point masses and loads; `nodes` attaches hinges to nodes
+    off the body frames.
     """
     builder = SceneBuilder("random tree", gravity=rng.uniform(-5.0, 5.0, 3))
     parents = ["ground"]
@@ -64,7 +66,7 @@ def random_scene(
         node = make(Node, name="n", position=rng.normal(size=3) * 0.5, quaternion=_quaternion(rng))
         builder.rigid_body(name, mass=mass, com=rng.normal(size=3) * 0.2, inertia=inertia(rng, mass), nodes=(node,))
         parent = str(rng.choice(parents[-3:]))
-        builder.add(_hinge(rng, kind, f"h{i}", parent, name, driven and i % 2 == 1, dissipative))
+        builder.add(_hinge(rng, kind, f"h{i}", parent, name, driven and i % 2 == 1, nodes))
         builder.marker(f"m{i}", name, node="n", offset=rng.normal(size=3) * 0.2)
         parents.append(name)
         if extras:
@@ -73,21 +75,22 @@ def random_scene(
 
 
 def _hinge(
-    rng: Generator, kind: str, name: str, parent: str, child: str, driven: bool, dissipative: bool
+    rng: Generator, kind: str, name: str, parent: str, child: str, driven: bool, nodes: bool
 ) -> Hinge:
     """A hinge of the kind with springs at a random place; `driven` prescribes its first coordinate."""
     values = {
         "name": name, "parent": parent, "child": child,
-        "parent_node": "n" if parent != "ground" else "origin", "child_node": str(rng.choice(["n", "origin"])),
+        "parent_node": "n" if nodes and parent != "ground" else "origin",
+        "child_node": str(rng.choice(["n", "origin"])) if nodes else "origin",
         "parent_position": rng.normal(size=3) * 0.3, "parent_quaternion": _quaternion(rng),
         "child_position": rng.normal(size=3) * 0.3, "child_quaternion": _quaternion(rng),
     }  # fmt: skip
 
     def turn(drives: bool = False) -> AngularCoordinate:
-        return angular(**_coordinate(rng, "torque", drives, dissipative))
+        return angular(**_coordinate(rng, "torque", drives))
 
     def shift(drives: bool = False) -> LinearCoordinate:
-        return linear(**_coordinate(rng, "force", drives, dissipative))
+        return linear(**_coordinate(rng, "force", drives))
 
     match kind:
         case "weld":
@@ -105,8 +108,7 @@ def _hinge(
         case "gimbal3":
             return make(Gimbal, sequence="zyx", rotations=(turn(driven), turn(), turn()), **values)
         case "spherical":
-            damping = rng.uniform(0.1, 0.5) if dissipative else 0.0
-            return make(Spherical, stiffness=rng.uniform(1.0, 5.0), damping=damping, **values)
+            return make(Spherical, stiffness=rng.uniform(1.0, 5.0), damping=rng.uniform(0.1, 0.5), **values)
         case "planar":
             return make(Planar, x=shift(driven), y=shift(), rotation=turn(), **values)
         case "free":
@@ -114,13 +116,11 @@ def _hinge(
     raise ValueError(kind)
 
 
-def _coordinate(rng: Generator, motor: str, driven: bool, dissipative: bool) -> dict:
-    values = {"stiffness": rng.uniform(1.0, 5.0), "rest": rng.uniform(-0.3, 0.3)}
-    if dissipative:
-        values["damping"] = rng.uniform(0.1, 0.5)
+def _coordinate(rng: Generator, motor: str, driven: bool) -> dict:
+    values = {"stiffness": rng.uniform(1.0, 5.0), "rest": rng.uniform(-0.3, 0.3), "damping": rng.uniform(0.1, 0.5)}
     if driven:
         values["prescribed"] = Sine(amplitude=0.4, angular_frequency_rad_s=rng.uniform(1.0, 3.0), phase_rad=0.3)
-    elif dissipative:
+    else:
         values[motor] = Constant(value=rng.uniform(-2.0, 2.0))
     return values
 
