@@ -1,0 +1,49 @@
+"""O(N) dynamics of trees of rigid and flexible bodies.
+
+    import flexmb as fm
+    scene = fm.load_scene("scene.toml")
+    trajectory = fm.simulate(scene, t_end=10.0)
+
+Names are imported when they are first used: reading a scene compiles nothing and loads no plotting.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from flexmb.scene import schema
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.files import load_scene, save_scene
+from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
+
+if TYPE_CHECKING:
+    from flexmb.simulation import simulate
+    from flexmb.status import Status
+    from flexmb.system import DynamicsError, Evaluation, State, System, compile
+    from flexmb.trajectory import Trajectory
+
+_LATER = {
+    "simulate": "flexmb.simulation",
+    "Status": "flexmb.status",
+    "DynamicsError": "flexmb.system",
+    "Evaluation": "flexmb.system",
+    "State": "flexmb.system",
+    "System": "flexmb.system",
+    "compile": "flexmb.system",
+    "Trajectory": "flexmb.trajectory",
+}
+
+__all__ = [
+    "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System", "Trajectory",
+    "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
+]  # fmt: skip
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _LATER:
+        raise AttributeError(f"module 'flexmb' has no attribute {name!r}")
+    value = getattr(import_module(_LATER[name]), name)
+    globals()[name] = value
+    return value
