@@ -6,6 +6,7 @@ import time
 import traceback
 from collections.abc import Callable, Iterable
 from importlib import import_module
+from pathlib import Path
 
 import msgspec
 
@@ -42,8 +43,8 @@ def execute(job: Job, emit: Emit) -> None:
         _with_engine(engine, job, blank, emit)
     except EngineMissing as error:
         emit(msgspec.structs.replace(blank, message=str(error)))
-    except Exception:  # a fault in one adapter is a finding about it and must not end the session
-        emit(msgspec.structs.replace(blank, status="failed", message=_last_lines(traceback.format_exc())))
+    except Exception as error:  # a fault in one adapter is a finding about it and must not end the session
+        emit(msgspec.structs.replace(blank, status="failed", message=_describe(error)))
 
 
 def find_engine(provider: str, name: str) -> Engine | str:
@@ -93,8 +94,8 @@ def _run(model: Model, run: Run, effort: Effort, record: RunRecord, kept: tuple[
     try:
         trajectory = model.simulate(run, effort)
         wall = min(_walls(model, run, effort, trajectory))
-    except Exception:  # the same as above, for one effort: the others may still work
-        return msgspec.structs.replace(record, status="failed", message=_last_lines(traceback.format_exc()))
+    except Exception as error:  # the same as above, for one effort: the others may still work
+        return msgspec.structs.replace(record, status="failed", message=_describe(error))
     status: RunStatus = trajectory.status
     message = trajectory.message
     if status == "finished" and len(trajectory.times) < len(run.times):
@@ -119,6 +120,7 @@ def _walls(model: Model, run: Run, effort: Effort, first: Trajectory) -> Iterabl
             yield model.simulate(run, effort).wall_s
 
 
-def _last_lines(text: str) -> str:
-    """The end of a traceback: the error and where it came from."""
-    return "\n".join(text.strip().splitlines()[-3:])
+def _describe(error: Exception) -> str:
+    """The error and where it was raised."""
+    place = traceback.extract_tb(error.__traceback__)[-1]
+    return f"{type(error).__name__}: {error} ({place.name}, {Path(place.filename).name} line {place.lineno})"

@@ -67,6 +67,8 @@ class Result:
                 and run.status == "finished"
                 and channel in run.channels
             ][-RUNGS:]
+            if _without_effect(ladder):
+                ladder = ladder[-1:]
             rungs = [Rung(run.effort_value, self.values(channel, run)) for run in ladder]
             size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
             evaluations = self.finest.evaluations
@@ -88,8 +90,15 @@ class Result:
         return self._signal(channel, like.uncertainty(channel))
 
     def _signal(self, channel: str, doubt: Uncertainty) -> Signal:
-        ranges = [signal_range(name, self.values(name)) for name in self._relatives(channel)]
-        return Signal(self.values(channel), doubt, max(ranges))
+        sizes = [max(signal_range(name, self.values(name)) for name in self._relatives(channel))]
+        if channel.endswith(".torque"):
+            sizes.append(self._largest(".force") * self._largest(".position"))
+        return Signal(self.values(channel), doubt, tuple(sizes))
+
+    def _largest(self, ending: str) -> float:
+        """Largest magnitude (SI) among the channels with that ending; 0 if there is none."""
+        sizes = (magnitude(name, self.values(name)) for name in self.finest.channels if name.endswith(ending))
+        return max(sizes, default=0.0)
 
     def _relatives(self, channel: str) -> list[str]:
         kin = family(channel)
@@ -152,6 +161,19 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
             if main is not None and refined is not None and refined.status == "finished":
                 main.refined, main.refinement = refined, (ratio, variant.refined.order)
     return CaseResults(case, results)
+
+
+def _without_effect(ladder: Sequence[RunRecord]) -> bool:
+    """Whether the last two efforts did the very same work with the very same result.
+
+    Then the engine did not follow the effort (say, a step cut short by the sample times), and equality means nothing.
+    """
+    if len(ladder) < 2:
+        return False
+    one, other = ladder[-2:]
+    return one.evaluations == other.evaluations and all(
+        name in one.channels and one.channels[name].data == packed.data for name, packed in other.channels.items()
+    )
 
 
 def _result(key: Key, group: list[RunRecord]) -> Result:

@@ -71,7 +71,7 @@ def estimate(channel: str, kind: str, rungs: Sequence[Rung], evaluations: int, s
     floor = roundoff_floor(size, max(evaluations, len(finest)))
     if len(rungs) < 2:
         unknown = np.full(len(finest), np.inf)
-        return Uncertainty(unknown, float("inf"), "unknown: only one effort finished")
+        return Uncertainty(unknown, float("inf"), "unknown: fewer than two efforts finished with different results")
     gap = distance(channel, rungs[-2].values, finest)
     if len(rungs) == 2:
         envelope = np.maximum.accumulate(UNPROVEN_SAFETY * gap) + floor

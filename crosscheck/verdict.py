@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.channels import distance, signal_range
+from crosscheck.channels import distance, family, signal_range
 from crosscheck.uncertainty import Uncertainty
 
 Array = NDArray[np.float64]
@@ -64,11 +64,15 @@ class Finding:
 
 @dataclass(frozen=True)
 class Signal:
-    """One channel of one result: values (T, k), U, and the largest range among the channels of its family."""
+    """One channel of one result: values (T, k), U, and further sizes (SI) for a signal that is zero within U.
+
+    `sizes`: the largest range in the channel's family (say, all hinge torques); for torques then the largest force
+    times the extent of the scene, since a torque that vanishes is the balance of forces at such distances.
+    """
 
     values: Array
     uncertainty: Uncertainty
-    family_range: float
+    sizes: tuple[float, ...]
 
 
 def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None = None) -> Finding:
@@ -106,6 +110,11 @@ def conserve(drift: Array, scale: float, limit: float) -> Finding:
 
 
 def _size(channel: str, a: Signal, b: Signal, total: float) -> float:
-    """Range of the two signals, or of their family where they are zero within `total`, their uncertainty (SI)."""
+    """Range of the two signals, or the first of their further sizes above `total`, their uncertainty (SI).
+
+    Kinds of energy turn into each other: their size is always that of the largest of them.
+    """
     own = max(signal_range(channel, a.values), signal_range(channel, b.values))
-    return own if own > total else max(own, a.family_range, b.family_range)
+    further = [max(pair) for pair in zip(a.sizes, b.sizes, strict=True)]
+    candidates = further if family(channel) == "energy" else [own, *further]
+    return next((size for size in candidates if size > total), max(candidates))

@@ -163,10 +163,10 @@ def _judge(reference: Result, channel: str, values: Array, rough: Array | None, 
         return Finding("failed", "there are empty cells or values that are not numbers")
     target = reference.signal(channel, across=False)
     if rough is not None:
-        doubt = estimate(channel, "tolerance", [Rung(2.0, rough), Rung(1.0, values)], 0, target.family_range)
+        doubt = estimate(channel, "tolerance", [Rung(2.0, rough), Rung(1.0, values)], 0, target.sizes[0])
     else:
         doubt = _claimed(channel, target, goal)
-    return compare(channel, Signal(values, doubt, target.family_range), target, goal)
+    return compare(channel, Signal(values, doubt, target.sizes), target, goal)
 
 
 def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:

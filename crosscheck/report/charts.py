@@ -1,7 +1,7 @@
 """The numbers behind the report's charts, small enough to be carried in one HTML file.
 
-Signals are thinned to `SAMPLES` instants and stored once each as float32 in base64; distances and drifts are computed
-here in double precision, and thinned by taking the largest of each bin so that no peak is lost. report.js draws them.
+Signals are thinned and stored once each (see store.py); distances and drifts are computed here in double precision, and
+thinned by taking the largest of each bin so that no peak is lost. templates/charts.js draws them.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.channels import distance, family, unit
+from crosscheck.channels import distance, family, matches, signal_range, unit
 from crosscheck.judge import energy_drift
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
@@ -23,6 +23,7 @@ from crosscheck.workprecision import WorkPrecision, work_precision
 
 Array = NDArray[np.float64]
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
+RUNAWAY = 20.0  # a signal that many times as wide as another has run away from it
 PANELS = (
     ("Motion", "marker"),
     ("Energy", "energy"),
@@ -54,50 +55,47 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
     """One panel a comparison and kind of channel; each offers its channels to choose from."""
     groups: dict[str, dict[str, list[Verdict]]] = {}
     for verdict in verdicts:
-        if verdict.kind == "comparison" and verdict.E is not None:
-            groups.setdefault(verdict.comparison, {}).setdefault(verdict.channel, []).append(verdict)
+        if verdict.kind == "comparison":
+            for channel in _drawn(case, verdict):
+                groups.setdefault(verdict.comparison, {}).setdefault(channel, []).append(verdict)
     panels = []
     for name, channels in groups.items():
         for title, prefix in PANELS:
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == prefix}
             if chosen:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                panels.append({"comparison": name, "title": title, "channels": views, "first": _telling(chosen)})
+                first = next((i for i, view in enumerate(views) if view["moves"]), 0)
+                panels.append({"comparison": name, "title": title, "channels": views, "first": first})
     return panels
 
 
-def _telling(channels: dict[str, list[Verdict]]) -> int:
-    """Number of the channel to show first: the first that moves."""
-    moving = [i for i, verdicts in enumerate(channels.values()) if (verdicts[0].scale or 0.0) > 0.0]
-    return moving[0] if moving else 0
+def _drawn(case: CaseResults, verdict: Verdict) -> list[str]:
+    """Channels to draw for a verdict: its own, or those its pattern names, as far as a failed run got."""
+    if verdict.E is not None:
+        return [verdict.channel]
+    stored = [name for result in _sides(case, verdict) if result.runs for name in result.finest.channels]
+    return [name for name in dict.fromkeys(stored) if matches(verdict.channel, name)]
+
+
+def _sides(case: CaseResults, verdict: Verdict) -> tuple[Result, Result]:
+    return case.get(verdict.variant_a, verdict.engine_a), case.get(verdict.variant_b, verdict.engine_b)
 
 
 def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]) -> dict[str, Any]:
-    """Overlay of all sides of a channel, and for each pair distance and uncertainty over time (SI)."""
+    """Overlay of all sides of a channel, and for each judged pair distance and uncertainty over time (SI)."""
     sides: dict[tuple[str, str], Result] = {}
-    curves = []
     for verdict in pairs:
-        a = case.get(verdict.variant_a, verdict.engine_a)
-        b = case.get(verdict.variant_b, verdict.engine_b)
-        sides |= {(a.variant, a.engine): a, (b.variant, b.engine): b}
-        across = a.variant != b.variant
-        doubt = a.signal(channel, across).uncertainty.envelope + b.signal(channel, across).uncertainty.envelope
-        curves.append(
-            {
-                "a": _label(a, across),
-                "b": _label(b, across),
-                "times": store.times(a.times),
-                "error": store.peaks(distance(channel, a.values(channel), b.values(channel))),
-                "doubt": store.peaks(doubt),
-                "goal": verdict.goal * verdict.scale if verdict.scale is not None else None,
-            }
-        )
+        for result in _sides(case, verdict):
+            if result.runs and channel in result.finest.channels:
+                sides[result.variant, result.engine] = result
     several = len({variant for variant, _ in sides}) > 1
     width = next(iter(sides.values())).values(channel).shape[1]
     return {
         "name": channel,
         "unit": unit(channel),
         "components": COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
+        "moves": any(signal_range(channel, result.values(channel)) > 0.0 for result in sides.values()),
+        "range": _shown_range([result.values(channel) for result in sides.values()]),
         "sides": [
             {
                 "label": _label(result, several),
@@ -107,8 +105,31 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
             }
             for result in sides.values()
         ],
-        "pairs": curves,
+        "pairs": [_pair(store, case, channel, verdict) for verdict in pairs if verdict.E is not None],
     }
+
+
+def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> dict[str, Any]:
+    a, b = _sides(case, verdict)
+    across = a.variant != b.variant
+    doubt = a.signal(channel, across).uncertainty.envelope + b.signal(channel, across).uncertainty.envelope
+    return {
+        "a": _label(a, across),
+        "b": _label(b, across),
+        "times": store.times(a.times),
+        "error": store.peaks(distance(channel, a.values(channel), b.values(channel))),
+        "doubt": store.peaks(doubt),
+    }
+
+
+def _shown_range(signals: list[Array]) -> list[float] | None:
+    """Limits of the drawing where one signal runs away: three spans of the smallest signal about its middle."""
+    limits = [(float(np.min(values)), float(np.max(values))) for values in signals]
+    low, high = min(limits, key=lambda pair: pair[1] - pair[0])
+    widest = max(upper - lower for lower, upper in limits)
+    if not 0.0 < high - low < widest / RUNAWAY:
+        return None
+    return [low - (high - low), high + (high - low)]
 
 
 def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:

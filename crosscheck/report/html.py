@@ -30,6 +30,7 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
     page = templates.get_template("report.html.j2").render(
         outcome=outcome,
         counts=outcome.counts(),
+        controls=outcome.controls(),
         overview=overview(outcome.verdicts),
         cases=[_case_view(number, case, outcome) for number, case in enumerate(session.cases)],
         environment=session.environments[-1] if session.environments else None,

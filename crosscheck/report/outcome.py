@@ -70,8 +70,13 @@ class Outcome:
         return " and ".join(parts)
 
     def counts(self) -> Counter[str]:
-        """Number of verdicts of each status."""
-        return Counter(verdict.status for verdict in self.all)
+        """Number of verdicts of each status, controls apart: there *differ* is the good news."""
+        return Counter(verdict.status for verdict in self.all if verdict.kind != "control")
+
+    def controls(self) -> tuple[int, int]:
+        """How many negative controls' channels were noticed, and how many there are."""
+        noticed = [verdict.ok for verdict in self.all if verdict.kind == "control"]
+        return sum(noticed), len(noticed)
 
 
 def conclude(session: Session) -> Outcome:

@@ -132,7 +132,9 @@ def _cell(group: list[Verdict]) -> Cell:
     worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
     good = worst.status == "agree" or worst.kind == "control"
     look = "bad" if bad else "good" if good else "expected"
-    text = "noticed" if worst.kind == "control" and worst.ok else worst.status
+    text = worst.status
+    if worst.kind == "control" and worst.status in ("differ", "agree"):
+        text = "noticed" if worst.ok else "missed"
     if len(group) > 1:
         text += f" {len(bad)}/{len(group)}" if bad else f" {len(group)}"
     if worst.expected != "agree" and worst.kind != "control":

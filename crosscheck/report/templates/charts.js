@@ -65,11 +65,14 @@ function distances(channel, series) {
 
 function drawChannel(node, channel, series) {
   const letters = channel.components.length > 1 ? " (" + channel.components.map((c, j) => c + " " + DASHES[j % 3]).join(", ") + ")" : "";
+  const judged = channel.pairs.length > 0;
+  const below = !judged ? {} : { yaxis2: { domain: [0, 0.38], type: "log", exponentformat: "power", nticks: 5,
+    title: { text: "E, and U dotted" + (channel.unit ? ", " + channel.unit : ""), font: { size: 10.5 } } } };
   Plotly.react(node, [...sides(channel, series), ...distances(channel, series)], layout({
-    xaxis: { title: { text: "time, s", standoff: 4 }, anchor: "y2" },
-    yaxis: { domain: [0.46, 1], title: { text: channel.unit + letters, font: { size: 10.5 } }, exponentformat: "power" },
-    yaxis2: { domain: [0, 0.38], type: "log", title: { text: "E, and U dotted" + (channel.unit ? ", " + channel.unit : ""), font: { size: 10.5 } },
-      exponentformat: "power", nticks: 5 },
+    xaxis: { title: { text: "time, s", standoff: 4 }, anchor: judged ? "y2" : "y" },
+    yaxis: { domain: judged ? [0.46, 1] : [0, 1], title: { text: channel.unit + letters, font: { size: 10.5 } }, exponentformat: "power",
+      range: channel.range || undefined },
+    ...below,
   }), CONFIG);
 }
 
@@ -95,19 +98,20 @@ function drawWork(node, work) {
     groups.set(key, [...(groups.get(key) || []), point]);
   }
   const low = Math.floor(Math.log10(Math.min(...errors, work.doubt))) - 0.7;
+  const quickest = Math.min(...work.points.map(p => p.wall_s).filter(s => s > 0)), wall = p => p.wall_s || quickest;
   const text = p => `${p.effort}<br>${p.evaluations || "?"} evaluations<br>${p.message || ""}`;
   const traces = [];
   for (const [key, points] of groups) {
     const good = points.filter(p => p.error > 0), bad = points.filter(p => !(p.error > 0));
     const marker = { color: colour(points[0].engine), symbol: SYMBOLS[variants.indexOf(points[0].variant) % SYMBOLS.length], size: 8 };
-    traces.push({ x: good.map(p => p.wall_s), y: good.map(p => p.error), text: good.map(text), name: key, legendgroup: key, type: "scatter",
+    traces.push({ x: good.map(wall), y: good.map(p => p.error), text: good.map(text), name: key, legendgroup: key, type: "scatter",
       mode: "lines+markers", line: { color: marker.color, width: 1 }, marker, hovertemplate: "%{x:.3g} s, error %{y:.2e}<br>%{text}<extra>" + key + "</extra>" });
-    if (bad.length) traces.push({ x: bad.map(p => p.wall_s), y: bad.map(() => margin), text: bad.map(text), name: key + " failed", legendgroup: key,
+    if (bad.length) traces.push({ x: bad.map(wall), y: bad.map(() => margin), text: bad.map(text), name: key + " failed", legendgroup: key,
       showlegend: !good.length, type: "scatter", mode: "markers", marker: { ...marker, symbol: "x", size: 9 },
       hovertemplate: "failed after %{x:.3g} s<br>%{text}<extra>" + key + "</extra>" });
   }
   const front = work.points.filter(p => p.best && p.error > 0);
-  traces.unshift({ x: front.map(p => p.wall_s), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
+  traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
     line: { color: "#c3cad3", width: 7, shape: "hv" }, hoverinfo: "skip" });
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
