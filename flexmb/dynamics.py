@@ -14,7 +14,7 @@ from flexmb.jain.kinematics import (
 )
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.functions import evaluate
-from flexmb.kernel import kernel
+from flexmb.kernel import helper, kernel
 from flexmb.loads import drive_loads, hinge_loads, wheel_load
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
 from flexmb.status import OK
@@ -79,6 +79,7 @@ def mass_matrix(t, y, c, w, M):
 @kernel
 def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, energy, momentum):
     """Everything observable at one state; w.acceleration and w.drive are filled as well. Returns a status code.
+    Loads are those of the model: a ruthless body shows them at its rest shape. Markers move with the true deformation.
 
     markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6) and
     wheel_loads (W,6): [torque; force] in World axes; energy (4,), momentum (6,) as in flexmb.balance.
@@ -87,26 +88,14 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
     status = forward_dynamics(c, w)
     if status != OK:
         return status
-    hinge_loads(c, w)
     drive_loads(c, w)
-    for k in range(c.body.shape[0]):
-        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            tau, f = wheel_load(c, w, k, i)
-            store3(wheel_loads[i], 0, tau)
-            store3(wheel_loads[i], 3, f)
     pose_sweep(c, w)
+    _world_loads(c, w, loads, wheel_loads)
+    velocity_sweep(c, w, False, True)
     energy_and_momentum(c, w, energy, momentum)
-    # markers move with the true deformation, also on bodies that the dynamics sees undeformed
-    velocity_sweep(c, w, True)
+    velocity_sweep(c, w, True, True)
     pose_sweep(c, w)
     acceleration_sweep(c, w)
-    for k in range(c.body.shape[0]):
-        R = mat3(w.body[k].pose_rotation, 0)
-        for i in (0, 3):
-            store3(loads[k], i, times(R, vec3(w.body[k].load, i)))
-        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            for n in (0, 3):
-                store3(wheel_loads[i], n, times(R, vec3(wheel_loads[i], n)))
     for i in range(marker_port.shape[0]):
         k = marker_body[i]
         port = marker_port[i]
@@ -120,3 +109,17 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
         store3(markers[i], 18, times(R, alpha))
         store3(markers[i], 21, add(times(R, a), vec3(c.gravity, 0)))
     return OK
+
+
+@helper
+def _world_loads(c, w, loads, wheel_loads):
+    """Hinge and wheel loads of every body in World axes."""
+    hinge_loads(c, w)
+    for k in range(c.body.shape[0]):
+        R = mat3(w.body[k].pose_rotation, 0)
+        store3(loads[k], 0, times(R, vec3(w.body[k].load, 0)))
+        store3(loads[k], 3, times(R, vec3(w.body[k].load, 3)))
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            tau, f = wheel_load(c, w, k, i)
+            store3(wheel_loads[i], 0, times(R, tau))
+            store3(wheel_loads[i], 3, times(R, f))

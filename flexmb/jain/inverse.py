@@ -23,7 +23,7 @@ from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, t
 @helper
 def inverse_dynamics(c, w, tau):
     """tau (nu,) for the state in w.q, w.u and the rates in w.acceleration; w.load receives the loads across hinges."""
-    velocity_sweep(c, w, False)
+    velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0:
         pose_sweep(c, w)
     acceleration_sweep(c, w)
@@ -42,7 +42,7 @@ def mass_matrix(c, w, M):
     for j in range(w.u.shape[0]):
         w.u[j] = 0.0
     store3(w.ground, 0, (0.0, 0.0, 0.0))
-    velocity_sweep(c, w, False)
+    velocity_sweep(c, w, False, False)
     for j in range(w.u.shape[0]):
         for i in range(w.u.shape[0]):
             w.speed[i].acceleration = 0.0

@@ -61,16 +61,17 @@ def normalise_quaternions(q, c):
 
 
 @helper
-def velocity_sweep(c, w, deformed):
+def velocity_sweep(c, w, shape, rates):
     """Poses, velocities and bias accelerations of all bodies and ports.
 
-    A ruthless body is seen undeformed, unless `deformed`: then its markers move with its true deformation.
+    `shape` and `rates` say whether a ruthless body shows its true eta and etadot or zero: neither in the equations of
+    motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers.
     """
     for k in range(c.body.shape[0]):
-        frozen = c.body[k].level == RUTHLESS and not deformed
+        exact = c.body[k].level != RUTHLESS
         for n in range(c.body[k].modes):
-            w.mode[k, n].eta = 0.0 if frozen else w.q[c.body[k].eta_index + n]
-            w.mode[k, n].etad = 0.0 if frozen else w.u[c.body[k].etad_index + n]
+            w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+            w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
         for i in range(c.body[k].port_start, c.body[k].port_stop):
             _move_port(c, w, k, i)
         _cross_hinge(c, w, k)
