@@ -1,0 +1,127 @@
+"""The command `flexmb`: thin, it only reads words and shows results."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.files import load_scene
+from flexmb.scene.reference import json_schema
+
+EXIT_STOPPED = 1
+EXIT_USAGE = 2
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    help="""
+Simulate trees of rigid and flexible bodies, wheels and point masses.
+
+A scene is a TOML file: see `docs/scene-reference.md`, or `flexmb schema` for the JSON Schema your editor understands.
+
+    flexmb check scene.toml
+    flexmb simulate scene.toml --t-end 10 --out results
+""",
+)
+console = Console()
+errors = Console(stderr=True)
+
+SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
+End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
+
+
+@app.command()
+def simulate(
+    scene: SceneFile,
+    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
+    method: Annotated[str, typer.Option(help="`dop853` (adapts its step) or `rk4` (fixed `--step`).")] = "dop853",
+    rtol: Annotated[float, typer.Option(help="Relative error allowed in a step (dop853).")] = 1e-10,
+    atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units (dop853).")] = 1e-12,
+    step: Annotated[float | None, typer.Option(help="Step in s (rk4).", show_default=False)] = None,
+    samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
+    plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+) -> None:
+    """
+    Simulate a scene; write `trajectory.csv` and charts; print a summary.
+
+    **Examples**
+
+        flexmb simulate boom.toml --t-end 60
+        flexmb simulate boom.toml --t-end 60 --rtol 1e-12 --samples 1001 --out fine
+        flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
+
+    **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
+    momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
+
+    **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
+    wrong.
+    """
+    with _no_traceback():
+        from flexmb.simulation import simulate as run  # after the words are understood: it loads the compiler
+        from flexmb.summary import summary
+
+        with console.status(f"simulating {scene} (the first run after an update compiles)"):
+            trajectory = run(load_scene(scene), t_end, method, rtol=rtol, atol=atol, step=step, samples=samples)  # type: ignore[arg-type]
+        out.mkdir(parents=True, exist_ok=True)
+        trajectory.to_csv(out / "trajectory.csv")
+        written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
+    console.print(summary(trajectory))
+    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+    if not trajectory.finished:
+        raise typer.Exit(EXIT_STOPPED)
+
+
+@app.command()
+def check(scene: SceneFile, t_end: End = None) -> None:
+    """
+    Check a scene without running it: every defect with its place and its remedy.
+
+    **Exit code**: 0 sound, 2 wrong.
+    """
+    with _no_traceback():
+        loaded = load_scene(scene)
+        check_scene(loaded, t_end)
+    counts = ", ".join(
+        f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
+    )
+    console.print(f"[green]sound[/green]: {loaded.name} ({counts})")
+
+
+@app.command()
+def schema() -> None:
+    """
+    Print the JSON Schema of scene files.
+
+    Point your editor's TOML or JSON language server at it for completion and inline errors:
+
+        flexmb schema > scene.schema.json
+    """
+    print(json_schema())
+
+
+@contextmanager
+def _no_traceback() -> Iterator[None]:
+    """What the user can put right is a message, not a traceback."""
+    try:
+        yield
+    except (SceneError, NotImplementedError, ValueError, OSError) as error:
+        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+        raise typer.Exit(EXIT_USAGE) from None
+
+
+def main() -> None:
+    """Entry point of the command `flexmb`."""
+    app()
+
+
+if __name__ == "__main__":
+    main()
