@@ -18,7 +18,7 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 TOLERANCES = tuple(Effort(kind="tolerance", value=10.0**-n, method="dop853") for n in (6, 8, 10, 12))
-STEPS = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(4, 8))
+STEPS = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(2, 6))
 COARSE = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(3))
 
 

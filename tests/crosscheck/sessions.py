@@ -1,0 +1,58 @@
+"""Running the small case with the fake engines, whole or with its run file changed."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from crosscheck.library import load_case
+from crosscheck.records import read
+from crosscheck.report.outcome import Outcome, conclude
+from crosscheck.results import collect
+from crosscheck.sweep import sweep
+from crosscheck.verdict import Verdict
+
+CASE = Path(__file__).parent / "data" / "pendulum" / "single"
+PROVIDER = "tests.crosscheck.fake_engines:engines"
+HEAD = """
+title = "Single pendulum"
+duration_s = 2.0
+samples = 21
+"""
+
+
+def copy_case(folder: Path, run_file: str | None = None) -> Path:
+    """The small case as folder/pendulum/single, with another run file if one is given."""
+    target = folder / "pendulum" / "single"
+    shutil.copytree(CASE, target)
+    if run_file is not None:
+        (target / "run.toml").write_text(HEAD + run_file, encoding="utf-8")
+    return target
+
+
+def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: object) -> Outcome:
+    """Run a case folder and judge its records."""
+    sweep([load_case(case)], asked, records, workers=2, provider=PROVIDER, **options)
+    return conclude(collect(read(records)))
+
+
+def compare_engines(folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6') -> Outcome:
+    """All pairs of some engines on the pendulum."""
+    names = ", ".join(f'"{name}"' for name in engines)
+    run_file = f"""
+[[variant]]
+name = "rigid"
+engines = [{names}]
+
+[[comparison]]
+name = "all"
+variant = "rigid"
+goals = {{ {goals} }}
+"""
+    return run_case(copy_case(folder, run_file), folder / "records.jsonl")
+
+
+def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
+    """The one verdict on a pair of engines."""
+    (found,) = [verdict for verdict in verdicts if (verdict.engine_a, verdict.engine_b) == (a, b)]
+    return found

@@ -1,0 +1,123 @@
+"""Case folders: the documented example is valid, faulty run files are refused with place and remedy."""
+
+from __future__ import annotations
+
+import textwrap
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from crosscheck import case as case_module
+from crosscheck.case import CaseError, RunFile, check_run_file
+from crosscheck.library import load_case, resolve
+from crosscheck.selection import select
+from tests.crosscheck.sessions import CASE, copy_case
+
+EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
+
+
+def example() -> RunFile:
+    return msgspec.convert(tomllib.loads(EXAMPLE), RunFile)
+
+
+def test_the_documented_example_is_valid() -> None:
+    check_run_file(example())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            'a = { variant = "full"',
+            'a = { variant = "fool"',
+            'no variant "fool"; the variants are rigid, full, segments',
+        ),
+        ('engine = "native" }\nb', 'engine = "exudyn" }\nb', 'engine "exudyn" does not run variant "full"'),
+        ('reason = "above the critical speed the unstiffened body diverges"', "", "needs a reason"),
+        ("segments = 16", "", r"\$.variant\[2\].segments"),
+        ('transform = "segments"', "", r"\$.variant\[2\].segments"),
+        ('engines = ["native"]', "engines = []", "name at least one engine"),
+        ('name = "full"', 'name = "rigid"', "two variants have the same name"),
+        ('reference = "rigid"', 'reference = "stiff"', 'no variant "stiff"'),
+        ("duration_s = 10.0", "duration_s = 0.0", "needs a duration"),
+        ('b = { variant = "rigid", engine = "pinocchio" }', 'b = { variant = "rigid", engine = "adams" }', "adams"),
+        ('goals = { "marker:tip.position" = 1e-6 }', "goals = {}", "at least one channel"),
+    ],
+)
+def test_faulty_run_files_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in EXAMPLE
+    folder = copy_case(tmp_path)
+    (folder / "run.toml").write_text(EXAMPLE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(CaseError, match=message) as refusal:
+        load_case(folder)
+    assert "run.toml" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "place"),
+    [("samples = 81", "samples"), ("duration = 3", "duration"), ('name = "rigid"\nengine = "x"', "engine")],
+)
+def test_unknown_keys_and_types_name_their_place(tmp_path: Path, line: str, place: str) -> None:
+    folder = copy_case(tmp_path)
+    text = (folder / "run.toml").read_text(encoding="utf-8")
+    changed = {
+        "samples": text.replace("samples = 81", 'samples = "many"'),
+        "duration": "duration = 3\n" + text,
+        "engine": text.replace('name = "rigid"', line, 1),
+    }[place]
+    (folder / "run.toml").write_text(changed, encoding="utf-8")
+    with pytest.raises(CaseError, match=place):
+        load_case(folder)
+
+
+def test_missing_scene_and_unknown_case_say_what_to_do(tmp_path: Path) -> None:
+    folder = copy_case(tmp_path)
+    (folder / "scene.toml").unlink()
+    with pytest.raises(CaseError, match=r"needs scene.toml"):
+        load_case(folder)
+    with pytest.raises(CaseError, match="crosscheck list"):
+        resolve(("no such case",))
+
+
+def test_a_folder_is_a_case() -> None:
+    (case,) = resolve((str(CASE),))
+    assert case.name == "pendulum/single"
+    assert case.provenance is not None
+
+
+def pairs(run: RunFile) -> set[tuple[str, str]]:
+    return {(item.a.engine, item.b.engine) for item in run.comparisons}
+
+
+def test_all_pairs_and_selections_of_engines() -> None:
+    run = example()
+    everything = pairs(select(run, ()))
+    assert ("mujoco", "exudyn") in everything
+    assert len(select(run, ()).comparisons) == 6 + 1
+    assert pairs(select(run, ("native", "mujoco"))) == {("native", "mujoco")}
+    alone = select(run, ("mujoco",))
+    assert pairs(alone) == {pair for pair in everything if "mujoco" in pair}
+    assert set(alone.variant("rigid").engines) == {"native", "pinocchio", "mujoco", "exudyn"}
+
+
+def test_a_foreign_engine_joins_what_is_compared_engine_by_engine() -> None:
+    run = select(example(), ("mine",))
+    assert ("native", "mine") in pairs(run)
+    assert all("mine" in pair for pair in pairs(run))
+
+
+def test_a_shipped_engine_that_the_case_leaves_out_stays_out() -> None:
+    run = msgspec.structs.replace(
+        example(),
+        variants=tuple(
+            msgspec.structs.replace(v, engines=tuple(e for e in v.engines if e != "exudyn")) for v in example().variants
+        ),
+    )
+    assert pairs(select(run, ("native", "exudyn"))) == set()
+
+
+def test_charts_follow_their_variants() -> None:
+    run = select(example(), ("exudyn",))
+    assert [chart.variants for chart in run.charts] == [("rigid",)]
