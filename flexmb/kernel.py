@@ -4,7 +4,7 @@
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper and
 no cache entry of its own (a third of the cold compile time of caching everything). From Python, call its `.py_func`.
 
-The disk cache is keyed by the sources of the whole package. Numba by itself only looks at the file of the entry point,
+The disk cache is keyed by the sources of the package, less the folders that hold no kernels. Numba by itself only looks at the file of the entry point,
 so that an edited helper in another file would leave a stale, silently wrong kernel behind.
 """
 
@@ -23,10 +23,16 @@ from numba.misc.appdirs import AppDirs
 _SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
 
 
+# Folders whose sources no kernel can depend on (held by a test): editing them recompiles nothing.
+WITHOUT_KERNELS = ("scene", "modal", "dense")
+
+
 def source_hash(package: Path) -> str:
-    """Hash of every Python source below `package`: names and contents."""
+    """Hash of the Python sources below `package` that kernels may depend on: names and contents."""
     digest = hashlib.sha256()
     for source in sorted(package.rglob("*.py")):
+        if source.relative_to(package).parts[0] in WITHOUT_KERNELS:
+            continue
         digest.update(str(source.relative_to(package)).encode() + b"\0")
         digest.update(source.read_bytes() + b"\0")
     return digest.hexdigest()[:16]

@@ -98,3 +98,11 @@ def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached
     assert run(2.0) == "2.0 0"
     assert run(2.0) == "2.0 1"
     assert run(3.0) == "3.0 0"
+
+
+def test_folders_left_out_of_the_cache_key_hold_no_kernels():
+    package = Path(flexmb.kernel.__file__).parent
+    for folder in flexmb.kernel.WITHOUT_KERNELS:
+        sources = list((package / folder).rglob("*.py"))
+        assert sources, f"{folder} is not a folder of the package"
+        assert not [source for source in sources if "flexmb.kernel" in source.read_text(encoding="utf-8")]
