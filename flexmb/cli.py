@@ -85,6 +85,8 @@ def check(scene: SceneFile, t_end: End = None) -> None:
     """
     Check a scene without running it: every defect with its place and its remedy.
 
+        flexmb check boom.toml --t-end 60
+
     **Exit code**: 0 sound, 2 wrong.
     """
     with _no_traceback():

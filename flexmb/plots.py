@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from flexmb.trajectory import Trajectory
+from flexmb.trajectory import Array, Trajectory
 
 _SIZE = (9.0, 5.5)  # inches
 _RESOLUTION = 120  # dots per inch
@@ -78,8 +78,8 @@ def _loads(trajectory: Trajectory, figure: Figure) -> None:
     """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
     torque, force = _rows(figure, "|torque| (N m)", "|force| (N)")
     for name, load in (trajectory.loads | trajectory.wheel_loads).items():
-        torque.plot(trajectory.t, np.linalg.norm(load[:, :3], axis=1), label=name)
-        force.plot(trajectory.t, np.linalg.norm(load[:, 3:], axis=1), label=name)
+        torque.plot(trajectory.t, _magnitude(load[:, :3]), label=name)
+        force.plot(trajectory.t, _magnitude(load[:, 3:]), label=name)
 
 
 def _drives(trajectory: Trajectory, figure: Figure) -> None:
@@ -87,3 +87,8 @@ def _drives(trajectory: Trajectory, figure: Figure) -> None:
     for name, drive in trajectory.drives.items():
         for i in range(drive.shape[1]):
             panel.plot(trajectory.t, drive[:, i], label=name if drive.shape[1] == 1 else f"{name}[{i}]")
+
+
+def _magnitude(vectors: Array) -> Array:
+    """Lengths of (T,3); hypot does not overflow where a diverging run's squares would."""
+    return np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])

@@ -138,10 +138,13 @@ def _observed(system: System, times: Array, raw: _Raw) -> Trajectory:
     message = _message(system, raw)
     for t, y in zip(times, raw.states, strict=False):
         try:
-            seen.append(system.evaluate(t, y[: system.nq], y[system.nq : -1]))
+            evaluation = system.evaluate(t, y[: system.nq], y[system.nq : -1])
         except DynamicsError as error:  # fixed steps may have jumped over the place where the dynamics ends
             status, stopped_at, message = Status.NOT_POSITIVE_DEFINITE, float(t), f"stopped at t = {t:g} s: {error}"
             break
+        if not np.isfinite(sum(evaluation.energy.values())):  # squares overflow before the state does
+            break
+        seen.append(evaluation)
     states = raw.states[: len(seen)]
     first = seen[0] if seen else None
     q_names, u_names = state_names(system)

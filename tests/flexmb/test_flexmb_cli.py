@@ -1,0 +1,85 @@
+"""The command `flexmb`, run as a user runs it."""
+
+import json
+
+import pytest
+from typer.testing import CliRunner
+
+import flexmb as fm
+from flexmb.cli import app
+from flexmb.warmup import pendulum
+
+
+@pytest.fixture
+def scene_file(tmp_path):
+    path = tmp_path / "scene.toml"
+    fm.save_scene(pendulum(), path)
+    return path
+
+
+def invoke(*words: object):
+    return CliRunner().invoke(app, [str(word) for word in words])
+
+
+def test_simulate_writes_a_csv_and_charts_and_tells_what_happened(scene_file, tmp_path):
+    result = invoke("simulate", scene_file, "--t-end", 0.5, "--samples", 11, "--out", tmp_path / "out")
+    assert result.exit_code == 0, result.output
+    assert len((tmp_path / "out" / "trajectory.csv").read_text().splitlines()) == 12
+    assert (tmp_path / "out" / "energy.png").exists()
+    for word in ("finished at t = 0.5 s", "energy drift", "momentum change", "accepted", "compile", "trajectory.csv"):
+        assert word in result.output
+
+
+def test_a_run_that_stops_early_writes_what_it_reached_and_exits_1(tmp_path):
+    bead = (
+        fm.SceneBuilder("centrifuge")
+        .rigid_body("rail", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        .rigid_body("bead", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        .revolute("drive", "ground", "rail", prescribed=fm.Ramp(rate=1e3))
+        .prismatic("slide", "rail", "bead", axis=(1.0, 0.0, 0.0), position=1.0)
+        .scene()
+    )
+    fm.save_scene(bead, tmp_path / "bead.toml")
+    result = invoke("simulate", tmp_path / "bead.toml", "--t-end", 2, "--out", tmp_path, "--no-plots")
+    assert result.exit_code == 1
+    assert "no longer finite" in result.output
+    assert (tmp_path / "trajectory.csv").exists()
+    assert not list(tmp_path.glob("*.png"))
+
+
+def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
+    assert invoke("check", scene_file).exit_code == 0
+    scene_file.write_text(scene_file.read_text().replace('child = "bob"', 'child = "bop"'))
+    result = invoke("check", scene_file)
+    assert result.exit_code == 2
+    assert "hinges[0]" in result.output
+    assert 'did you mean "bob"?' in result.output
+    assert "Traceback" not in result.output
+
+
+@pytest.mark.parametrize("words", [("-1",), ("1", "--method", "euler"), ("1", "--rtol", "1e-20")])
+def test_wrong_options_exit_2_with_a_remedy(scene_file, words, tmp_path):
+    result = invoke("simulate", scene_file, "--out", tmp_path / "out", "--t-end", *words)
+    assert result.exit_code == 2
+    assert "error:" in result.output
+    assert "Traceback" not in result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_missing_file_is_no_traceback(tmp_path):
+    result = invoke("check", tmp_path / "nowhere.toml")
+    assert result.exit_code == 2
+    assert "nowhere.toml" in result.output
+
+
+def test_schema_is_json_schema():
+    result = invoke("schema")
+    assert result.exit_code == 0
+    assert "Scene" in json.loads(result.output)["$defs"]
+
+
+@pytest.mark.parametrize("words", [(), ("simulate",), ("check",), ("schema",)])
+def test_help_teaches(words):
+    result = invoke(*words, "--help")
+    assert result.exit_code == 0
+    assert "flexmb" in result.output
