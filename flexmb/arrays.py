@@ -1,17 +1,15 @@
 """The arrays kernels work on: one table of names, shapes and units.
 
 N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
-W wheels; L loads; F functions of time; m the largest number of modes; nq, nu lengths of q and u. Everything about a body
-is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal frame.
-Angular components come first. Units are SI. Every table is an array of records: a kernel is handed a few pointers, and
-code reads like ``c.body[k].parent``.
+W wheels; L loads; F functions of time; m the largest number of modes; nq, nu lengths of q and u. Everything about a
+body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
+frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
+``c.body[k].parent``.
 
 A *port* is a frame fixed to a point of a body that may deform: where a hinge, wheel, load or marker sits.
 """
 
 from __future__ import annotations
-
-
 
 import numpy as np
 from numpy.typing import NDArray

@@ -287,7 +287,7 @@ def _from_cross_products(J: a.Real) -> a.Real:
 
 
 def _gyration(model: FlexibleModel) -> a.Real:
-    """B_n, symmetric: centrifugal force on mode n of the undeformed body, sum phi . (w x (w x r)) m + psi . (w x J w)."""
+    """B_n, symmetric: centrifugal force on mode n at rest shape, sum m phi . (w x (w x r)) + psi . (w x J w)."""
     centre = model.position + model.com_offset
     moves = model.translation + cross_matrix(model.com_offset).swapaxes(-1, -2) @ model.rotation
     P = np.einsum("p,pan,pb->nab", model.mass, moves, centre)

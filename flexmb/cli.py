@@ -27,8 +27,9 @@ Simulate trees of rigid and flexible bodies, wheels and point masses.
 
 A scene is a TOML file: see `docs/scene-reference.md`, or `flexmb schema` for the JSON Schema your editor understands.
 
-    flexmb check scene.toml
-    flexmb simulate scene.toml --t-end 10 --out results
+Find every defect of a scene: `flexmb check scene.toml`
+
+Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out results`
 """,
 )
 console = Console()

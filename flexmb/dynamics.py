@@ -1,6 +1,7 @@
 """Entry points of the compiled dynamics: right-hand side, projection, and everything observable at one state."""
 
 from flexmb.balance import energy_and_momentum, power
+from flexmb.functions import evaluate
 from flexmb.jain import inverse
 from flexmb.jain.kinematics import (
     acceleration_sweep,
@@ -13,7 +14,6 @@ from flexmb.jain.kinematics import (
     velocity_sweep,
 )
 from flexmb.jain.sweeps import forward_dynamics
-from flexmb.functions import evaluate
 from flexmb.kernel import helper, kernel
 from flexmb.loads import drive_loads, hinge_loads, wheel_load
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
@@ -81,8 +81,8 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
     """Everything observable at one state; w.acceleration and w.drive are filled as well. Returns a status code.
     Loads are those of the model: a ruthless body shows them at its rest shape. Markers move with the true deformation.
 
-    markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6) and
-    wheel_loads (W,6): [torque; force] in World axes; energy (4,), momentum (6,) as in flexmb.balance.
+    markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6)
+    and wheel_loads (W,6): [torque; force] in World axes; energy (4,), momentum (6,) as in flexmb.balance.
     """
     load_state(t, y, c, w)
     status = forward_dynamics(c, w)

@@ -4,8 +4,8 @@
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper and
 no cache entry of its own (a third of the cold compile time of caching everything). From Python, call its `.py_func`.
 
-The disk cache is keyed by the sources of the package, less the folders that hold no kernels. Numba by itself only looks at the file of the entry point,
-so that an edited helper in another file would leave a stale, silently wrong kernel behind.
+The disk cache is keyed by the sources of the package, less the folders that hold no kernels. Numba by itself only looks
+at the file of the entry point, so that an edited helper in another file would leave a stale, wrong kernel behind.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """From scene to links: every body (point masses too) with its inboard hinge, in the frame the dynamics uses.
 
-A link's frame is the outboard frame of its hinge, turned so that a hinge axis is z; only where that hinge sits on a node
-that deforms does the link keep the modal frame of its body. Wheels are folded into their body, despun (Frisch).
+A link's frame is the outboard frame of its hinge, turned so that a hinge axis is z; only where that hinge sits on a
+node that deforms does the link keep the modal frame of its body. Wheels are folded into their body, despun (Frisch).
 """
 
 from __future__ import annotations

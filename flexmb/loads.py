@@ -50,7 +50,7 @@ def drive_loads(c, w):
 def wheel_load(c, w, k, i):
     """Load of the bearing and motor of wheel i on the wheel about its centre, body axes: (tau, f).
 
-    tau = J_t (alpha - q q.alpha) + w x (J w) + I (thetadd + q.alpha) q + w x I thetad q; gravity is in the acceleration.
+    Rate of its angular momentum h = J_t (w - q q.w) + I (thetad + q.w) q; gravity is in the acceleration.
     """
     port = c.wheel[i].port
     mass, axial, transverse = c.wheel[i].mass, c.wheel[i].axial, c.wheel[i].transverse

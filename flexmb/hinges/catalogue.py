@@ -93,7 +93,7 @@ def rate(kind, q, i, u, j, sequence, dq):
         spherical.rate(q, i, u, j, sequence, dq)
     elif kind == FREE:
         free.rate(q, i, u, j, sequence, dq)
-    elif kind == REVOLUTE or kind == PRISMATIC:
+    elif kind in (REVOLUTE, PRISMATIC):
         revolute.rate(q, i, u, j, sequence, dq)
     elif kind == CYLINDRICAL:
         cylindrical.rate(q, i, u, j, sequence, dq)

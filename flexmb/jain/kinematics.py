@@ -4,11 +4,11 @@ Jain & Rodriguez (10), (24), (25) for trees, in body axes. For hinges at deformi
 accelerations are classical (of the hinge point), not spatial; the body order is base to tip.
 """
 
+from flexmb.arrays import RUTHLESS
 from flexmb.functions import evaluate
 from flexmb.hinges import catalogue
 from flexmb.kernel import helper
 from flexmb.levels.field import field_motion
-from flexmb.arrays import RUTHLESS
 from flexmb.spatial.vector import (
     add,
     add3,
@@ -130,7 +130,7 @@ def port_acceleration(c, w, k, i):
 
 @helper
 def _inboard(c, w, k):
-    """O+ of body k on its parent, in parent axes: (w, v, alpha, a) of the reference, arm0 from it to O+, R_parent_O+."""
+    """O+ of body k in parent axes: (w, v, alpha, a) of the parent's reference, the arm from it to O+, R_parent_O+."""
     p = c.body[k].parent
     i = c.body[k].inboard_port
     zero = (0.0, 0.0, 0.0)

@@ -1,8 +1,8 @@
 """Articulated-body forward dynamics of trees with rigid and flexible bodies, O(N): Jain & Rodriguez (63), (64).
 
-Per body the modes are eliminated first (explicit D_f by Cholesky), then the hinge. The dense Lemma-level operators are
-another room; here every quantity is a scalar tuple or a row of the workspace. Bodies are numbered base to tip, hence the
-inward sweep runs from N-1 to 0. Gravity enters as acceleration -g of the ground.
+Per body the modes are eliminated first (explicit D_f by Cholesky), then the hinge. Every quantity is a scalar tuple or a
+row of the workspace. Bodies are numbered base to tip, hence the inward sweep runs from N-1 to 0. Gravity enters as
+acceleration -g of the ground.
 """
 
 from math import sqrt
@@ -159,11 +159,11 @@ def _refer_to_hinge(c, w, k):
 
 @helper
 def _eliminate_hinge(c, w, k):
-    """D_R, G_R, P_R^+ and z_R^+ of (63), (64); hands both to the parent. Prescribed speeds act as bias, not as freedom."""
+    """D_R, G_R, P_R^+ and z_R^+ of (63), (64), handed to the parent. Prescribed speeds act as bias, not as freedom."""
     p = load_inertia(w.body[k].hinge_inertia, 0)
     kind = c.body[k].hinge_kind
     j = c.body[k].u_index
-    single = (kind == REVOLUTE or kind == PRISMATIC) and c.body[k].outboard_port < 0
+    single = kind in (REVOLUTE, PRISMATIC) and c.body[k].outboard_port < 0
     for n in range(c.body[k].nv):
         f = c.speed[j + n].prescribed
         if f >= 0:
