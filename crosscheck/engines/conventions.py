@@ -19,17 +19,22 @@ Array = NDArray[np.float64]
 
 def scalar_last(quaternion: ArrayLike) -> Array:
     """wxyz (..., 4) to xyzw (Pinocchio, SciPy)."""
-    return np.roll(np.asarray(quaternion, dtype=float), -1, axis=-1)
+    return np.asarray(quaternion, dtype=float)[..., [1, 2, 3, 0]]
 
 
 def scalar_first(quaternion: ArrayLike) -> Array:
     """xyzw (..., 4) to wxyz (this project, MuJoCo, Exudyn)."""
-    return np.roll(np.asarray(quaternion, dtype=float), 1, axis=-1)
+    return np.asarray(quaternion, dtype=float)[..., [3, 0, 1, 2]]
 
 
 def angular_first(spatial: ArrayLike) -> Array:
     """[linear; angular] (..., 6) to [angular; linear]; its own inverse."""
-    return np.roll(np.asarray(spatial, dtype=float), 3, axis=-1)
+    return np.asarray(spatial, dtype=float)[..., [3, 4, 5, 0, 1, 2]]
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a x b over the last axis (..., 3): `np.cross` without its generality, which costs twenty times as much."""
+    return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
 def cross_matrix(a: ArrayLike) -> Array:
@@ -79,10 +84,10 @@ def quaternion_rate(quaternion: ArrayLike, omega: ArrayLike) -> Array:
     return 0.5 * np.array([-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a])
 
 
-def shift_wrench(wrench: Array, offset: ArrayLike) -> Array:
+def shift_wrench(wrench: Array, offset: Array) -> Array:
     """[tau; f] (..., 6) about Q from the same wrench about O, with `offset` (..., 3) from Q to O, one set of axes."""
     moved = np.array(wrench, dtype=float)
-    moved[..., :3] += np.cross(offset, moved[..., 3:])
+    moved[..., :3] += cross(offset, moved[..., 3:])
     return moved
 
 

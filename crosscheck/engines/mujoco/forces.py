@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.engines.conventions import rotation_vector
+from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
 from crosscheck.engines.mujoco.tree import ARMATURE, Slot, Tree
@@ -90,6 +90,6 @@ class _NodeLoad:
         vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
         if self._is_force:
             data.xfrc_applied[self._body, :3] += vector
-            data.xfrc_applied[self._body, 3:] += np.cross(R @ self._arm, vector)
+            data.xfrc_applied[self._body, 3:] += cross(R @ self._arm, vector)
         else:
             data.xfrc_applied[self._body, 3:] += vector

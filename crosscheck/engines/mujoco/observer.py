@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
-from crosscheck.engines.conventions import quaternion_of, shift_wrench
+from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import Tree
@@ -28,6 +28,7 @@ class Observer:
         self._tree = tree
         self._forces = forces
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
+        self._names = [(link.kind, link.joint) for link in tree.links]
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, data: mujoco.MjData) -> Snapshot:
@@ -35,10 +36,7 @@ class Observer:
         with self._forces.active():
             mujoco.mj_forward(model, data)
         mujoco.mj_rnePostConstraint(model, data)
-        loads = {
-            (link.kind, link.joint): self._load(body, data)
-            for link, body in zip(self._tree.links, self._tree.bodies, strict=True)
-        }
+        loads = dict(zip(self._names, self._loads(data), strict=True))
         kinetic, momentum = self._motion(data)
         mass = model.body_mass
         return Snapshot(
@@ -55,13 +53,14 @@ class Observer:
             momentum=momentum,
         )
 
-    def _pole(self, body: int, data: mujoco.MjData) -> Array:
-        """The point about which MuJoCo's spatial vectors of a body are given."""
-        return data.subtree_com[self._tree.model.body_rootid[body]]
+    def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Array:
+        """The points about which MuJoCo's spatial vectors of bodies are given."""
+        return data.subtree_com[self._tree.model.body_rootid[bodies]]
 
-    def _load(self, body: int, data: mujoco.MjData) -> Array:
-        """[torque; force] on the link about its frame's origin, which is the outboard hinge point."""
-        return shift_wrench(data.cfrc_int[body], self._pole(body, data) - data.xpos[body])
+    def _loads(self, data: mujoco.MjData) -> Array:
+        """[torque; force] (links, 6) on each link about its frame's origin, which is the outboard hinge point."""
+        bodies = self._tree.bodies
+        return shift_wrench(data.cfrc_int[bodies], self._pole(bodies, data) - data.xpos[bodies])
 
     def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
         body = self._tree.bodies[at.link]
@@ -69,9 +68,9 @@ class Observer:
         position = data.xpos[body] + R @ at.frame.position
         arm = position - self._pole(body, data)
         w, alpha = data.cvel[body, :3], data.cacc[body, :3]
-        v = data.cvel[body, 3:] + np.cross(w, arm)
+        v = data.cvel[body, 3:] + cross(w, arm)
         # The spatial acceleration's linear part lacks w x v of the point; it counts from -gravity.
-        a = data.cacc[body, 3:] + self._gravity + np.cross(alpha, arm) + np.cross(w, v)
+        a = data.cacc[body, 3:] + self._gravity + cross(alpha, arm) + cross(w, v)
         return MarkerSnapshot(
             position=position,
             quaternion=quaternion_of(R @ at.frame.rotation),
@@ -82,15 +81,15 @@ class Observer:
     def _motion(self, data: mujoco.MjData) -> tuple[float, Array]:
         """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count the drives' armature."""
         model = self._tree.model
-        pole = data.subtree_com[model.body_rootid]
+        pole = self._pole(np.arange(model.nbody), data)
         w = data.cvel[:, :3]
-        v = data.cvel[:, 3:] + np.cross(w, data.xipos - pole)
+        v = data.cvel[:, 3:] + cross(w, data.xipos - pole)
         axes = data.ximat.reshape(-1, 3, 3)
         spin = np.einsum("bij,bi->bj", axes, w)
         p = model.body_mass[:, None] * v
         about_com = np.einsum("bij,bj->bi", axes, model.body_inertia * spin)
         kinetic = 0.5 * (np.sum(p * v) + np.sum(model.body_inertia * spin**2))
-        return float(kinetic), np.concatenate([np.sum(about_com + np.cross(data.xipos, p), axis=0), p.sum(axis=0)])
+        return float(kinetic), np.concatenate([np.sum(about_com + cross(data.xipos, p), axis=0), p.sum(axis=0)])
 
     def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Array]) -> dict[str, Array]:
         """Load across the joint along the prescribed axis, less what spring and damper already give."""

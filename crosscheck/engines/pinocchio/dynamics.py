@@ -22,6 +22,9 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 
+BALLAST = 1e15
+"""kg m^2 or kg."""
+
 
 class Solution(NamedTuple):
     """Accelerations (nv,), loads of the driven coordinates (d,), power of drives, motors, dampers and loads (W)."""
@@ -51,6 +54,9 @@ class Dynamics:
         self._driven_v = np.array([slot.v for slot in self.driven], dtype=np.intp)
         self._free_q = np.setdiff1d(np.arange(tree.model.nq), self._driven_q)
         self._free_v = np.setdiff1d(np.arange(tree.model.nv), self._driven_v)
+        self._ballasted = tree.model.copy()
+        self._ballasted.armature[self._driven_v] = BALLAST
+        self._ballasted_data = self._ballasted.createData()
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
         self._scalar_q = np.array([slot.q for slot in scalars], dtype=np.intp)
         self._scalar_v = np.array([slot.v for slot in scalars], dtype=np.intp)
@@ -72,27 +78,23 @@ class Dynamics:
         return State(q, v, motion[:, 2])
 
     def solve(self, t: float, state: State) -> Solution:
-        """Hybrid dynamics: M_FF a_F = tau_F - n_F - M_FD a_D, and the drives supply the rest of their rows."""
-        model, data = self.tree.model, self.data
-        q, v, driven = state
-        lost = self.forces.dampers_and_motors(t, v)
-        tau = self.forces.springs(q) + lost
+        """Articulated-body accelerations; with driven coordinates, their rows of the inverse dynamics are the drives.
+
+        Hybrid dynamics as a limit: a driven joint has the armature `BALLAST` and the effort BALLAST * acceleration, so
+        nothing else moves it. Its acceleration is off by the drive load / BALLAST, which is below round-off.
+        """
+        lost = self.forces.dampers_and_motors(t, state.v)
+        tau = self.forces.springs(state.q) + lost
         wrenches = self._wrenches(t, state)
-        if len(self._driven_v) == 0:
-            extra = () if wrenches is None else (wrenches,)
-            a, drive = pin.aba(model, data, q, v, tau, *extra), np.zeros(0)
-        else:
-            F, D = self._free_v, self._driven_v
-            a = np.zeros(model.nv)
-            a[D] = driven
-            # n + M_D a_D, external loads included; crba comes after, rnea would not disturb its M.
-            rest = self.inverse(state, a, wrenches) - tau
-            M = pin.crba(model, data, q)
-            a[F] = np.linalg.solve(M[np.ix_(F, F)], -rest[F])
-            drive = rest[D] + M[np.ix_(D, F)] @ a[F]
-        power = lost @ v + drive @ v[self._driven_v]
+        extra = () if wrenches is None else (wrenches,)
+        D = self._driven_v
+        effort = tau.copy()
+        effort[D] = BALLAST * state.driven
+        a = pin.aba(self._ballasted, self._ballasted_data, state.q, state.v, effort, *extra)
+        drive = self.inverse(state, a, wrenches)[D] - tau[D] if len(D) else np.zeros(0)
+        power = lost @ state.v + drive @ state.v[D]
         if self.loads:
-            power += self.loads.power(t, data)
+            power += self.loads.power(t, self.data)
         return Solution(a, drive, float(power))
 
     def inverse(self, state: State, acceleration: Array, wrenches: pin.StdVec_Force | None) -> Array:

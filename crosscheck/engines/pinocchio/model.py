@@ -20,6 +20,11 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 
+# Angles of elastic chains are a thousandth of a radian: coarser absolute tolerances let their fastest modes ring.
+_SMALL = 1e-3
+# Coordinates and speeds are of order one to a hundred, so below this the error control would chase round-off.
+_ROUND_OFF = 1e-13
+
 
 class PinocchioModel:
     def __init__(self, scene: Scene) -> None:
@@ -63,7 +68,7 @@ class PinocchioModel:
             solved = solve_ivp(
                 lambda t, y, last=before_end: self._dynamics.rate(min(t, last), y),
                 (begin, end), y, method=effort.method, t_eval=np.union1d(inside, [end]),
-                rtol=effort.value, atol=effort.value,
+                rtol=effort.value, atol=max(_SMALL * effort.value, _ROUND_OFF),
             )  # fmt: skip
             evaluations += solved.nfev
             good = np.isfinite(solved.y).all(axis=0)

@@ -7,7 +7,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
-from crosscheck.engines.conventions import angular_first, quaternion_of, rotate_spatial
+from crosscheck.engines.conventions import angular_first, cross, quaternion_of, rotate_spatial
 from crosscheck.engines.links import attachment
 from crosscheck.engines.pinocchio.dynamics import Dynamics, State
 from crosscheck.engines.pinocchio.tree import placement
@@ -55,7 +55,7 @@ class Observer:
                 "spring": dynamics.forces.spring_energy(state.q),
                 "gravity": pin.computePotentialEnergy(model, data, state.q),
             },
-            momentum=np.concatenate([about_com + np.cross(com, linear), linear]),
+            momentum=np.concatenate([about_com + cross(com, linear), linear]),
         )
 
     def _marker(self, frame: int) -> MarkerSnapshot:
