@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -13,7 +14,7 @@ from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.joints import Link, Port
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, Motion, across_quaternion
-from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.scene.hinges import (
     AngularCoordinate, Cylindrical, Free, Gimbal, Hinge, Planar, Prismatic, Revolute, Spherical, Universal, Weld,
@@ -68,6 +69,21 @@ class Assembly:
     @property
     def links(self) -> dict[str, Link]:
         return self.hinges | self.wheels | self.guides
+
+    @property
+    def prescribed(self) -> list[tuple[int, Callable[[float], Profile]]]:
+        """Every prescribing constraint with its function of time."""
+        stages = [stage for link in self.links.values() for stage in link.stages]
+        return [(stage.constraint, stage.prescribed) for stage in stages if stage.constraint is not None]
+
+    def deflection_measures(self) -> list[tuple[slice, Array]]:
+        """Where the modal coordinates are among the coordinates, and how far each reaches, for every flexible body."""
+        found = []
+        for placed in self.bodies.values():
+            if placed.carrier.modes is not None:
+                first = self.shop.mbs.GetNodeODE2Index(placed.carrier.modes)
+                found.append((slice(first, first + len(placed.eta)), placed.reach))
+        return found
 
 
 def unconstrained(scene: Scene) -> bool:

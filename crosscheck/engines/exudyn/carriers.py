@@ -13,11 +13,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.contract import Array
-from crosscheck.engines.conventions import quaternion_of
+from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.exudyn.library import load, matrix
 from crosscheck.engines.exudyn.modal import ModalIntegrals, gravity_force
 from crosscheck.engines.exudyn.motion import Motion
-from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, matrices
+from crosscheck.engines.exudyn.rotations import exponential, local_rate_map
 from crosscheck.engines.lumping import Inertia, steiner
 
 
@@ -155,12 +155,17 @@ class Workshop:
             return 0
         g = self.gravity
         if self.explicit:
-            return lambda mbs, t, item, q, qdot: gravity_force(data, g, exponential(q[3:6]), np.eye(3), q[6:])
+
+            def weight_on_group(mbs, t, item, q, qdot):
+                turn = np.asarray(q[3:6])
+                return gravity_force(data, g, exponential(turn), np.eye(3), np.asarray(q[6:]))
+
+            return weight_on_group
         reference = np.array(self.mbs.GetNodeParameter(node, "referenceCoordinates"))[3:7]
 
         def weight(mbs, t, item, q, qdot):
             p = reference + q[3:7]
-            return gravity_force(data, g, matrices(p), local_rate_map(p), np.asarray(q[7:]))
+            return gravity_force(data, g, rotation_matrix(p), local_rate_map(p), np.asarray(q[7:]))
 
         return weight
 

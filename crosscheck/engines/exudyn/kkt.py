@@ -9,6 +9,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.assembly import Assembly
+from crosscheck.engines.exudyn.beams import PlanarBeam
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import States
 
@@ -16,7 +17,7 @@ _DISTANCE = 1e-5
 """Time (s) of the central difference along the velocity: error (1e-5)²/6 third derivatives against 1e-16/1e-5."""
 
 
-def initial_state(assembly: Assembly) -> States:
+def initial_state(assembly: Assembly | PlanarBeam) -> States:
     """The state at t = 0 with accelerations and multipliers that satisfy M a + C' mu = f and C a = -dC/dt v + d2o/dt2.
 
     C is the Jacobian of Exudyn's constraints, o the prescribed coordinates.
@@ -57,14 +58,11 @@ def initial_state(assembly: Assembly) -> States:
     return States(np.zeros(1), q[None], v[None], a[None], multipliers[None], stored[None])
 
 
-def _prescribed_accelerations(assembly: Assembly, size: int) -> Array:
+def _prescribed_accelerations(assembly: Assembly | PlanarBeam, size: int) -> Array:
     """Second derivatives of the offsets in the rows of their constraints (coordinate - offset = 0)."""
     found = np.zeros(size)
-    for link in assembly.links.values():
-        for stage in link.stages:
-            if stage.constraint is not None:
-                row = assembly.shop.mbs.systemData.GetObjectLTGAE(stage.constraint)[0]
-                found[row] = stage.prescribed(0.0).acceleration
+    for constraint, profile in assembly.prescribed:
+        found[assembly.shop.mbs.systemData.GetObjectLTGAE(constraint)[0]] = profile(0.0).acceleration
     return found
 
 
@@ -74,6 +72,8 @@ def body_mass_matrix(assembly: Assembly, body: str) -> Array:
     Exudyn's matrix for [World position, rotation coordinates, modes] by congruence with the map from these speeds.
     """
     placed, shop = assembly.bodies[body], assembly.shop
+    data = shop.mbs.systemData
+    data.SetODE2Coordinates(data.GetODE2Coordinates(shop.exu.ConfigurationType.Initial))
     carrier, m = placed.carrier, len(placed.eta)
     M = np.array(shop.mbs.ComputeItem(carrier.flexible, shop.exu.ComputeItemType.MassMatrix))
     A = placed.motion.rotation @ carrier.zero.T

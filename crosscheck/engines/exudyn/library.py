@@ -23,6 +23,8 @@ def load() -> ModuleType:
     except ImportError as error:
         raise EngineMissing(REMEDY) from error
     exudyn.special.userInterface.SuppressAll()
+    exudyn.config.suppressWarnings = True
+    exudyn.config.printToConsole = False
     return exudyn
 
 

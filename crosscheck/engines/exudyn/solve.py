@@ -9,15 +9,25 @@ import numpy as np
 
 from crosscheck.engines.contract import Array, Effort, Status
 from crosscheck.engines.exudyn.assembly import Assembly
+from crosscheck.engines.exudyn.beams import PlanarBeam
 from crosscheck.engines.exudyn.state import States
 
 IMPLICIT = ("TrapezoidalIndex2", "GeneralizedAlpha")
 EXPLICIT = "DOPRI5"
 SPECTRAL_RADIUS = 0.9
-NEWTON_RELATIVE, NEWTON_ABSOLUTE = 1e-8, 1e-8
-"""Exudyn's defaults (1e-8, 1e-10) lie below the round-off floor of stiff bodies: Newton then never ends."""
+NEWTON_TOLERANCES = (1e-8, 1e-6, 1e-4)
+"""Relative and absolute tolerance of Newton's method, tried in turn until a run reaches its end.
+
+The floor that round-off puts under the residual depends on the stiffness of the bodies; below it Newton never converges
+and the run stops early (Exudyn's defaults, 1e-8 and 1e-10, do so for beams). 1e-6 leaves errors of 1e-7 in positions; only finely meshed stiff beams come to 1e-4.
+"""
 DEFLECTION_LIMIT = 1e3
 """Largest deflection, in units of the body's length: beyond it a linear modal field means nothing."""
+
+SPARSE_FROM = 60
+"""Number of unknowns from which Exudyn's sparse solver is the faster one."""
+SMALLEST_STEP = 1e-4
+"""Smallest error-controlled step, in units of a sample interval: Exudyn goes on with it, however large the error."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +44,7 @@ class Solution:
 class Recorder:
     """Collects the state at every sample; Exudyn calls its sensors twice at the start, and the later call counts."""
 
-    def __init__(self, assembly: Assembly) -> None:
+    def __init__(self, assembly: Assembly | PlanarBeam) -> None:
         self.data = assembly.shop.mbs.systemData
         self.rows: list[tuple[float, Array, Array, Array, Array]] = []
 
@@ -55,7 +65,7 @@ class Recorder:
         return States(times, q, v, None, multipliers.reshape(count, -1), stored.reshape(count, -1))
 
 
-def integrate(assembly: Assembly, times: Array, effort: Effort) -> Solution:
+def integrate(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> Solution:
     """Integrate from 0 through `times`; uniform sampling for the implicit solvers."""
     run = _implicit if effort.method in IMPLICIT else _explicit
     start = perf_counter()
@@ -68,7 +78,7 @@ def integrate(assembly: Assembly, times: Array, effort: Effort) -> Solution:
     return Solution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations)
 
 
-def _settings(assembly: Assembly):
+def _settings(assembly: Assembly | PlanarBeam):
     settings = assembly.shop.exu.SimulationSettings()
     settings.solution.file.write = False
     settings.timeIntegration.verboseMode = 0
@@ -88,17 +98,28 @@ def steps_between_samples(times: Array, step: float) -> int:
     return 2 ** max(0, int(np.ceil(np.log2(gaps[0] / step) - 1e-9)))
 
 
-def _implicit(assembly: Assembly, times: Array, effort: Effort) -> tuple[States, int]:
+def _implicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
     """A fixed-step run; a sensor takes the samples, which fall on steps."""
+    for tolerance in NEWTON_TOLERANCES:
+        states, evaluations = _fixed_steps(assembly, times, effort, tolerance)
+        if len(states.times) >= len(times):
+            break
+    return states, evaluations
+
+
+def _fixed_steps(
+    assembly: Assembly | PlanarBeam, times: Array, effort: Effort, tolerance: float
+) -> tuple[States, int]:
     shop = assembly.shop
-    steps = steps_between_samples(times, effort.value) * (len(times) - 1)
     settings = _settings(assembly)
     control = settings.timeIntegration
-    control.endTime, control.numberOfSteps = float(times[-1]), steps
-    control.newton.relativeTolerance, control.newton.absoluteTolerance = NEWTON_RELATIVE, NEWTON_ABSOLUTE
+    control.solverType = getattr(shop.exu.DynamicSolverType, effort.method)
+    control.endTime = float(times[-1])
+    control.numberOfSteps = steps_between_samples(times, effort.value) * (len(times) - 1)
+    control.newton.relativeTolerance = control.newton.absoluteTolerance = tolerance
     control.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
     settings.solution.sensors.writePeriod = float(times[1])
-    if shop.mbs.systemData.SystemSize() > 60:
+    if shop.mbs.systemData.SystemSize() > SPARSE_FROM:
         settings.linearSolver.solverType = shop.exu.LinearSolverType.EigenSparse
     recorder = Recorder(assembly)
 
@@ -107,14 +128,22 @@ def _implicit(assembly: Assembly, times: Array, effort: Effort) -> tuple[States,
         return [0.0]
 
     shop.mbs.SetSensorParameter(assembly.sampler, "sensorUserFunction", sample)
-    shop.mbs.SolveDynamic(
-        settings, solverType=getattr(shop.exu.DynamicSolverType, effort.method), showHints=False,
-        showCausingItems=False,
-    )  # fmt: skip
+    _run(assembly, settings)
     return recorder.states(), shop.mbs.sys["dynamicSolver"].it.newtonStepsCount
 
 
-def _explicit(assembly: Assembly, times: Array, effort: Effort) -> tuple[States, int]:
+def _run(assembly: Assembly | PlanarBeam, settings, update: bool = False) -> bool:
+    """Run Exudyn's solver; False where it gives up, be it by its return value or by an exception."""
+    exu = assembly.shop.exu
+    try:
+        return assembly.shop.mbs.SolveDynamic(
+            settings, updateInitialValues=update, showHints=False, showCausingItems=False
+        )
+    except (exu.SolverError, exu.ModelError):
+        return False
+
+
+def _explicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
     """Error-controlled steps, restarted at every sample: the solver does not stop at output times by itself."""
     shop = assembly.shop
     data, initial = shop.mbs.systemData, shop.exu.ConfigurationType.Initial
@@ -122,6 +151,7 @@ def _explicit(assembly: Assembly, times: Array, effort: Effort) -> tuple[States,
     recorder, settings = Recorder(assembly), _settings(assembly)
     settings.solution.sensors.active = False
     control = settings.timeIntegration
+    control.solverType = shop.exu.DynamicSolverType.DOPRI5
     control.automaticStepSize, control.numberOfSteps = True, 1
     control.relativeTolerance = control.absoluteTolerance = effort.value
     shop.mbs.Assemble()
@@ -129,25 +159,24 @@ def _explicit(assembly: Assembly, times: Array, effort: Effort) -> tuple[States,
     steps = 0
     for left, right in zip(times, times[1:], strict=False):
         control.startTime, control.endTime = float(left), float(right)
-        finished = shop.mbs.SolveDynamic(
-            settings, solverType=shop.exu.DynamicSolverType.DOPRI5, updateInitialValues=True, showHints=False
-        )
-        steps += shop.mbs.sys["dynamicSolver"].it.currentStepIndex
-        if not finished:
+        control.minimumStepSize = SMALLEST_STEP * float(right - left)
+        finished = _run(assembly, settings, update=True)
+        taken = shop.mbs.sys["dynamicSolver"].it.currentStepIndex
+        steps += taken
+        if not finished or taken > 0.9 / SMALLEST_STEP:
             break
-        recorder.take(right)
+        recorder.take(float(right))
+        if not np.all(np.isfinite(recorder.rows[-1][1])):
+            break
     data.SetSystemState(start, initial)
     return recorder.states(), 6 * steps
 
 
-def _good_samples(assembly: Assembly, states: States, times: Array) -> int:
+def _good_samples(assembly: Assembly | PlanarBeam, states: States, times: Array) -> int:
     """How many samples to keep: in time, finite, and with deflections that still mean something."""
     count = min(len(states.times), len(times))
     good = np.abs(states.times[:count] - times[:count]) < 1e-6 * times[-1]
     good &= np.all(np.isfinite(states.q[:count]), axis=1) & np.all(np.isfinite(states.v[:count]), axis=1)
-    for placed in assembly.bodies.values():
-        if placed.carrier.modes is not None:
-            first = assembly.shop.mbs.GetNodeODE2Index(placed.carrier.modes)
-            eta = states.q[:count, first : first + len(placed.eta)]
-            good &= np.abs(eta) @ placed.reach < DEFLECTION_LIMIT
+    for columns, reach in assembly.deflection_measures():
+        good &= np.abs(states.q[:count, columns]) @ reach < DEFLECTION_LIMIT
     return int(np.argmin(np.append(good, False)))

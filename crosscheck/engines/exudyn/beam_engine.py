@@ -1,0 +1,186 @@
+"""Exudyn's large-deflection planar beams as an engine of their own: the nonlinear reference for beam scenes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from crosscheck.engines.contract import (
+    Array,
+    Effort,
+    MarkerPath,
+    MarkerSnapshot,
+    Model,
+    Run,
+    Snapshot,
+    Support,
+    Trajectory,
+)
+from crosscheck.engines.exudyn import library
+from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, root_frame
+from crosscheck.engines.exudyn.kkt import initial_state
+from crosscheck.engines.exudyn.solve import integrate
+from crosscheck.engines.exudyn.state import States
+from flexmb.scene.hinges import Revolute, Weld
+from flexmb.scene.schema import BeamBody, Scene
+from flexmb.scene.tree import GROUND, node_frame
+
+STEPS = (1e-2, 5e-3, 2.5e-3)
+"""Steps (s) that follow the bending of a flexible boom turning at a few rad/s; the axial vibrations are stepped over."""
+
+
+class ExudynBeamEngine:
+    """A single beam on a hinge about World z, or clamped, as a planar beam of finite deflection."""
+
+    name = "exudyn-beam"
+
+    def version(self) -> str:
+        """Version of the library; raises EngineMissing where it is not installed."""
+        return library.version()
+
+    def supports(self, scene: Scene) -> Support:
+        """"surrogate" for the scenes it takes: another model of the beam than its modes, not an approximation of them."""
+        for reason in _refusals(scene):
+            return Support("no", reason)
+        return Support("surrogate", "a planar beam of finite deflection instead of modes")
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        """The scene's own number of elements, three steps; generalised-alpha damps the axial vibrations that it skips."""
+        return tuple(Effort("step", step, "GeneralizedAlpha") for step in STEPS)
+
+    def compile(self, scene: Scene) -> Model:
+        """Convert the scene; the mesh has as many elements as the scene's beam."""
+        return BeamModel(assemble_beam(scene, scene.bodies[0].elements))
+
+
+def _refusals(scene: Scene) -> Iterator[str]:
+    if len(scene.bodies) != 1 or not isinstance(scene.bodies[0], BeamBody):
+        yield "it takes scenes with one beam and nothing else"
+        return
+    beam, hinge = scene.bodies[0], scene.hinges[0]
+    if scene.wheels or scene.point_masses or scene.loads or scene.closures or beam.tip_masses:
+        yield "it takes a bare beam: no wheels, point masses, tip masses, loads or closures"
+    if scene.modal_states:
+        yield "initial modal coordinates have no meaning here"
+    if any(scene.gravity_m_s2):
+        yield "it takes no gravity"
+    if set(beam.modes.families) - {"bending_y", "axial"}:
+        yield 'it is planar: the beam may want the families "bending_y" and "axial" only'
+    if np.any(beam.modes.damping_ratio):
+        yield "it has no modal damping"
+    if beam.theory == "timoshenko" and any(station.GAy_N is None for station in beam.stations):
+        yield "a shear-flexible beam needs GAy_N at every station"
+    if beam.level == "rigid":
+        yield "the beam is rigid in this scene"
+    yield from _hinge_refusals(beam, hinge)
+
+
+def _hinge_refusals(beam: BeamBody, hinge) -> Iterator[str]:
+    if hinge.parent != GROUND or not isinstance(hinge, Revolute | Weld):
+        yield "the beam must be hinged (revolute) or welded to the ground"
+        return
+    if node_frame(beam, hinge.child_node).position[0] != 0.0 or any(hinge.child_position_m):
+        yield "the hinge must be at the root of the beam"
+    if abs(root_frame(beam, hinge).rotation[2, 2] - 1.0) > 1e-12:
+        yield "the beam's x-y plane must be World's x-y plane"
+    if isinstance(hinge, Revolute):
+        turned = root_frame(beam, hinge).rotation @ np.array(hinge.axis)
+        c = hinge.rotation
+        if abs(abs(turned[2]) - 1.0) > 1e-12:
+            yield "the hinge axis must be World z"
+        if c.stiffness_Nm_rad or c.damping_Nms_rad or c.torque_Nm is not None:
+            yield "the hinge may be free or prescribed, without spring, damper or motor"
+
+
+class BeamModel:
+    """One planar beam."""
+
+    def __init__(self, beam: PlanarBeam) -> None:
+        self.beam = beam
+
+    def warm_up(self) -> None:
+        """Nothing to compile."""
+
+    def evaluate(self) -> Snapshot:
+        states = initial_state(self.beam)
+        markers = {}
+        for marker in self.beam.scene.markers:
+            path, acceleration = self._marker(marker, states)
+            markers[marker.name] = MarkerSnapshot(
+                path.position[0], path.quaternion[0], path.velocity[0], acceleration[0]
+            )
+        loads = {name: values[0] for name, values in self._loads(states).items()}
+        drives = {name: values[0] for name, values in self._drives(states).items()}
+        return Snapshot(markers, loads, {}, drives, {}, None)
+
+    def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        solution = integrate(self.beam, run.times, effort)
+        states = solution.states
+        states.multipliers[:1] = initial_state(self.beam).multipliers
+        return Trajectory(
+            status=solution.status, message=solution.message, times=run.times[: len(states.times)],
+            markers={marker.name: self._marker(marker, states)[0] for marker in self.beam.scene.markers},
+            loads=self._loads(states), drives=self._drives(states), wall_s=solution.wall_s,
+            evaluations=solution.evaluations,
+        )  # fmt: skip
+
+    def _multiplier(self, states: States, hold: int) -> Array:
+        return states.multipliers[:, self.beam.shop.mbs.systemData.GetObjectLTGAE(self.beam.holds[hold])[0]]
+
+    def _loads(self, states: States) -> dict[str, Array]:
+        """(T,6) [torque; force] on the beam about the hinge point: what holds the massless hub."""
+        load = np.zeros((len(states.times), 6))
+        for hold, column in zip(range(len(self.beam.holds)), (3, 4, 2), strict=False):
+            load[:, column] = -self._multiplier(states, hold)
+        return {self.beam.scene.hinges[0].name: load}
+
+    def _drives(self, states: States) -> dict[str, Array]:
+        hinge = self.beam.scene.hinges[0]
+        if not self.beam.prescribed:
+            return {}
+        return {hinge.name: -axis_sign(hinge) * self._multiplier(states, 2)[:, None]}
+
+    def _marker(self, marker, states: States) -> tuple[MarkerPath, Array]:
+        """Motion of a section plus offset, and its spatial acceleration (T,6), zeros where the states have none."""
+        beam, T = self.beam, len(states.times)
+        rest = node_frame(beam.scene.bodies[0], marker.node)
+        node = beam.nodes[int(np.argmin(np.abs(beam.stations - rest.position[0])))]
+        first, size = beam.shop.mbs.GetNodeODE2Index(node), 3 if beam.sheared else 4
+        reference = np.array(beam.shop.mbs.GetNodeParameter(node, "referenceCoordinates"))
+        q = states.q[:, first : first + size] + reference
+        v = states.v[:, first : first + size]
+        a = np.zeros_like(v) if states.a is None else states.a[:, first : first + size]
+        angle, rate, second = self._turn(q, v, a)
+        offset = np.array(marker.offset_m)
+        arm = np.stack(
+            [
+                np.cos(angle) * offset[0] - np.sin(angle) * offset[1],
+                np.sin(angle) * offset[0] + np.cos(angle) * offset[1],
+            ],
+            axis=1,
+        )
+        normal = np.stack([-arm[:, 1], arm[:, 0]], axis=1)
+        position = np.column_stack([q[:, :2] + arm, np.full(T, beam.height + offset[2])])
+        zero = np.zeros(T)
+        linear = v[:, :2] + rate[:, None] * normal
+        classical = a[:, :2] + second[:, None] * normal - rate[:, None] ** 2 * arm
+        velocity = np.column_stack([zero, zero, rate, linear, zero])
+        acceleration = np.column_stack([zero, zero, second, classical, zero])
+        quaternion = np.column_stack([np.cos(angle / 2.0), zero, zero, np.sin(angle / 2.0)])
+        return MarkerPath(position, quaternion, velocity), acceleration
+
+    def _turn(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+        """Angle of the section (rad), its rate and acceleration."""
+        if self.beam.sheared:
+            return q[:, 2], v[:, 2], a[:, 2]
+        s, s_rate, s_second = q[:, 2:], v[:, 2:], a[:, 2:]
+        square = np.sum(s * s, axis=1)
+        rate = _cross(s, s_rate) / square
+        second = _cross(s, s_second) / square - 2.0 * rate * np.sum(s * s_rate, axis=1) / square
+        return np.unwrap(np.arctan2(s[:, 1], s[:, 0])), rate, second
+
+
+def _cross(a: Array, b: Array) -> Array:
+    """z component of a x b for (T,2) vectors."""
+    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
