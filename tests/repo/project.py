@@ -17,5 +17,10 @@ def text_files() -> Iterator[Path]:
     yield from (path for path in sorted(ROOT.iterdir()) if path.is_file() and path.suffix in TEXT - {""})
     for folder in SOURCES:
         for path in sorted((ROOT / folder).rglob("*")):
-            if path.is_file() and path.suffix in TEXT and "__pycache__" not in path.parts:
+            if path.is_file() and path.suffix in TEXT and not is_cache(path.relative_to(ROOT / folder)):
                 yield path
+
+
+def is_cache(path: Path) -> bool:
+    """Whether a relative path lies in a folder that tools leave behind."""
+    return any(part == "__pycache__" or part.startswith(".") for part in path.parts)

@@ -18,7 +18,6 @@ SYSTEM = {
     "coordinate": ["name"],
     "speed": ["name"],
     "state": ["q", "u"],
-    "initial_state": [],
     "accelerations": ["state", "algorithm"],
     "mass_matrix": ["state"],
     "bias": ["state"],
@@ -49,6 +48,10 @@ def test_scene_builder() -> None:
 @pytest.mark.parametrize("name", SYSTEM)
 def test_system(name: str) -> None:
     assert set(SYSTEM[name]) <= _parameters(getattr(fm.System, name))
+
+
+def test_initial_state_is_a_value() -> None:
+    assert isinstance(inspect.getattr_static(fm.System, "initial_state"), property)
 
 
 def test_trajectory() -> None:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.repo.project import ROOT
+from tests.repo.project import ROOT, is_cache
 
 FROM_WHEEL = """
 import pathlib, sys
@@ -51,9 +51,9 @@ def test_ships_every_case(wheel: Path) -> None:
 
 def test_ships_every_data_file(wheel: Path) -> None:
     def data(root: Path) -> set[Path]:
-        files = (path for path in root.rglob("*") if path.is_file() and "__pycache__" not in path.parts)
-        return {path.relative_to(root) for path in files}
+        files = (path.relative_to(root) for path in root.rglob("*") if path.is_file())
+        return {path for path in files if not is_cache(path)}
 
     for package in ("flexmb", "crosscheck"):
-        assert data(ROOT / package) <= {path for path in data(wheel / package)}
+        assert data(ROOT / package) <= data(wheel / package)
     assert data(wheel / "crosscheck" / "cases") == data(ROOT / "cases")
