@@ -35,19 +35,24 @@ class _Worker:
     process: BaseProcess
     pipe: Connection
     job: int | None = None
+    kind: str = ""
 
 
-def run_jobs(function: Function, jobs: Sequence[Any], workers: int, log: str) -> Iterator[Event]:
+def run_jobs(
+    function: Function, jobs: Sequence[Any], workers: int, log: str, kind: Callable[[Any], str] = lambda job: ""
+) -> Iterator[Event]:
     """Run `function(job, emit)` for every job in `workers` processes; events in the order in which they come.
 
-    `function` must be importable by name. Whatever workers print goes to the file `log`. Numerical libraries get one
-    thread per worker. Closing the iterator early stops the workers.
+    `function` must be importable by name. `kind(job)` names what a worker has to load or compile for a job: workers
+    stay with their kind while there are jobs of it. Whatever they print goes to the file `log`. Numerical libraries get
+    one thread per worker. Closing the iterator early stops the workers.
     """
-    waiting = list(range(len(jobs)))[::-1]
+    waiting = list(range(len(jobs)))
+    kinds = [kind(job) for job in jobs]
     crew = [_start(function, log) for _ in range(min(workers, len(jobs)))]
     try:
         for worker in crew:
-            yield _hand_out(worker, waiting, jobs)
+            yield _hand_out(worker, _next_job(worker, crew, waiting, kinds), jobs, kinds)
         while busy := [worker for worker in crew if worker.job is not None]:
             ready = wait([worker.pipe for worker in busy])
             for worker in [each for each in busy if each.pipe in ready]:
@@ -60,7 +65,7 @@ def run_jobs(function: Function, jobs: Sequence[Any], workers: int, log: str) ->
                 if event.kind in ("crashed", "ended"):
                     worker.job = None
                     if waiting:
-                        yield _hand_out(worker, waiting, jobs)
+                        yield _hand_out(worker, _next_job(worker, crew, waiting, kinds), jobs, kinds)
     finally:
         for worker in crew:
             worker.pipe.close()
@@ -87,11 +92,19 @@ def _start(function: Function, log: str) -> _Worker:
     return _Worker(process, here)
 
 
-def _hand_out(worker: _Worker, waiting: list[int], jobs: Sequence[Any]) -> Event:
-    worker.job = waiting.pop()
+def _next_job(worker: _Worker, crew: list[_Worker], waiting: list[int], kinds: list[str]) -> int:
+    """Take the first waiting job of the worker's own kind, else of a kind nobody is at, else the first."""
+    taken = {other.kind for other in crew if other is not worker}
+    preference = ([kinds[job] != worker.kind, kinds[job] in taken] for job in waiting)
+    _, place = min((rank, place) for place, rank in enumerate(preference))
+    return waiting.pop(place)
+
+
+def _hand_out(worker: _Worker, job: int, jobs: Sequence[Any], kinds: list[str]) -> Event:
+    worker.job, worker.kind = job, kinds[job]
     with suppress(BrokenPipeError):  # a worker that died before its first job is reported when it is read
-        worker.pipe.send(jobs[worker.job])
-    return Event(worker.job, "started")
+        worker.pipe.send(jobs[job])
+    return Event(job, "started")
 
 
 def _receive(worker: _Worker) -> Event:

@@ -45,7 +45,8 @@ def sweep(
         archive.write(environment())
         for record, _ in plans:
             archive.write(record)
-        for event in run_jobs(execute, jobs, workers or os.cpu_count() or 1, str(records.with_suffix(".log"))):
+        log = str(records.with_suffix(".log"))
+        for event in run_jobs(execute, jobs, workers or os.cpu_count() or 1, log, kind=_engine):
             if isinstance(event.content, RunRecord):
                 archive.write(event.content)
             elif event.kind == "crashed":
@@ -53,6 +54,11 @@ def sweep(
             listener(jobs, event)
     finally:
         archive.close()
+
+
+def _engine(job: Job) -> str:
+    """A worker stays with its engine: each loads its library, or compiles its kernels, once."""
+    return job.engine
 
 
 def _done(known: Sequence[Record], job: Job) -> frozenset[tuple[str, str]]:

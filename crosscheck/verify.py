@@ -67,21 +67,25 @@ def verify_csv(
 
 def read_signals(file: Path, times: Array) -> dict[str, Array]:
     """Channels (T, k) of a CSV whose times are the case's; groups such as tip.px, tip.py, tip.pz must be whole."""
-    try:
-        table = np.genfromtxt(file, delimiter=",", names=True, deletechars="", dtype=np.float64, encoding="utf-8")
-        header = next(csv.reader(file.open(encoding="utf-8", newline="")))
-    except (OSError, StopIteration, ValueError) as error:
-        raise VerifyError(f"{file} cannot be read as a CSV with one header line: {error}") from None
-    names = [name.strip() for name in header]
-    if not names or names[0] != "t":
-        raise VerifyError(f'{file}: the first column must be "t"; it is "{names[0] if names else ""}"')
-    columns = dict(
-        zip(names, np.array([table[name] for name in table.dtype.names]).reshape(len(names), -1), strict=True)
-    )
+    columns = _columns(file)
     if len(columns["t"]) != len(times) or np.max(np.abs(columns["t"] - times)) > TIME_MATCH_S:
         asked = f"{len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s"
         raise VerifyError(f"{file}: its times are not the case's ({asked}); --template writes a file with them")
     return _grouped(file, {name: values for name, values in columns.items() if name != "t"})
+
+
+def _columns(file: Path) -> dict[str, Array]:
+    """Columns of a CSV by name; an empty cell is NaN."""
+    try:
+        with file.open(encoding="utf-8", newline="") as stream:
+            header, *rows = csv.reader(stream)
+        table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in rows])
+        columns = dict(zip((name.strip() for name in header), table.T, strict=True))
+    except (OSError, ValueError) as error:
+        raise VerifyError(f"{file} cannot be read as a CSV of numbers with one header line: {error}") from None
+    if next(iter(columns)) != "t":
+        raise VerifyError(f'{file}: the first column must be "t"; it is "{next(iter(columns))}"')
+    return columns
 
 
 def sample_times_csv(case: Case, variant: str | None) -> str:

@@ -46,3 +46,19 @@ def test_every_job_is_answered_and_a_crash_costs_only_its_own(tmp_path: Path) ->
 
 def test_no_jobs_no_workers(tmp_path: Path) -> None:
     assert list(run_jobs(work, [], 2, str(tmp_path / "log"))) == []
+
+
+def whoami(job: tuple[str, int], emit: Callable[[object], None]) -> None:
+    emit(os.getpid())
+
+
+def test_workers_stay_with_their_kind(tmp_path: Path) -> None:
+    """Two workers, two kinds in turn: each process does one kind, but for what the other takes over at the end."""
+    jobs = [(kind, number) for number in range(4) for kind in ("one", "two")]
+    events = run_jobs(whoami, jobs, 2, str(tmp_path / "log"), kind=lambda job: job[0])
+    homes: dict[str, list[object]] = {"one": [], "two": []}
+    for event in events:
+        if event.kind == "emitted":
+            homes[jobs[event.job][0]].append(event.content)
+    changes = sum(a != b for pids in homes.values() for a, b in zip(pids, pids[1:], strict=False))
+    assert changes <= 1

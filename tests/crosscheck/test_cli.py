@@ -1,0 +1,152 @@
+"""The command line: what it writes, what it says, and its exit codes."""
+
+from __future__ import annotations
+
+import functools
+from pathlib import Path
+
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from crosscheck import cli
+from crosscheck.engine_list import EngineState
+from crosscheck.engines.contract import Run
+from crosscheck.library import load_case
+from crosscheck.sweep import sweep
+from crosscheck.verify import verify_csv
+from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
+
+WIDE = {"COLUMNS": "200"}
+
+
+@pytest.fixture
+def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
+    monkeypatch.setattr(cli, "sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr(cli, "verify_csv", functools.partial(verify_csv, provider=PROVIDER))
+    monkeypatch.setattr(cli.console, "_width", 200)
+    return CliRunner()
+
+
+def test_run_writes_everything_and_ends_with_zero(runner: CliRunner, tmp_path: Path) -> None:
+    result = runner.invoke(cli.app, ["run", str(CASE), "--out", str(tmp_path)], env=WIDE)
+    assert result.exit_code == 0, result.output
+    assert {"report.html", "verdicts.json", "summary.md", "junit.xml", "records.jsonl"} <= {
+        file.name for file in tmp_path.iterdir()
+    }
+    assert "All 15 verdicts are as expected" in result.output
+    assert f"Report: {tmp_path / 'report.html'}" in result.output
+    again = runner.invoke(cli.app, ["report", str(tmp_path / "records.jsonl"), "--out", str(tmp_path / "b")], env=WIDE)
+    assert again.exit_code == 0
+    assert (tmp_path / "b" / "verdicts.json").read_bytes() == (tmp_path / "verdicts.json").read_bytes()
+
+
+def test_an_engine_that_does_not_exist_ends_with_one(runner: CliRunner, tmp_path: Path) -> None:
+    result = runner.invoke(cli.app, ["run", str(CASE), "--engine", "pinochio", "--out", str(tmp_path)], env=WIDE)
+    assert result.exit_code == 1
+    assert 'there is no engine "pinochio"' in result.output
+
+
+def test_an_unknown_case_ends_with_two(runner: CliRunner, tmp_path: Path) -> None:
+    result = runner.invoke(cli.app, ["run", "nowhere", "--out", str(tmp_path)], env=WIDE)
+    assert result.exit_code == 2
+    assert "crosscheck list" in result.output
+    assert runner.invoke(cli.app, ["report", str(tmp_path / "none.jsonl")], env=WIDE).exit_code == 2
+
+
+def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
+    states = [EngineState("fine", "1.0", ""), EngineState("absent", None, "pip install 'flexmb[absent]'")]
+    monkeypatch.setattr(cli, "describe_engines", lambda: states)
+    output = runner.invoke(cli.app, ["engines"], env=WIDE).output
+    assert "not installed" in output
+    assert "pip install 'flexmb[absent]'" in output
+
+
+def test_help_teaches(runner: CliRunner) -> None:
+    output = runner.invoke(cli.app, ["run", "--help"], env=WIDE).output
+    for word in ("Exit code", "resumes", "canonical", "report.html"):
+        assert word in output
+
+
+def csv_of(path: Path, gravity_factor: float = 1.0, effort: int = 3, drop: str = "") -> Path:
+    """What a user's own code might write: the tip's position and the hinge's force."""
+    case = load_case(CASE)
+    model = Pendulum(case.scene(case.run.variants[0]), gravity_factor)
+    times = np.linspace(0.0, 4.0, 81)
+    run = model.simulate(Run(times), TOLERANCES[effort])
+    columns = {
+        "t": times,
+        **{f"tip.p{letter}": run.markers["tip"].position[:, i] for i, letter in enumerate("xyz")},
+        **{f"pivot.f{letter}": run.loads["pivot"][:, 3 + i] for i, letter in enumerate("xyz")},
+    }
+    columns.pop(drop, None)
+    np.savetxt(path, np.column_stack(list(columns.values())), "%.17g", ",", header=",".join(columns), comments="")
+    return path
+
+
+def verify(runner: CliRunner, *words: str) -> tuple[int, str]:
+    result = runner.invoke(cli.app, ["verify", str(CASE), *words, "--engine", "fine"], env=WIDE)
+    return result.exit_code, result.output
+
+
+def test_a_right_csv_agrees(runner: CliRunner, tmp_path: Path) -> None:
+    code, output = verify(runner, str(csv_of(tmp_path / "my.csv")))
+    assert (code, "All 2 verdicts are as expected" in output) == (0, True), output
+
+
+def test_a_wrong_csv_differs(runner: CliRunner, tmp_path: Path) -> None:
+    code, output = verify(runner, str(csv_of(tmp_path / "my.csv", gravity_factor=1.001)))
+    assert (code, "differ, expected agree" in output) == (1, True), output
+
+
+def test_a_coarse_csv_gives_its_own_uncertainty(runner: CliRunner, tmp_path: Path) -> None:
+    """At rtol 1e-6 the results are some 1e-5 off: differing from the claim of the goal, unresolved by their own U."""
+    rough, rougher = (
+        csv_of(tmp_path / "my.csv", effort=0),
+        csv_of(tmp_path / "rough.csv", gravity_factor=1.0001, effort=0),
+    )
+    assert "differ" in verify(runner, str(rough))[1]
+    code, output = verify(runner, str(rough), "--coarse", str(rougher))
+    assert (code, "unresolved, expected agree" in output) == (1, True), output
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda text: text.replace("tip.px", "tip.x", 1), "no whole group contains tip.x"),
+        (lambda text: text.replace("t,", "time,", 1), 'the first column must be "t"'),
+        (lambda text: "\n".join(text.splitlines()[:-3]) + "\n", "its times are not the case's"),
+        (lambda text: "", "cannot be read"),
+    ],
+)
+def test_a_csv_that_cannot_be_compared_ends_with_two(runner: CliRunner, tmp_path: Path, change, message: str) -> None:
+    file = csv_of(tmp_path / "my.csv")
+    file.write_text(change(file.read_text(encoding="utf-8")), encoding="utf-8")
+    code, output = verify(runner, str(file))
+    assert (code, message in output) == (2, True), output
+
+
+def test_a_wrong_name_is_not_green(runner: CliRunner, tmp_path: Path) -> None:
+    file = csv_of(tmp_path / "my.csv")
+    file.write_text(file.read_text(encoding="utf-8").replace("tip.", "tap."), encoding="utf-8")
+    code, output = verify(runner, str(file))
+    assert (code, "check the name" in output) == (1, True), output
+
+
+def test_a_template_has_the_times_and_columns(runner: CliRunner, tmp_path: Path) -> None:
+    file = tmp_path / "my.csv"
+    code, _ = verify(runner, str(file), "--template")
+    lines = file.read_text(encoding="utf-8").splitlines()
+    assert code == 0
+    assert len(lines) == 1 + 81
+    assert lines[0].startswith("t,tip.px,tip.py,tip.pz,tip.qw")
+    assert verify(runner, str(file))[0] == 2
+
+
+def test_list_shows_the_shipped_cases(runner: CliRunner, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    copy_case(tmp_path)
+    monkeypatch.setattr("crosscheck.library.shipped_folder", lambda: tmp_path)
+    output = runner.invoke(cli.app, ["list"], env=WIDE).output
+    assert "pendulum/single" in output
+    assert "fine, stepper" in output

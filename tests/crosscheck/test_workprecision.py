@@ -1,0 +1,66 @@
+"""The work-precision chart: one reference for all, errors that fall, a front that nothing beats, failures kept."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from crosscheck.library import load_case
+from crosscheck.records import read
+from crosscheck.results import collect
+from crosscheck.sweep import sweep
+from crosscheck.workprecision import WorkPrecision, work_precision
+from tests.crosscheck.sessions import PROVIDER, copy_case
+
+RUN_FILE = """
+[[variant]]
+name = "rigid"
+engines = ["fine", "stepper", "biased", "diverger"]
+
+[[chart]]
+observable = "marker:tip.position"
+variants = ["rigid"]
+reference = "rigid"
+"""
+
+
+@pytest.fixture(scope="module")
+def chart(tmp_path_factory: pytest.TempPathFactory) -> WorkPrecision:
+    folder: Path = tmp_path_factory.mktemp("chart")
+    case = load_case(copy_case(folder, RUN_FILE))
+    sweep([case], (), folder / "records.jsonl", workers=2, provider=PROVIDER)
+    (results,) = collect(read(folder / "records.jsonl")).cases
+    found = work_precision(results, results.case.run.charts[0])
+    assert found is not None
+    return found
+
+
+def errors(chart: WorkPrecision, engine: str) -> list[float | None]:
+    """Errors by effort, coarse to fine: wall time grows with the stepper's effort, and the order is kept for others."""
+    return [point.error for point in chart.points if point.engine == engine]
+
+
+def test_errors_fall_with_effort_down_to_the_reference(chart: WorkPrecision) -> None:
+    falling = errors(chart, "stepper")
+    assert falling == sorted(falling, reverse=True)
+    assert falling[0] > 1e3 * chart.reference_uncertainty
+    assert min(errors(chart, "fine")) >= 0.0
+
+
+def test_a_biased_engine_has_a_floor(chart: WorkPrecision) -> None:
+    assert min(errors(chart, "biased")) > 1e-4
+
+
+def test_failed_runs_are_kept_without_an_error(chart: WorkPrecision) -> None:
+    failed = [point for point in chart.points if point.engine == "diverger"]
+    assert len(failed) == 4
+    assert all(point.error is None and "1e-12" in point.message and not point.best for point in failed)
+
+
+def test_nothing_beats_the_front(chart: WorkPrecision) -> None:
+    front = [point for point in chart.points if point.best]
+    assert front
+    for point in front:
+        rivals = [other for other in chart.points if other.error is not None and other.wall_s < point.wall_s]
+        assert all(other.error > point.error for other in rivals)
