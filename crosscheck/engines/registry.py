@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable
 from importlib import import_module
 from importlib.metadata import entry_points
-from importlib.util import find_spec
 
 from crosscheck.engines.contract import Engine
 
@@ -24,7 +23,7 @@ def engines() -> dict[str, Engine]:
 
     An engine without its library raises `EngineMissing` from `version`. A plug-in may not take a built-in name.
     """
-    found = {name: _load(path)() for name, path in _BUILT_IN.items() if _is_there(path)}
+    found = {name: _load(path)() for name, path in _BUILT_IN.items()}
     for point in entry_points(group=GROUP):
         if point.name in _BUILT_IN:
             continue
@@ -41,11 +40,6 @@ def engine(name: str) -> Engine:
     if name not in known:
         raise KeyError(f'no engine "{name}"; there are {", ".join(known)}')
     return known[name]
-
-
-def _is_there(path: str) -> bool:
-    spec = find_spec(path.partition(":")[0])
-    return spec is not None and spec.origin is not None
 
 
 def _load(path: str) -> Callable[[], Engine]:

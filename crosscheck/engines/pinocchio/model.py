@@ -42,15 +42,14 @@ class PinocchioModel:
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         start = time.perf_counter()
-        states, evaluations, message = self._integrate(run.times, effort)
+        with np.errstate(over="ignore", invalid="ignore"):  # divergence is a status
+            states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
         reached = run.times[: len(states)]
         samples = [self._observer.observe(t, self._dynamics.state(t, y)) for t, y in zip(reached, states, strict=True)]
         status: Status = "finished" if len(states) == len(run.times) else "diverged"
         work = np.array([y[-1] for y in states])
-        return stack(
-            reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations, work=work
-        )  # fmt: skip
+        return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations, work=work)
 
     def _integrate(self, times: Array, effort: Effort) -> tuple[list[Array], int, str]:
         """States at the sample times reached, evaluations of the right-hand side, and why it stopped early.

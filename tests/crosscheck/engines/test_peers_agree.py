@@ -39,7 +39,7 @@ def _compare(scene, name: str) -> None:
         assert np.abs(ours_all - theirs_all).max() <= worse * ACCELERATION * np.abs(ours_all).max(), kind
     for kind in ("loads", "wheel_loads"):
         a, b = getattr(ours, kind), getattr(theirs, kind)
-        assert a.keys() == b.keys()
+        assert a.keys() <= b.keys()  # an engine may know more: loads on point masses
         if a:
             scale = max(np.abs(load).max() for load in a.values())
             assert max(np.abs(a[key] - b[key]).max() for key in a) <= worse * LOAD * scale, kind

@@ -1,0 +1,61 @@
+"""Engines are found by name, built in or plugged in, and a missing library says how to get it."""
+
+import sys
+from importlib.metadata import EntryPoint
+
+import pytest
+
+from crosscheck.engines import registry
+from crosscheck.engines.contract import EngineMissing
+
+BUILT_IN = {"native", "pinocchio", "mujoco", "exudyn"}
+
+
+class _Plugged:
+    name = "plugged"
+
+    def version(self):
+        return "1"
+
+    def supports(self, scene):
+        raise NotImplementedError
+
+    efforts = compile = supports
+
+
+class _NoEngine:
+    pass
+
+
+def _plug(monkeypatch, name: str, value: str) -> None:
+    points = [EntryPoint(name=name, value=value, group=registry.GROUP)]
+    monkeypatch.setattr(registry, "entry_points", lambda group: points)
+
+
+def test_built_in_engines_are_found_under_their_names():
+    found = registry.engines()
+    assert found.keys() >= BUILT_IN
+    assert all(engine.name == name for name, engine in found.items())
+
+
+def test_unknown_name_lists_the_known_ones():
+    with pytest.raises(KeyError, match="native, pinocchio"):
+        registry.engine("simulink")
+
+
+def test_plug_in_is_found(monkeypatch):
+    _plug(monkeypatch, "mine", f"{__name__}:_Plugged")
+    assert registry.engine("mine").name == "plugged"
+
+
+def test_plug_in_that_is_no_engine_is_refused(monkeypatch):
+    _plug(monkeypatch, "mine", f"{__name__}:_NoEngine")
+    with pytest.raises(TypeError, match="no crosscheck engine"):
+        registry.engines()
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+def test_missing_library_names_the_extra(monkeypatch, name):
+    monkeypatch.setitem(sys.modules, name, None)
+    with pytest.raises(EngineMissing, match=r"pip install .*flexmb\[peers\]"):
+        registry.engine(name).version()
