@@ -1,0 +1,74 @@
+"""Interleaved timing: rivals take turns, so that a busy machine slows both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.schema import Scene
+from flexmb.scene.shapes import beam_section
+
+SAMPLE_S = 0.01  # a sample shorter than this measures the clock and the scheduler
+ROUNDS = 15
+
+
+def interleaved(*rivals: Callable[[], object]) -> list[float]:
+    """Seconds per call of each rival: 20th percentile of ROUNDS samples, each of at least SAMPLE_S, taken in turns."""
+    repeats = []
+    for rival in rivals:
+        rival()
+        start = perf_counter()
+        rival()
+        repeats.append(max(1, int(SAMPLE_S / max(perf_counter() - start, 1e-7))))
+    samples = np.empty((ROUNDS, len(rivals)))
+    for row in samples:
+        for i, (rival, repeat) in enumerate(zip(rivals, repeats, strict=True)):
+            start = perf_counter()
+            for _ in range(repeat):
+                rival()
+            row[i] = (perf_counter() - start) / repeat
+    return np.percentile(samples, 20, axis=0).tolist()
+
+
+def record(benchmark, native: float, **rivals: float) -> None:
+    """Put the times (us) and the ratios rival / native into the benchmark's report."""
+    benchmark.extra_info["native_us"] = round(1e6 * native, 3)
+    for name, seconds in rivals.items():
+        benchmark.extra_info[f"{name}_us"] = round(1e6 * seconds, 3)
+        benchmark.extra_info[f"{name}_ratio"] = round(seconds / native, 2)
+
+
+def rigid_chain(bodies: int) -> Scene:
+    """Serial chain of rigid bodies on revolute hinges with general axes."""
+    rng = np.random.default_rng(bodies)
+    scene = SceneBuilder(f"chain of {bodies}", gravity=(0.0, 0.0, -9.81))
+    for k in range(bodies):
+        axis, turn = Rotation.random(2, rng)
+        inertia = turn.as_matrix() @ np.diag([0.02, 0.03, 0.04]) @ turn.as_matrix().T
+        scene.rigid_body(f"b{k}", mass=1.0, com=0.2 * rng.standard_normal(3), inertia=0.5 * (inertia + inertia.T))
+        scene.revolute(
+            f"h{k}",
+            "ground" if k == 0 else f"b{k - 1}",
+            f"b{k}",
+            axis=axis.apply((0.0, 0.0, 1.0)),
+            parent_position=0.5 * rng.standard_normal(3),
+            angle=rng.uniform(-1.0, 1.0),
+            rate=rng.uniform(-1.0, 1.0),
+        )
+    return scene.scene()
+
+
+def flexible_chain(bodies: int, modes: int, level: str) -> Scene:
+    """Serial chain of beams, clamped at their hinges, each hinged to the tip of the one before."""
+    scene = SceneBuilder(f"{bodies} beams of {modes} modes", gravity=(0.0, 0.0, -9.81))
+    section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
+    for k in range(bodies):
+        scene.beam(f"b{k}", length=2.0, elements=12, section=section, modes=modes, level=level)
+        at = {} if k == 0 else {"parent_node": "tip"}
+        axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))[k % 2]
+        scene.revolute(f"h{k}", "ground" if k == 0 else f"b{k - 1}", f"b{k}", axis=axis, angle=0.3, rate=0.2, **at)
+    return scene.scene()

@@ -1,0 +1,67 @@
+"""One evaluation of the accelerations, called from Python: native against Pinocchio's aba and MuJoCo's mj_forward.
+
+python -m pytest tests/benchmarks --benchmark-columns=min,median
+"""
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from crosscheck.engines.links import links
+from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
+
+
+def evaluation(scene):
+    """The compiled right-hand side at the initial state, as a call without arguments."""
+    system = fm.compile(scene)
+    state, workspace = system.initial_state, system.workspace()
+    y = np.concatenate([state.q, state.u, [0.0]])
+    dy = np.empty_like(y)
+    return lambda: system.rhs(0.0, y, dy, system.constants, workspace)
+
+
+def pinocchio_aba(scene):
+    pin = pytest.importorskip("pinocchio", reason="the rival is not installed: pip install flexmb[peers]")
+    from crosscheck.engines.pinocchio.tree import build_tree, initial_state
+
+    tree = build_tree(links(scene), np.array(scene.gravity_m_s2))
+    data, (q, v), tau = tree.model.createData(), initial_state(tree), np.zeros(tree.model.nv)
+    return lambda: pin.aba(tree.model, data, q, v, tau)
+
+
+def mujoco_forward(scene):
+    mujoco = pytest.importorskip("mujoco", reason="the rival is not installed: pip install flexmb[peers]")
+    from crosscheck.engines.mujoco.tree import build_tree, initial_state
+
+    tree = build_tree(links(scene), np.array(scene.gravity_m_s2))
+    data = mujoco.MjData(tree.model)
+    data.qpos[:], data.qvel[:] = initial_state(tree)
+    return lambda: mujoco.mj_forward(tree.model, data)
+
+
+@pytest.mark.parametrize("bodies", [1, 10, 50, 100])
+def test_rigid_chain(benchmark, bodies):
+    scene = rigid_chain(bodies)
+    native = evaluation(scene)
+    times = interleaved(native, pinocchio_aba(scene), mujoco_forward(scene))
+    record(benchmark, times[0], pinocchio=times[1], mujoco=times[2])
+    benchmark.pedantic(native, rounds=20, iterations=100)
+
+
+@pytest.mark.parametrize("bodies", [10, 1000])
+def test_cost_of_each_body(benchmark, bodies):
+    """Compare `native_us / bodies` of the two: O(N) means that they hardly differ."""
+    native = evaluation(rigid_chain(bodies))
+    record(benchmark, interleaved(native)[0])
+    benchmark.pedantic(native, rounds=20, iterations=10)
+
+
+@pytest.mark.parametrize("level", ["ruthless", "full"])
+@pytest.mark.parametrize("modes", [2, 5, 10])
+def test_flexible_chain(benchmark, modes, level):
+    """Recursion against mass matrix and Cholesky of the same system."""
+    system = fm.compile(flexible_chain(10, modes, level))
+    state = system.initial_state
+    times = interleaved(lambda: system.accelerations(state), lambda: system.accelerations(state, algorithm="composite"))
+    record(benchmark, times[0], composite=times[1])
+    benchmark.pedantic(lambda: system.accelerations(state), rounds=20, iterations=10)
