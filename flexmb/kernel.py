@@ -4,15 +4,18 @@
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper and
 no cache entry of its own (a third of the cold compile time of caching everything). From Python, call its `.py_func`.
 
-The disk cache is keyed by the sources of the package, less the folders that hold no kernels. Numba by itself only looks
-at the file of the entry point, so that an edited helper in another file would leave a stale, wrong kernel behind.
+The disk cache is keyed by the sources a kernel can depend on: its own file and all that this imports, directly or not,
+from the package. Numba by itself only looks at the file of the entry point, so that an edited helper in another file
+would leave a stale, silently wrong kernel behind.
 """
 
 from __future__ import annotations
 
 import hashlib
+import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -27,24 +30,53 @@ _SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", 
 WITHOUT_KERNELS = ("scene", "modal", "dense")
 
 
-def source_hash(package: Path) -> str:
-    """Hash of the Python sources below `package` that kernels may depend on: names and contents."""
+_PACKAGE = Path(__file__).parent
+
+# "import module" or "from module import members", the members on the line or in parentheses. Parsing the sources in
+# earnest would take longer than all the rest of a warm start.
+_IMPORT = re.compile(
+    rf"^\s*(?:from|import)\s+({_PACKAGE.name}\b[\w.]*)(?:\s+import\s+(\([^)]*\)|[^\n]*))?", re.MULTILINE
+)
+
+
+def source_hash(source: Path) -> str:
+    """Hash of a source file and of everything of the package that it imports, directly or not: names and contents."""
+    found, waiting = set[Path](), [source]
+    while waiting:
+        file = waiting.pop()
+        if file not in found:
+            found.add(file)
+            waiting.extend(_imported(file))
     digest = hashlib.sha256()
-    for source in sorted(package.rglob("*.py")):
-        if source.relative_to(package).parts[0] in WITHOUT_KERNELS:
-            continue
-        digest.update(str(source.relative_to(package)).encode() + b"\0")
-        digest.update(source.read_bytes() + b"\0")
+    for file in sorted(found):
+        digest.update(file.name.encode() + b"\0" + file.read_bytes() + b"\0")
     return digest.hexdigest()[:16]
 
 
-def _cache_directory() -> str | None:
-    """Where kernels of exactly these sources are kept; None where nothing can be written.
+@cache
+def _imported(source: Path) -> frozenset[Path]:
+    """Files of the package that a source file imports by itself. The package has no relative imports."""
+    names = set[str]()
+    for module, members in _IMPORT.findall(source.read_text(encoding="utf-8")):
+        names |= {module, *(f"{module}.{member}" for member in re.findall(r"\w+", members))}
+    return frozenset(file for name in names for file in _files(name) if file.is_file())
+
+
+def _files(module: str) -> Iterator[Path]:
+    """Where a module of the package may be: a file, or a folder."""
+    place = _PACKAGE.parent.joinpath(*module.split("."))
+    yield place.with_suffix(".py")
+    yield place / "__init__.py"
+
+
+@cache
+def cache_directory(source: Path) -> str | None:
+    """Where the kernels of a source file are kept; None where nothing can be written.
 
     Below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user.
     """
     root = Path(config.CACHE_DIR or AppDirs(appname="numba", appauthor=False).user_cache_dir)
-    directory = root / f"flexmb-{source_hash(Path(__file__).parent)}"
+    directory = root / f"{_PACKAGE.name}-{source_hash(source)}"
     try:
         directory.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
@@ -53,15 +85,13 @@ def _cache_directory() -> str | None:
     return str(directory)
 
 
-CACHE_DIRECTORY = _cache_directory()
-
-
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` as an entry point, cached on disk."""
-    if CACHE_DIRECTORY is None:
+    directory = cache_directory(Path(function.__code__.co_filename))
+    if directory is None:
         return njit(**_SEMANTICS)(function)
     # Numba reads its cache directory while it decorates: set only here, other packages keep theirs.
-    others, config.CACHE_DIR = config.CACHE_DIR, CACHE_DIRECTORY
+    others, config.CACHE_DIR = config.CACHE_DIR, directory
     try:
         return njit(cache=True, **_SEMANTICS)(function)
     finally:

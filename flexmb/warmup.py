@@ -5,9 +5,11 @@ Everything depends on types only, not on the scene: one small scene compiles wha
 
 from __future__ import annotations
 
+from pathlib import Path
 from time import perf_counter
 
-from flexmb.kernel import CACHE_DIRECTORY
+from flexmb import propagate
+from flexmb.kernel import cache_directory
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.simulation import simulate
@@ -42,4 +44,7 @@ def _pointwise(system: System) -> None:
 
 
 if __name__ == "__main__":
-    print(f"compiled in {warm_up():.1f} s, kept in {CACHE_DIRECTORY or 'memory only: no folder is writable'}")
+    kept = cache_directory(Path(propagate.__file__))
+    print(
+        f"compiled in {warm_up():.1f} s, kept in {Path(kept).parent if kept else 'memory only: no folder is writable'}"
+    )

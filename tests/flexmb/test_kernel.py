@@ -1,5 +1,6 @@
 """Bundles of arrays, and the disk cache that must not survive an edit."""
 
+import ast
 import os
 import pickle
 import shutil
@@ -12,7 +13,7 @@ import pytest
 
 import flexmb.kernel
 from flexmb.bundle import bundle
-from flexmb.kernel import helper, kernel, source_hash
+from flexmb.kernel import _imported, helper, kernel, source_hash
 
 
 @bundle
@@ -61,16 +62,34 @@ def test_bundles_refuse_arrays_they_cannot_describe():
         Pair(values=np.zeros((4, 6))[:, ::2], counts=np.zeros(2))
 
 
-def test_any_edit_of_the_sources_changes_the_cache(tmp_path):
-    (tmp_path / "room").mkdir()
-    source = tmp_path / "room" / "a.py"
-    source.write_text("x = 1\n")
-    before = source_hash(tmp_path)
-    assert source_hash(tmp_path) == before
-    source.write_text("x = 2\n")
-    edited = source_hash(tmp_path)
-    source.rename(tmp_path / "room" / "b.py")
-    assert len({before, edited, source_hash(tmp_path)}) == 3
+def test_the_hash_follows_imports_through_the_package(tmp_path):
+    """Two probes outside the package: one imports the dynamics, one only a file that imports nothing."""
+    far, near = tmp_path / "far.py", tmp_path / "near.py"
+    far.write_text("from flexmb.dynamics import rhs\n")
+    near.write_text("from flexmb.status import OK\n")
+    assert source_hash(far) == source_hash(far)
+    before = source_hash(near)
+    near.write_text("from flexmb.status import OK, NONFINITE\n")
+    assert source_hash(near) != before
+    package = Path(flexmb.kernel.__file__).parent
+    assert {package / "status.py"} == _imported(near)
+    assert package / "dynamics.py" in _imported(far)
+    assert package / "jain" / "sweeps.py" in _imported(package / "dynamics.py")
+
+
+def test_the_imports_found_are_those_that_python_sees():
+    package = Path(flexmb.kernel.__file__).parent
+    for source in package.rglob("*.py"):
+        seen = set()
+        for node in ast.walk(ast.parse(source.read_bytes())):
+            if isinstance(node, ast.ImportFrom):
+                assert node.level == 0, f"{source}: the cache key does not follow relative imports"
+                seen |= {str(node.module), *(f"{node.module}.{alias.name}" for alias in node.names)}
+            elif isinstance(node, ast.Import):
+                seen |= {alias.name for alias in node.names}
+        places = [package.parent.joinpath(*name.split(".")) for name in seen if name.split(".")[0] == "flexmb"]
+        files = {file for place in places for file in (place.with_suffix(".py"), place / "__init__.py")}
+        assert {file for file in files if file.is_file()} <= _imported(source)
 
 
 PROBE = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
