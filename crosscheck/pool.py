@@ -44,28 +44,29 @@ def run_jobs(
     """Run `function(job, emit)` for every job in `workers` processes; events in the order in which they come.
 
     `function` must be importable by name. `kind(job)` names what a worker has to load or compile for a job: workers
-    stay with their kind while there are jobs of it. Whatever they print goes to the file `log`. Numerical libraries get
-    one thread per worker. Closing the iterator early stops the workers.
+    stay with their kind while there are jobs of it, and only one is at a kind until its first job is done, so that what
+    that job leaves in caches on disk is not made twice. Whatever workers print goes to the file `log`. Numerical
+    libraries get one thread per worker. Closing the iterator early stops the workers.
     """
-    waiting = list(range(len(jobs)))
     kinds = [kind(job) for job in jobs]
+    waiting = list(range(len(jobs)))
+    prepared: set[str] = set()
     crew = [_start(function, log) for _ in range(min(workers, len(jobs)))]
     try:
-        for worker in crew:
-            yield _hand_out(worker, _next_job(worker, crew, waiting, kinds), jobs, kinds)
-        while busy := [worker for worker in crew if worker.job is not None]:
+        while waiting or any(worker.job is not None for worker in crew):
+            for worker in crew:
+                if worker.job is None and (job := _next_job(worker, crew, waiting, kinds, prepared)) is not None:
+                    yield _hand_out(worker, job, jobs, kinds)
+            busy = [worker for worker in crew if worker.job is not None]
             ready = wait([worker.pipe for worker in busy])
             for worker in [each for each in busy if each.pipe in ready]:
                 event = _receive(worker)
                 yield event
                 if event.kind == "crashed":
-                    crew.remove(worker)
-                    worker = _start(function, log)
-                    crew.append(worker)
-                if event.kind in ("crashed", "ended"):
+                    crew[crew.index(worker)] = _start(function, log)
+                elif event.kind == "ended":
                     worker.job = None
-                    if waiting:
-                        yield _hand_out(worker, _next_job(worker, crew, waiting, kinds), jobs, kinds)
+                    prepared.add(worker.kind)
     finally:
         for worker in crew:
             worker.pipe.close()
@@ -92,12 +93,17 @@ def _start(function: Function, log: str) -> _Worker:
     return _Worker(process, here)
 
 
-def _next_job(worker: _Worker, crew: list[_Worker], waiting: list[int], kinds: list[str]) -> int:
-    """Take the first waiting job of the worker's own kind, else of a kind nobody is at, else the first."""
-    taken = {other.kind for other in crew if other is not worker}
-    preference = ([kinds[job] != worker.kind, kinds[job] in taken] for job in waiting)
-    _, place = min((rank, place) for place, rank in enumerate(preference))
-    return waiting.pop(place)
+def _next_job(
+    worker: _Worker, crew: list[_Worker], waiting: list[int], kinds: list[str], prepared: set[str]
+) -> int | None:
+    """Take the first waiting job of the worker's own kind, else of a kind nobody is at, else of a prepared kind."""
+    taken = {other.kind for other in crew if other is not worker and other.job is not None}
+    open_jobs = [job for job in waiting if kinds[job] in prepared or kinds[job] not in taken]
+    if not open_jobs:
+        return None
+    chosen = min(open_jobs, key=lambda job: (kinds[job] != worker.kind, kinds[job] in taken, job))
+    waiting.remove(chosen)
+    return chosen
 
 
 def _hand_out(worker: _Worker, job: int, jobs: Sequence[Any], kinds: list[str]) -> Event:

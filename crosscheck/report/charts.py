@@ -23,7 +23,8 @@ from crosscheck.workprecision import WorkPrecision, work_precision
 
 Array = NDArray[np.float64]
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
-RUNAWAY = 20.0  # a signal that many times as wide as another has run away from it
+RUNAWAY = 20.0  # a signal that many times as large as another has run away from it
+STILL, BAND = 1e-3, 0.05  # a signal that moves less than that part of its size is still, and shown in such a band
 PANELS = (
     ("Motion", "marker"),
     ("Energy", "energy"),
@@ -123,13 +124,18 @@ def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> di
 
 
 def _shown_range(signals: list[Array]) -> list[float] | None:
-    """Limits of the drawing where one signal runs away: three spans of the smallest signal about its middle."""
-    limits = [(float(np.min(values)), float(np.max(values))) for values in signals]
-    low, high = min(limits, key=lambda pair: pair[1] - pair[0])
-    widest = max(upper - lower for lower, upper in limits)
-    if not 0.0 < high - low < widest / RUNAWAY:
-        return None
-    return [low - (high - low), high + (high - low)]
+    """Limits of the drawing where the automatic ones would hide what matters, else None.
+
+    Where one signal runs away: twice the smallest signal. Where all stay put: a band about them, not their round-off.
+    """
+    sizes = [float(np.max(np.abs(values))) for values in signals]
+    smallest, largest = min(sizes), max(sizes)
+    if 0.0 < smallest < largest / RUNAWAY:
+        return [-2.0 * smallest, 2.0 * smallest]
+    low, high = min(float(np.min(values)) for values in signals), max(float(np.max(values)) for values in signals)
+    if high - low < STILL * largest:
+        return [low - BAND * largest, high + BAND * largest]
+    return None
 
 
 def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:

@@ -12,9 +12,8 @@ from plotly.offline import get_plotlyjs
 
 from crosscheck.report.charts import payload
 from crosscheck.report.outcome import Outcome
-from crosscheck.report.views import check_table, comparison_tables, overview
+from crosscheck.report.views import comparison_tables, conservation_table, control_table, overview
 from crosscheck.results import CaseResults, Session
-from crosscheck.verdict import Verdict
 
 
 def write_report(session: Session, outcome: Outcome, file: Path) -> None:
@@ -51,8 +50,6 @@ def _inline(templates: Environment, name: str) -> Markup:
 def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:
     record = case.case
     verdicts = outcome.verdicts[record.case]
-    controls = [verdict for verdict in verdicts if verdict.kind == "control"]
-    conserved = [verdict for verdict in verdicts if verdict.kind == "conservation"]
     return {
         "number": number,
         "anchor": f"case-{number}",
@@ -63,18 +60,8 @@ def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, An
         "variants": [_variant_view(case, variant) for variant in record.run.variants],
         "ok": all(verdict.ok for verdict in verdicts) and not any(a.case == record.case for a in outcome.not_run),
         "tables": comparison_tables(verdicts),
-        "conservation": check_table(
-            "Conservation",
-            "Drift over the run, relative to the largest magnitude reached.",
-            conserved,
-            [f"{verdict.comparison.capitalize()}, {verdict.variant_a}" for verdict in conserved],
-        ),
-        "controls": check_table(
-            "Negative controls",
-            "Deliberate faults of the scene. A check that does not notice them proves nothing.",
-            controls,
-            [_control_name(verdict) for verdict in controls],
-        ),
+        "conservation": conservation_table([verdict for verdict in verdicts if verdict.kind == "conservation"]),
+        "controls": control_table([verdict for verdict in verdicts if verdict.kind == "control"]),
         "absences": [absence for absence in outcome.absences if absence.case == record.case],
         "timings": _timings(case),
     }
@@ -122,10 +109,6 @@ def _engines(session: Session) -> list[tuple[str, str]]:
         for (_, engine, _), result in case.results.items():
             found.setdefault(engine, set()).update(run.version for run in result.runs)
     return [(engine, ", ".join(sorted(versions)) or "did not run") for engine, versions in sorted(found.items())]
-
-
-def _control_name(verdict: Verdict) -> str:
-    return f"{verdict.comparison}: {verdict.engine_a} with the fault, {verdict.engine_b} without"
 
 
 def _first_paragraph(readme: str) -> str:

@@ -91,16 +91,31 @@ def comparison_tables(verdicts: Iterable[Verdict]) -> list[Table]:
     return [_comparison_table(name, group) for name, group in groups.items()]
 
 
-def check_table(title: str, note: str, verdicts: list[Verdict], names: list[str]) -> Table | None:
-    """Controls or conservation checks: `names[i]` is the row of verdict i, the columns are who was checked."""
+def conservation_table(verdicts: list[Verdict]) -> Table | None:
+    """Conserved quantities against engines."""
     if not verdicts:
         return None
-    columns = list(dict.fromkeys(_checked(verdict) for verdict in verdicts))
+    columns = tuple(dict.fromkeys(verdict.engine_a for verdict in verdicts))
+    groups: dict[str, list[Verdict]] = {}
+    for verdict in verdicts:
+        groups.setdefault(f"{verdict.comparison.capitalize()}, {verdict.variant_a}", []).append(verdict)
+    rows = tuple(Row(name, _cells(columns, group, lambda each: each.engine_a)) for name, group in groups.items())
+    return Table("Conservation", "Drift over the run, relative to the largest magnitude reached.", columns, rows)
+
+
+def control_table(verdicts: list[Verdict]) -> Table | None:
+    """Negative controls, the channels that must notice them beneath."""
+    if not verdicts:
+        return None
+    groups: dict[str, list[Verdict]] = {}
+    for verdict in verdicts:
+        groups.setdefault(f"{verdict.comparison} ({verdict.engine_a}, against {verdict.engine_b})", []).append(verdict)
     rows = []
-    for name in dict.fromkeys(names):
-        group = [verdict for verdict, each in zip(verdicts, names, strict=True) if each == name]
-        rows.append(Row(name, _cells(columns, group, _checked)))
-    return Table(title, note, tuple(columns), tuple(rows))
+    for name, group in groups.items():
+        below = tuple(Row(verdict.channel, (_cell([verdict]),)) for verdict in group)
+        rows.append(Row(name, (_cell(group),), below if len(below) > 1 else ()))
+    note = "Deliberate faults of the scene. A comparison that does not notice them proves nothing."
+    return Table("Negative controls", note, ("The fault is",), tuple(rows))
 
 
 def _comparison_table(name: str, group: list[Verdict]) -> Table:
@@ -135,6 +150,8 @@ def _cell(group: list[Verdict]) -> Cell:
     text = worst.status
     if worst.kind == "control" and worst.status in ("differ", "agree"):
         text = "noticed" if worst.ok else "missed"
+    if worst.kind == "conservation" and worst.status in ("differ", "agree"):
+        text = "conserved" if worst.status == "agree" else "drifts"
     if len(group) > 1:
         text += f" {len(bad)}/{len(group)}" if bad else f" {len(group)}"
     if worst.expected != "agree" and worst.kind != "control":
@@ -163,7 +180,3 @@ def _column(verdict: Verdict) -> str:
     if verdict.kind == "control":
         return "Negative controls"
     return f"{verdict.engine_a} – {verdict.engine_b}"
-
-
-def _checked(verdict: Verdict) -> str:
-    return verdict.engine_a if verdict.kind == "conservation" else verdict.channel

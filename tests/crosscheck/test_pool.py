@@ -53,12 +53,21 @@ def whoami(job: tuple[str, int], emit: Callable[[object], None]) -> None:
 
 
 def test_workers_stay_with_their_kind(tmp_path: Path) -> None:
-    """Two workers, two kinds in turn: each process does one kind, but for what the other takes over at the end."""
+    """Two workers, two kinds in turn: a process leaves its kind only when no job of it is left, so at most once."""
     jobs = [(kind, number) for number in range(4) for kind in ("one", "two")]
     events = run_jobs(whoami, jobs, 2, str(tmp_path / "log"), kind=lambda job: job[0])
-    homes: dict[str, list[object]] = {"one": [], "two": []}
+    done: dict[object, list[str]] = {}
     for event in events:
         if event.kind == "emitted":
-            homes[jobs[event.job][0]].append(event.content)
-    changes = sum(a != b for pids in homes.values() for a, b in zip(pids, pids[1:], strict=False))
-    assert changes <= 1
+            done.setdefault(event.content, []).append(jobs[event.job][0])
+    assert {kinds[0] for kinds in done.values()} == {"one", "two"}
+    for kinds in done.values():
+        assert sum(a != b for a, b in zip(kinds, kinds[1:], strict=False)) <= 1
+
+
+def test_only_one_worker_is_at_a_kind_until_its_first_job_is_done(tmp_path: Path) -> None:
+    jobs = [("one", 0), ("one", 1), ("one", 2)]
+    events = list(run_jobs(whoami, jobs, 2, str(tmp_path / "log"), kind=lambda job: job[0]))
+    order = [(event.kind, event.job) for event in events if event.kind in ("started", "ended")]
+    assert order[:2] == [("started", 0), ("ended", 0)]
+    assert sorted(order[2:]) == [("ended", 1), ("ended", 2), ("started", 1), ("started", 2)]
