@@ -35,6 +35,7 @@ from flexmb.spatial.inertia import (
 from flexmb.spatial.vector import add, add3, cross, dot, mat3, scale, store3, sub, times, vec3
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
 
+SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
 SINGLE = -1  # free_count of a hinge with one free speed along z: no small matrices
 
 
@@ -101,12 +102,13 @@ def _eliminate_modes(c, w, k):
 
 @helper
 def cholesky(a, n):
-    """Lower Cholesky factor of a[:n,:n] in place; False where it is not positive definite (or NaN)."""
+    """Lower Cholesky factor of a[:n,:n] in place; False where it is not positive definite to round-off (or NaN)."""
     for j in range(n):
         d = a[j, j]
+        floor = SINGULAR * d
         for i in range(j):
             d -= a[j, i] * a[j, i]
-        if not d > 0.0:
+        if not d > floor:
             return False
         d = sqrt(d)
         a[j, j] = d
