@@ -15,6 +15,7 @@ _BUILT_IN = {
     "pinocchio": "crosscheck.engines.pinocchio:PinocchioEngine",
     "mujoco": "crosscheck.engines.mujoco:MujocoEngine",
     "exudyn": "crosscheck.engines.exudyn:ExudynEngine",
+    "exudyn-beam": "crosscheck.engines.exudyn:ExudynBeamEngine",
 }
 
 

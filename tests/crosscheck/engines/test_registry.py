@@ -8,7 +8,7 @@ import pytest
 from crosscheck.engines import registry
 from crosscheck.engines.contract import EngineMissing
 
-BUILT_IN = {"native", "pinocchio", "mujoco", "exudyn"}
+BUILT_IN = {"native", "pinocchio", "mujoco", "exudyn", "exudyn-beam"}
 
 
 class _Plugged:
