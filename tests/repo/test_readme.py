@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import pytest
 from typer.main import get_command
@@ -41,3 +42,11 @@ def test_crosscheck_options_exist() -> None:
 def test_the_test_command_is_what_continuous_integration_runs() -> None:
     assert COMMANDS[1].startswith("python3 ") and COMMANDS[1].endswith("pytest")
     assert 'grep -E "^python3 .*pytest$" README.md' in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
+def test_the_python_example_runs() -> None:
+    (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+    names: dict[str, Any] = {}
+    exec(compile(example, "README.md", "exec"), names)
+    assert names["trajectory"].t[-1] == 1.0
+    assert names["loads"].shape == (6,)
