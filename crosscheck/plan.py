@@ -18,7 +18,8 @@ from crosscheck.engines.contract import Effort
 from crosscheck.library import Case
 from crosscheck.records import CaseRecord, VariantInfo
 from crosscheck.selection import select
-from flexmb.scene.bodies import BeamBody, RigidBody
+from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
@@ -116,12 +117,14 @@ def scene_identity(scene: Scene, times: Array) -> str:
 def _attempt(
     case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
 ) -> tuple[Scene | None, str]:
-    """The scene of a variant, or why it cannot be made: one bad variant must not stop the others."""
+    """The checked scene of a variant, or why there is none: one bad variant must not stop the others."""
     try:
         scene = case.scene(variant)
         if control is not None:
             scene = mutate(scene, control.mutation, control.target)
-        return variant_scene(scene, variant, refined), ""
+        scene = variant_scene(scene, variant, refined)
+        check_scene(scene, t_end=variant.duration_s or case.run.duration_s)
+        return scene, ""
     except (ValueError, NotImplementedError, OSError) as error:
         return None, str(error)
 
@@ -166,7 +169,8 @@ def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:
 def _info(scene: Scene | None, error: str) -> VariantInfo:
     if scene is None:
         return VariantInfo(level="", drawing=None, error=error)
-    return VariantInfo(level=levels(scene), drawing=draw(scene))
+    drawable = all(not isinstance(body, SidBody) for body in scene.bodies)  # a SID body's nodes are in its file
+    return VariantInfo(level=levels(scene), drawing=draw(scene) if drawable else None)
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:

@@ -196,3 +196,21 @@ def test_replaying_the_records_gives_the_same_verdicts(sound: Outcome, tmp_path)
     again = conclude(collect(read(records)))
     assert msgspec.json.encode(again.all) == msgspec.json.encode(first.all)
     assert len(again.all) == len(sound.all)
+
+
+def test_a_bad_scene_is_refused_before_anything_runs_and_says_where(tmp_path) -> None:
+    folder = copy_case(tmp_path)
+    scene = folder / "scene.toml"
+    scene.write_text(scene.read_text(encoding="utf-8").replace("mass_kg = 2.0", "mass_kg = -2.0"), encoding="utf-8")
+    outcome = run_case(folder, tmp_path / "records.jsonl")
+    assert not outcome.ok
+    assert {absence.status for absence in outcome.absences} == {"failed"}
+    assert all("mass_kg" in absence.reason for absence in outcome.absences)
+
+
+def test_a_diverged_run_keeps_its_good_part(tmp_path) -> None:
+    compare_engines(tmp_path, ("fine", "diverger"))
+    (results,) = collect(read(tmp_path / "records.jsonl")).cases
+    result = results.get("rigid", "diverger")
+    assert result.times[-1] == pytest.approx(0.9)
+    assert len(result.values("marker:tip.position")) == len(result.times) == 10
