@@ -13,6 +13,7 @@ class Status(IntEnum):
     NONFINITE = 2
     STEP_TOO_SMALL = 3
     MAX_STEPS = 4
+    OUT_OF_RANGE = 5
 
     @property
     def advice(self) -> str:
@@ -35,6 +36,10 @@ _ADVICE = {
         "the step became too small to advance time: the motion is singular or diverging there (a gimbal at its "
         "singular angle, a flexible body beyond its range), or rtol and atol ask for more than double precision gives"
     ),
+    Status.OUT_OF_RANGE: (
+        "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; look "
+        "for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
+    ),
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
 }
 
@@ -43,3 +48,4 @@ NOT_POSITIVE_DEFINITE = int(Status.NOT_POSITIVE_DEFINITE)
 NONFINITE = int(Status.NONFINITE)
 STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
 MAX_STEPS = int(Status.MAX_STEPS)
+OUT_OF_RANGE = int(Status.OUT_OF_RANGE)

@@ -33,9 +33,10 @@ from flexmb.spatial.inertia import (
     sum_inertia,
 )
 from flexmb.spatial.vector import add, add3, cross, dot, mat3, scale, store3, sub, times, vec3
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
+RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
 SINGLE = -1  # free_count of a hinge with one free speed along z: no small matrices
 
 
@@ -47,6 +48,9 @@ def forward_dynamics(c, w):
     if c.load.shape[0] > 0:
         pose_sweep(c, w)
     for k in range(c.body.shape[0]):
+        if is_out_of_range(c, w, k):
+            w.fault[0] = k
+            return OUT_OF_RANGE
         body_inertia(c, w, k)
         elastic_forces(c, w, k)
         node_loads(c, w, k)
@@ -57,6 +61,17 @@ def forward_dynamics(c, w):
             return NOT_POSITIVE_DEFINITE
     _outward(c, w)
     return OK
+
+
+@helper
+def is_out_of_range(c, w, k):
+    """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
+    squares = 0.0
+    for n in range(c.body[k].modes):
+        for i in range(c.body[k].modes):
+            squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
+    body = c.body[k].rigid
+    return squares > RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
 
 
 @helper
