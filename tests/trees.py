@@ -117,7 +117,7 @@ def _body(
         nodes = ["root", "tip", "middle"]
     else:
         modes = 3
-        _modal(scene, rng, name, level, modes, floating=carrier == "floating")
+        _modal(scene, rng, name, level, modes, floating=carrier == "floating", lossless=recipe.conservative)
         nodes = ["a", "b"] if carrier == "floating" else ["origin", "a", "b"]
     if level != "rigid":
         size = recipe.deformation if carrier != "beam" else 0.3 * recipe.deformation
@@ -141,7 +141,9 @@ def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe
     return 4
 
 
-def _modal(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes: int, *, floating: bool) -> None:
+def _modal(
+    scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes: int, *, floating: bool, lossless: bool
+) -> None:
     """Points with mass, offset mass centres and turning tensors, moved by arbitrary assumed modes."""
     n = 5
     masses = rng.uniform(0.1, 0.4, n)
@@ -151,7 +153,7 @@ def _modal(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes
         inertia=np.array([inertia(rng, m, 0.3) for m in masses]), com_offset=rng.uniform(-0.1, 0.1, (n, 3)),
     )  # fmt: skip
     root = rng.normal(size=(modes, modes))
-    loss = rng.normal(size=(modes, modes))
+    loss = rng.normal(size=(modes, modes)) * (not lossless)
     nodes = [
         s.ModalNode(
             name=node, position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)),

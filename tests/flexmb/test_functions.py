@@ -19,7 +19,8 @@ SPIN = SpinUp(rate=4.0, duration_s=2.5)
 SMOOTH = [
     (Constant(value=2.0), 1.0), (Ramp(value=0.3, rate=1.5, start_s=0.2), 1.0),
     (Sine(amplitude=0.7, angular_frequency_rad_s=3.0, phase_rad=0.4, offset=0.1), 0.9), (STEP, 0.2), (STEP, 1.3),
-    (STEP, 2.9), (SPIN, 1.0), (SPIN, 3.0), (TABLE, 0.6), (TABLE, 1.5), (Pulse(value=3.0, start_s=1.0, duration_s=1.0), 1.5),
+    (STEP, 2.9), (SPIN, 1.0), (SPIN, 3.0), (TABLE, 0.6), (TABLE, 1.5),
+    (Pulse(value=3.0, start_s=1.0, duration_s=1.0), 1.5),
 ]  # fmt: skip
 SPAN = 0.15
 
