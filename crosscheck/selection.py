@@ -13,7 +13,7 @@ import msgspec
 
 from crosscheck.case import Chart, Comparison, Conservation, RunFile, Side, Variant
 
-SHIPPED = frozenset({"native", "pinocchio", "mujoco", "exudyn"})
+SHIPPED = frozenset({"native", "pinocchio", "mujoco", "exudyn", "exudyn-beam"})
 
 
 def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:

@@ -65,8 +65,7 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == prefix}
             if chosen:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                first = next((i for i, view in enumerate(views) if view["moves"]), 0)
-                panels.append({"comparison": name, "title": title, "channels": views, "first": first})
+                panels.append({"comparison": name, "title": title, "channels": views, "first": _first(views)})
     return panels
 
 
@@ -82,6 +81,13 @@ def _sides(case: CaseResults, verdict: Verdict) -> tuple[Result, Result]:
     return case.get(verdict.variant_a, verdict.engine_a), case.get(verdict.variant_b, verdict.engine_b)
 
 
+def _first(views: list[dict[str, Any]]) -> int:
+    """Number of the channel to show first: of those that measure the same as the first, the one that moves most."""
+    alike = [i for i, view in enumerate(views) if family(view["name"]) == family(views[0]["name"])]
+    still = all(views[i]["size"] == 0.0 for i in alike)
+    return max(range(len(views)) if still else alike, key=lambda i: views[i]["size"])
+
+
 def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]) -> dict[str, Any]:
     """Overlay of all sides of a channel, and for each judged pair distance and uncertainty over time (SI)."""
     sides: dict[tuple[str, str], Result] = {}
@@ -95,7 +101,7 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
         "name": channel,
         "unit": unit(channel),
         "components": COMPONENTS.get(width, [str(i + 1) for i in range(width)]),
-        "moves": any(signal_range(channel, result.values(channel)) > 0.0 for result in sides.values()),
+        "size": min(signal_range(channel, result.values(channel)) for result in sides.values()),
         "range": _shown_range([result.values(channel) for result in sides.values()]),
         "sides": [
             {

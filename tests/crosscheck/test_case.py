@@ -11,8 +11,9 @@ import pytest
 
 from crosscheck import case as case_module
 from crosscheck.case import CaseError, RunFile, check_run_file
+from crosscheck.engines.registry import engines
 from crosscheck.library import load_case, resolve
-from crosscheck.selection import select
+from crosscheck.selection import SHIPPED, select
 from tests.crosscheck.sessions import CASE, copy_case
 
 EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
@@ -121,3 +122,9 @@ def test_a_shipped_engine_that_the_case_leaves_out_stays_out() -> None:
 def test_charts_follow_their_variants() -> None:
     run = select(example(), ("exudyn",))
     assert [chart.variants for chart in run.charts] == [("rigid",)]
+
+
+def test_the_shipped_engines_are_those_of_the_registry() -> None:
+    """A case that leaves a shipped engine out does so on purpose: the list must not fall behind."""
+    from_us = {name for name, engine in engines().items() if type(engine).__module__.startswith("crosscheck.")}
+    assert from_us == SHIPPED

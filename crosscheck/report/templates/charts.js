@@ -1,14 +1,14 @@
 // Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
 "use strict";
-const COLOURS = { native: "#1b62a5", pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00" };
-const SPARE = ["#7a4fb5", "#0f8b8d", "#a44a3f", "#5b6675", "#b5179e", "#3f6212"];
+const COLOURS = { native: "#1b62a5", pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00", "exudyn-beam": "#7a4fb5" };
+const SPARE = ["#0f8b8d", "#a44a3f", "#5b6675", "#b5179e", "#3f6212"];
 const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
 const DASHES = ["solid", "dash", "dot"];
 const PAIRS = ["#44546a", "#c2410c", "#6d28d9", "#0e7490", "#9d174d", "#4d7c0f", "#92400e", "#1e40af"];
 const CONFIG = { displayModeBar: false, responsive: true };
 
 function colour(name) {
-  if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - 4) % SPARE.length];
+  if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - 5 + SPARE.length) % SPARE.length];
   return COLOURS[name];
 }
 

@@ -10,13 +10,22 @@ class SceneView {
       '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div><div class="controls"></div>';
     this.canvas = host.querySelector("canvas"); this.context = this.canvas.getContext("2d");
     this.slider = host.querySelector("input"); this.clock = host.querySelector(".clock"); this.button = host.querySelector("button");
-    this.button.onclick = () => { this.playing = !this.playing; this.last = null; this.button.textContent = this.playing ? "❚❚" : "▶"; if (this.playing) requestAnimationFrame(t => this.tick(t)); };
+    this.button.onclick = () => { this.wanted = !this.playing; this.play(this.wanted); };
     this.slider.oninput = () => { this.phase = Number(this.slider.value); this.draw(); };
     const chooser = document.createElement("select");
     animations.forEach((animation, i) => chooser.add(new Option(animation.title, i)));
     chooser.onchange = () => this.load(Number(chooser.value));
     host.querySelectorAll(".controls")[1].append(chooser);
     this.listen(); this.load(0);
+    // It plays while it is seen, unless the reader stopped it or asks for less motion.
+    this.wanted = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    new IntersectionObserver(([entry]) => this.play(this.wanted && entry.isIntersecting)).observe(this.canvas);
+  }
+
+  play(on) {
+    if (on === this.playing) return;
+    this.playing = on; this.last = null; this.button.textContent = on ? "❚❚" : "▶";
+    if (on) requestAnimationFrame(t => this.tick(t));
   }
 
   listen() {
