@@ -17,7 +17,17 @@ from crosscheck.engines.exudyn.motion import AT_REST, Motion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.scene.hinges import (
-    AngularCoordinate, Cylindrical, Free, Gimbal, Hinge, Planar, Prismatic, Revolute, Spherical, Universal, Weld,
+    AngularCoordinate,
+    Cylindrical,
+    Free,
+    Gimbal,
+    Hinge,
+    Planar,
+    Prismatic,
+    Revolute,
+    Spherical,
+    Universal,
+    Weld,
 )  # fmt: skip
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Load, ModalBody, PointMass, Scene, Wheel
@@ -30,7 +40,7 @@ CROSS_ARM = 0.01
 
 @dataclass(frozen=True)
 class Placed:
-    """A scene body in the system: its carrier and its motion at t = 0; where it bends, its modal state and mesh crosses.
+    """A scene body in the system: its carrier, its motion at t = 0 and, where it bends, modal state and mesh crosses.
 
     `reach` (m,): largest displacement of an inertia point for a unit modal coordinate, in units of the body's length.
     """
@@ -238,7 +248,7 @@ def _cross(shape: NodeShape) -> list[Array]:
 
 
 def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> Port:
-    """An inboard hinge frame at a node of a placed body plus a fixed offset; a section carrier where the node deforms."""
+    """An inboard hinge frame at a node of a placed body plus an offset; on a section carrier where the node deforms."""
     shape = parent.shape(node)
     zero = shape.rotation @ offset.rotation
     at_node = _exudyn_motion(parent).node(shape, parent.eta, parent.rate)

@@ -27,7 +27,7 @@ from flexmb.scene.schema import BeamBody, Scene
 from flexmb.scene.tree import GROUND, node_frame
 
 STEPS = (1e-2, 5e-3, 2.5e-3)
-"""Steps (s) that follow the bending of a flexible boom turning at a few rad/s; the axial vibrations are stepped over."""
+"""Steps (s) that follow the bending of a boom turning at a few rad/s; its axial vibrations are stepped over."""
 
 
 class ExudynBeamEngine:
@@ -40,13 +40,13 @@ class ExudynBeamEngine:
         return library.version()
 
     def supports(self, scene: Scene) -> Support:
-        """"surrogate" for the scenes it takes: another model of the beam than its modes, not an approximation of them."""
+        """"surrogate" for the scenes it takes: another model of the beam than its modes, and a richer one."""
         for reason in _refusals(scene):
             return Support("no", reason)
         return Support("surrogate", "a planar beam of finite deflection instead of modes")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """The scene's own number of elements, three steps; generalised-alpha damps the axial vibrations that it skips."""
+        """Three steps, with the scene's number of elements; generalised-alpha damps the axial vibrations it skips."""
         return tuple(Effort("step", step, "GeneralizedAlpha") for step in STEPS)
 
     def compile(self, scene: Scene) -> Model:

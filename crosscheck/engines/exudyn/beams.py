@@ -53,7 +53,7 @@ def assemble_beam(scene: Scene, elements: int) -> PlanarBeam:
     shop = Workshop(np.zeros(3), explicit=False)
     base, angle, rate = _pose(beam, hinge)
     hub = _hub(shop, base.position, angle, rate)
-    holds, prescribed = _hold(shop, hub, hinge, angle)
+    holds, prescribed = _hold(shop, hub, hinge)
     sheared = beam.theory == "timoshenko"
     stations = _stations(scene, beam, elements)
     add = _geometrically_exact if sheared else _cable
@@ -98,30 +98,33 @@ def _hub(shop: Workshop, position: Array, angle: float, rate: float) -> int:
 
 
 def _hold(
-    shop: Workshop, hub: int, hinge: Hinge, start: float
+    shop: Workshop, hub: int, hinge: Hinge
 ) -> tuple[tuple[int, ...], list[tuple[int, Callable[[float], Profile]]]]:
     """Constraints on the hub's x, y and, unless it turns freely, its angle beyond the one at t = 0."""
     function = hinge.rotation.prescribed_rad if isinstance(hinge, Revolute) else None
     turns_freely = isinstance(hinge, Revolute) and function is None
-    holds, prescribed = [], []
-    for coordinate in range(2 if turns_freely else 3):
-        motion = {}
-        if coordinate == 2 and function is not None:
-            sign, f = axis_sign(hinge), profile(function)
-            first = f(0.0).value
-            motion = dict(
-                offsetUserFunction=lambda mbs, t, item, offset: sign * (f(t).value - first),
-                offsetUserFunction_t=lambda mbs, t, item, offset: sign * f(t).rate,
-            )
-        marker = shop.mbs.AddMarker(shop.items.MarkerNodeCoordinate(nodeNumber=hub, coordinate=coordinate))
-        holds.append(
-            shop.mbs.AddObject(
-                shop.items.CoordinateConstraint(markerNumbers=[shop.fixed_coordinate, marker], **motion)
-            )
+    holds = [_constrain(shop, hub, coordinate) for coordinate in (0, 1)]
+    if turns_freely:
+        return tuple(holds), []
+    if function is None:
+        return (*holds, _constrain(shop, hub, 2)), []
+    sign, f = axis_sign(hinge), profile(function)
+    start = f(0.0).value
+    holds.append(
+        _constrain(
+            shop, hub, 2,
+            offsetUserFunction=lambda mbs, t, item, offset: sign * (f(t).value - start),
+            offsetUserFunction_t=lambda mbs, t, item, offset: sign * f(t).rate,
         )
-        if motion:
-            prescribed.append((holds[-1], lambda t: Profile(*(sign * np.array(f(t))))))
-    return tuple(holds), prescribed
+    )  # fmt: skip
+    return tuple(holds), [(holds[2], lambda t: Profile(*(sign * np.array(f(t)))))]
+
+
+def _constrain(shop: Workshop, node: int, coordinate: int, **motion: Callable) -> int:
+    marker = shop.mbs.AddMarker(shop.items.MarkerNodeCoordinate(nodeNumber=node, coordinate=coordinate))
+    return shop.mbs.AddObject(
+        shop.items.CoordinateConstraint(markerNumbers=[shop.fixed_coordinate, marker], **motion)
+    )
 
 
 def _stations(scene: Scene, beam: BeamBody, elements: int) -> Array:

@@ -13,11 +13,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.contract import Array
-from crosscheck.engines.conventions import quaternion_of, rotation_matrix
+from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.exudyn.library import load, matrix
 from crosscheck.engines.exudyn.modal import ModalIntegrals, gravity_force
 from crosscheck.engines.exudyn.motion import Motion
-from crosscheck.engines.exudyn.rotations import exponential, local_rate_map
+from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, turn_and_rate_map
 from crosscheck.engines.lumping import Inertia, steiner
 
 
@@ -25,8 +25,8 @@ from crosscheck.engines.lumping import Inertia, steiner
 class Carrier:
     """A body of the Exudyn system: `item` is the rigid body that markers attach to, `node` its rigid-body node.
 
-    `inertia` about the mass centre and `com` are in Exudyn axes; a massless carrier has none. `flexible` is the floating
-    frame object on the same node, `modes` the node of its modal coordinates. The ground has node -1.
+    `inertia` is in Exudyn axes; a massless carrier has none. `flexible` is the floating frame object on the same node,
+    `modes` the node of its modal coordinates, `data` its integrals. The ground has node -1.
     """
 
     item: int
@@ -45,7 +45,7 @@ class Carrier:
 
 @dataclass
 class Workshop:
-    """An Exudyn system being built. `explicit`: Lie-group nodes for the explicit integrator instead of Euler parameters.
+    """An Exudyn system being built. `explicit`: Lie-group nodes, for the explicit integrator, not Euler parameters.
 
     Gravity acts on every carrier with mass as it is added.
     """
@@ -165,7 +165,7 @@ class Workshop:
 
         def weight(mbs, t, item, q, qdot):
             p = reference + q[3:7]
-            return gravity_force(data, g, rotation_matrix(p), local_rate_map(p), np.asarray(q[7:]))
+            return gravity_force(data, g, *turn_and_rate_map(p), np.asarray(q[7:]))
 
         return weight
 

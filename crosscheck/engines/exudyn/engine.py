@@ -6,16 +6,17 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Model, Support
 from crosscheck.engines.exudyn import library
-from crosscheck.engines.exudyn.assembly import unconstrained
+from crosscheck.engines.exudyn.assembly import flexible, unconstrained
 from crosscheck.engines.exudyn.solve import EXPLICIT
 from crosscheck.engines.exudyn.support import supports
 from crosscheck.engines.functions_of_time import fastest_rate
 from flexmb.scene.schema import Scene
 
-STEP = 4e-3
-"""Coarsest step (s) of a scene in which nothing spins."""
-SPIN_PER_STEP = 0.05
-"""Largest angle (rad) a wheel turns in a coarsest step: its joint's error grows with it."""
+RIGID_STEP, FLEXIBLE_STEP = 4e-3, 2e-3
+"""Coarsest step (s) of a scene in which no wheel spins, without and with flexible bodies."""
+SPIN_PER_STEP, WHEEL_STEP = 0.2, 1e-3
+"""Angle (rad) that a wheel may turn in a coarsest step, for the error of its bearing grows with it, and the step (s)
+below which this is not pursued, for the time of a run grows with it."""
 
 
 class ExudynEngine:
@@ -38,7 +39,8 @@ class ExudynEngine:
         """
         if unconstrained(scene):
             return tuple(Effort("tolerance", tolerance, EXPLICIT) for tolerance in (1e-7, 1e-9, 1e-11))
-        step = min(STEP, SPIN_PER_STEP / max(_fastest_spin(scene), 1e-9))
+        coarsest = FLEXIBLE_STEP if any(flexible(body) for body in scene.bodies) else RIGID_STEP
+        step = min(coarsest, max(WHEEL_STEP, SPIN_PER_STEP / max(_fastest_spin(scene), 1e-9)))
         return tuple(Effort("step", step / refinement, "TrapezoidalIndex2") for refinement in (1, 2, 4))
 
     def compile(self, scene: Scene) -> Model:

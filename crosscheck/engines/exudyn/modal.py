@@ -1,4 +1,4 @@
-"""A flexible body for Exudyn's floating frame of reference: points, modes, and their inertia integrals by plain sums."""
+"""A flexible body for Exudyn's floating frame of reference: nodes, and the inertia integrals as sums over points."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def gravity_force(data: ModalIntegrals, g: Array, A: Array, rate_map: Array, eta
     """Generalised weight [World force; rotation coordinates; modes] of the deformed body.
 
     Exudyn's own mass-proportional load leaves out the moment of the deformation, A skew(shape eta) G, so that energy
-    drifts. `g` (3,) m/s² in World, `A` (3,3) frame to World, `rate_map` (3,k): angular velocity in body axes = map qdot.
+    drifts. `g` (3,) m/s² in World, `A` (3,3) frame to World, `rate_map` (3,k): body-axes angular velocity = map qdot.
     """
     local = A.T @ g
     moment = cross_matrix(data.first + data.shape @ eta) @ local

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engines.contract import Array, Effort, Run, Snapshot, Trajectory
-from crosscheck.engines.exudyn.assembly import Assembly, assemble
+from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
 from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
@@ -64,8 +64,8 @@ class ExudynModel:
 
     def mass_matrix(self, body: str | None = None) -> Array:
         """(m+6, m+6) of a flexible body, [modes; angular; linear] in its body axes; of the only one by default."""
-        name = body or next(name for name, placed in self.assembly.bodies.items() if placed.carrier.flexible is not None)
-        return body_mass_matrix(self.assembly, name)
+        bending = [name for name, placed in self.assembly.bodies.items() if placed.carrier.flexible is not None]
+        return body_mass_matrix(self.assembly, body or bending[0])
 
     def _located(self, item, paths: dict[int, CarrierPath]):
         placed = self.assembly.bodies[item.body]

@@ -1,4 +1,4 @@
-"""Where everything is, and how it moves, at t = 0: redundant coordinates need poses and velocities that fit the joints."""
+"""Where everything is and how it moves at t = 0: redundant coordinates must fit the joints."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flexmb.scene.hinges import AngularCoordinate, Free, LinearCoordinate, Spher
 
 @dataclass(frozen=True)
 class Motion:
-    """A frame in World: `position` (3,) m, `rotation` (3,3) to World, `angular` rad/s and `linear` m/s in World axes."""
+    """A frame in World: `position` (3,) m, `rotation` (3,3) to World; `angular` rad/s, `linear` m/s in World axes."""
 
     position: Array
     rotation: Array

@@ -19,6 +19,14 @@ def local_rate_map(p: Array) -> Array:
     return 2.0 * np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
 
 
+def turn_and_rate_map(p: Array) -> tuple[Array, Array]:
+    """Rotation matrix and `local_rate_map` of one set of Euler parameters (4,), quickly: for Exudyn's call-backs."""
+    p0, p1, p2, p3 = (float(each) for each in p)
+    G = np.array([[-p1, p0, p3, -p2], [-p2, -p3, p0, p1], [-p3, p2, -p1, p0]])
+    E = np.array([[-p1, p0, -p3, p2], [-p2, p3, p0, -p1], [-p3, -p2, p1, p0]])
+    return E @ G.T, 2.0 * G
+
+
 def matrices(p: Array) -> Array:
     """Rotation matrices (..., 3, 3), body to World, of Euler parameters (..., 4) (normalised here)."""
     p = np.asarray(p)

@@ -19,15 +19,19 @@ NEWTON_TOLERANCES = (1e-8, 1e-6, 1e-4)
 """Relative and absolute tolerance of Newton's method, tried in turn until a run reaches its end.
 
 The floor that round-off puts under the residual depends on the stiffness of the bodies; below it Newton never converges
-and the run stops early (Exudyn's defaults, 1e-8 and 1e-10, do so for beams). 1e-6 leaves errors of 1e-7 in positions; only finely meshed stiff beams come to 1e-4.
+and the run stops early (Exudyn's defaults, 1e-8 and 1e-10, do so for beams). 1e-6 leaves errors of 1e-7 in positions;
+only finely meshed stiff beams come to 1e-4.
 """
 DEFLECTION_LIMIT = 1e3
 """Largest deflection, in units of the body's length: beyond it a linear modal field means nothing."""
 
 SPARSE_FROM = 60
 """Number of unknowns from which Exudyn's sparse solver is the faster one."""
-SMALLEST_STEP = 1e-4
-"""Smallest error-controlled step, in units of a sample interval: Exudyn goes on with it, however large the error."""
+FIRST_STEP, SMALLEST_STEP = 1e-3, 1e-5
+"""First and smallest error-controlled step, in units of a sample interval.
+
+From a first step that is far too long Exudyn falls to the smallest one and accepts its error, whatever it is.
+"""
 
 
 @dataclass(frozen=True)
@@ -156,15 +160,16 @@ def _explicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> 
     control.relativeTolerance = control.absoluteTolerance = effort.value
     shop.mbs.Assemble()
     recorder.take(0.0)
-    steps = 0
+    steps, step = 0, FIRST_STEP * float(times[1])
     for left, right in zip(times, times[1:], strict=False):
         control.startTime, control.endTime = float(left), float(right)
-        control.minimumStepSize = SMALLEST_STEP * float(right - left)
+        control.initialStepSize, control.minimumStepSize = step, SMALLEST_STEP * float(right - left)
         finished = _run(assembly, settings, update=True)
         taken = shop.mbs.sys["dynamicSolver"].it.currentStepIndex
         steps += taken
-        if not finished or taken > 0.9 / SMALLEST_STEP:
+        if not finished or taken > 0.5 / SMALLEST_STEP:
             break
+        step = float(right - left) / taken
         recorder.take(float(right))
         if not np.all(np.isfinite(recorder.rows[-1][1])):
             break

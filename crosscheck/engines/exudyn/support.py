@@ -46,7 +46,7 @@ def _body_refusals(body: Body) -> Iterator[str]:
         case BeamBody() if body.level != "rigid":
             yield f'body "{body.name}": expand the beam to raw points and modes first'
         case ModalBody() if body.level not in ("rigid", "full"):
-            yield f'body "{body.name}": Exudyn\'s floating frame has the kinetic energy of level "full", not "{body.level}"'
+            yield f'body "{body.name}": Exudyn\'s floating frame is of level "full", not "{body.level}"'
         case ModalBody(level="full"):
             arrays = modal_arrays(body)
             if arrays.inertia.any() or (arrays.com_offset.any() and arrays.rotation_modes.any()):

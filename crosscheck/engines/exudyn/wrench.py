@@ -43,7 +43,7 @@ def drives(assembly: Assembly, states: States) -> dict[str, Array]:
 
 
 def _connector_wrench(assembly: Assembly, link: Link) -> Array:
-    """[torque; force] at the link's outboard marker: the least-squares solution of J' [force; torque] = -(C' lambda)."""
+    """[torque; force] at the link's outboard marker: least-squares solution of J' [force; torque] = -C' multiplier."""
     mbs, kinds = assembly.shop.mbs, assembly.shop.exu.ComputeItemType
     J = np.vstack(
         [mbs.ComputeItem(link.marker, kinds.PositionJacobian), mbs.ComputeItem(link.marker, kinds.RotationJacobian)]

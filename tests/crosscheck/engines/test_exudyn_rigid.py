@@ -112,7 +112,8 @@ def test_prescribed_hinge_needs_the_torque_of_its_inertia():
         run = model.simulate(Run(times), Effort("step", h, "TrapezoidalIndex2"))
         errors.append(np.abs(run.drives["drive"][:, 0] + J * 9.0 * np.sin(3.0 * times)).max())
         assert run.drives["drive"][:, 0] == pytest.approx(run.loads["drive"][:, 2], abs=1e-9)
-    assert errors[1] < 1e-3 * J * 9.0 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.1)
+    # the Newton tolerance (1e-8 of the residual) blurs the ratio of 4 a little
+    assert errors[1] < 1e-4 * J * 9.0 and errors[0] / errors[1] == pytest.approx(4.0, rel=0.25)
 
 
 def test_prescribed_wheel_passes_many_turns():
