@@ -1,0 +1,181 @@
+"""What the project promises of its engines at random states, pinned on the shipped cases and on random trees.
+
+Rigid variants: accelerations equal Pinocchio's and MuJoCo's to 1e-10 and hinge loads to 1e-9. Level `full`: mass matrix
+and accelerations equal those of Exudyn's floating frame to 1e-9. Free flight equals Exudyn's explicit run to 1e-7.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import flexmb
+from crosscheck.engines.contract import Effort, Engine, EngineMissing, MarkerSnapshot, Run, Snapshot
+from crosscheck.engines.randomise import randomise
+from crosscheck.engines.registry import engine
+from crosscheck.surrogate import finite_segments, modal_points, rigidify
+from flexmb.scene import schema as s
+from tests import trees
+
+CASES = sorted((Path(__file__).parents[3] / "cases").glob("*/*/scene.toml"))
+RANDOM = [(name, seed) for name in ("grounded", "free-flying") for seed in range(60, 63)]
+ACCELERATION = 1e-10
+LOAD = 1e-9
+FLEXIBLE = 1e-9
+FLIGHT = 1e-7
+
+
+def peer(name: str, scene: s.Scene) -> Engine:
+    """The engine, or a skip that says why it cannot judge this scene."""
+    found = engine(name)
+    try:
+        found.version()
+    except EngineMissing as missing:
+        pytest.skip(str(missing))
+    support = found.supports(scene)
+    if support.kind != "exact":
+        pytest.skip(f"{name}: {support.reason}")
+    return found
+
+
+def largest(motions: list[np.ndarray]) -> float:
+    return max(float(np.max(np.abs(motion))) for motion in motions)
+
+
+def compare_accelerations(ours: dict[str, MarkerSnapshot], theirs: dict[str, MarkerSnapshot], tolerance: float) -> None:
+    """Angular and linear parts each in units of the scene's largest."""
+    assert ours.keys() == theirs.keys() and ours, "markers are what is compared: a scene without any shows nothing"
+    for part in (slice(0, 3), slice(3, 6)):
+        scale = largest([marker.acceleration[part] for marker in ours.values()])
+        for name, marker in ours.items():
+            gap = marker.acceleration[part] - theirs[name].acceleration[part]
+            assert np.max(np.abs(gap)) <= tolerance * scale, name
+
+
+def compare_loads(scene: s.Scene, ours: Snapshot, theirs: Snapshot, tolerance: float) -> None:
+    """All six components across every hinge, torques and forces each in units of the scene's largest.
+
+    Inertia forces, m a of all bodies, count as well (and their torques over a metre): across a free hinge they cancel.
+    """
+    mass = sum(body.mass_kg for body in scene.bodies if isinstance(body, s.RigidBody))
+    inertial = mass * largest([marker.acceleration for marker in ours.markers.values()])
+    for part in (slice(0, 3), slice(3, 6)):
+        scale = max(inertial, largest([load[part] for load in ours.loads.values()]))
+        for hinge in scene.hinges:
+            gap = ours.loads[hinge.name][part] - theirs.loads[hinge.name][part]
+            assert np.max(np.abs(gap)) <= tolerance * scale, hinge.name
+
+
+def compare_rigid(scene: s.Scene, name: str) -> None:
+    ours = engine("native").compile(scene).evaluate()
+    theirs = peer(name, scene).compile(scene).evaluate()
+    compare_accelerations(ours.markers, theirs.markers, ACCELERATION)
+    compare_loads(scene, ours, theirs, LOAD)
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize("path", CASES, ids=lambda path: "/".join(path.parts[-3:-1]))
+def test_rigid_variants_of_the_cases(path, name):
+    compare_rigid(randomise(rigidify(flexmb.load_scene(path)), np.random.default_rng(0)), name)
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize(("kind", "seed"), RANDOM)
+def test_rigid_variants_of_random_flexible_trees(kind, seed, name):
+    recipe = trees.FULL if kind == "grounded" else trees.FREE_FLYING
+    compare_rigid(rigidify(trees.random_scene(seed, recipe)), name)
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize("seed", range(2))
+def test_finite_segments_of_a_beam(seed, name):
+    """Sixteen stiff segments: a surrogate is a rigid tree like any other."""
+    scene = replace(clamped_beam(), bodies=(beam("clamped-free", ("bending_y", "bending_z", "torsion")),))
+    compare_rigid(randomise(finite_segments(scene, "beam", 16), np.random.default_rng(seed)), name)
+
+
+def beam(boundary: str, families: tuple[str, ...] = ("bending_y", "bending_z", "axial", "torsion")) -> s.BeamBody:
+    """Beam K of the spin-up manoeuvre with a torsional stiffness, its section's inertia in massy points."""
+    stations = tuple(
+        s.BeamStation(
+            x_m=x, EA_N=5.03e6, EIy_Nm2=566.6, EIz_Nm2=566.6, GJ_Nm2=435.0, mass_per_length_kg_m=0.2019,
+            rotary_y_kg_m=2e-4, rotary_z_kg_m=2e-4,
+        )
+        for x in (0.0, 8.0)
+    )  # fmt: skip
+    modes = s.Modes(count=6, families=families, boundary=boundary)
+    return s.BeamBody(name="beam", length_m=8.0, elements=8, stations=stations, modes=modes, points="section")
+
+
+def markers() -> tuple[s.Marker, ...]:
+    return (s.Marker(name="tip", body="beam", node="tip"), s.Marker(name="root", body="beam", node="root"))
+
+
+def clamped_beam() -> s.Scene:
+    """On a hinge about a turned axis, under gravity."""
+    hinge = s.Revolute(name="hub", parent="ground", child="beam", axis=(0.0, 0.6, 0.8))
+    return s.Scene(
+        name="clamped", gravity_m_s2=(0.0, 0.0, -9.81), bodies=(beam("clamped-free"),), hinges=(hinge,),
+        markers=markers(),
+    )  # fmt: skip
+
+
+def flying_beam(boundary: str) -> s.Scene:
+    return s.Scene(
+        name="flying", bodies=(beam(boundary),), hinges=(s.Free(name="free", parent="ground", child="beam"),),
+        markers=markers(),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
+def test_full_has_the_mass_matrix_of_exudyns_floating_frame(boundary, seed):
+    """[modes; angular; linear] in body axes: a free hinge's own speeds, where it sits at the body frame."""
+    scene = randomise(modal_points(flying_beam(boundary)), np.random.default_rng(seed))
+    theirs = peer("exudyn", scene).compile(scene).mass_matrix("beam")
+    system = flexmb.compile(scene)
+    free, modes = system.speed("free"), system.speed("beam.modes")
+    order = np.r_[modes, free]
+    ours = system.mass_matrix(system.initial_state)[np.ix_(order, order)]
+    assert np.max(np.abs(ours - theirs)) <= FLEXIBLE * np.max(np.abs(theirs))
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("build", [clamped_beam, lambda: flying_beam("clamped-free"), lambda: flying_beam("free-free")],
+                         ids=["hinged", "flying, clamped modes", "flying, free modes"])  # fmt: skip
+def test_full_has_the_accelerations_of_exudyns_floating_frame(build, seed):
+    scene = randomise(modal_points(build()), np.random.default_rng(seed))
+    theirs = peer("exudyn", scene).compile(scene).evaluate()
+    ours = engine("native").compile(scene).evaluate()
+    compare_accelerations(ours.markers, theirs.markers, FLEXIBLE)
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: "/".join(path.parts[-3:-1]))
+def test_flexible_cases_at_random_states(path):
+    scene = flexmb.load_scene(path)
+    if all(isinstance(body, s.RigidBody) for body in scene.bodies):
+        pytest.skip("no flexible body")
+    scene = randomise(modal_points(scene), np.random.default_rng(1))
+    theirs = peer("exudyn", scene).compile(scene).evaluate()
+    compare_accelerations(engine("native").compile(scene).evaluate().markers, theirs.markers, FLEXIBLE)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
+def test_ten_seconds_of_free_flight(boundary):
+    """Exudyn's explicit integrator at 1e-11 against DOP853 at 1e-12, in units of the tip's range."""
+    scene = randomise(modal_points(flying_beam(boundary)), np.random.default_rng(5))
+    state = scene.modal_states[0]
+    gentle = replace(  # centimetres: with decimetres the motion is chaotic
+        state, coordinates=tuple(0.1 * x for x in state.coordinates), rates=tuple(0.1 * x for x in state.rates or ())
+    )
+    scene, run = replace(scene, modal_states=(gentle,)), Run(np.linspace(0.0, 10.0, 101))
+    theirs = peer("exudyn", scene).compile(scene).simulate(run, Effort("tolerance", 1e-11, "DOPRI5"))
+    ours = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-12, "dop853"))
+    assert ours.status == theirs.status == "finished"
+    for name, path in ours.markers.items():
+        size = np.ptp(path.position, axis=0).max()
+        assert np.max(np.abs(path.position - theirs.markers[name].position)) <= FLIGHT * size, name
