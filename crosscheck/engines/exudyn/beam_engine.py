@@ -22,8 +22,8 @@ from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
-from flexmb.scene.hinges import Revolute, Weld
-from flexmb.scene.schema import BeamBody, Scene
+from flexmb.scene.hinges import Hinge, Revolute, Weld
+from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
 
 STEPS = (1e-2, 5e-3, 2.5e-3)
@@ -76,7 +76,7 @@ def _refusals(scene: Scene) -> Iterator[str]:
     yield from _hinge_refusals(beam, hinge)
 
 
-def _hinge_refusals(beam: BeamBody, hinge) -> Iterator[str]:
+def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:
     if hinge.parent != GROUND or not isinstance(hinge, Revolute | Weld):
         yield "the beam must be hinged (revolute) or welded to the ground"
         return
@@ -141,7 +141,7 @@ class BeamModel:
             return {}
         return {hinge.name: -axis_sign(hinge) * self._multiplier(states, 2)[:, None]}
 
-    def _marker(self, marker, states: States) -> tuple[MarkerPath, Array]:
+    def _marker(self, marker: Marker, states: States) -> tuple[MarkerPath, Array]:
         """Motion of a section plus offset, and its spatial acceleration (T,6), zeros where the states have none."""
         beam, T = self.beam, len(states.times)
         rest = node_frame(beam.scene.bodies[0], marker.node)

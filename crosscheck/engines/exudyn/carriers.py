@@ -8,6 +8,7 @@ Every body keeps its own axes, chosen so that all bodies' axes are parallel to W
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -52,10 +53,10 @@ class Workshop:
 
     gravity: Array
     explicit: bool
-    exu: object = field(init=False)
-    items: object = field(init=False)
-    container: object = field(init=False)
-    mbs: object = field(init=False)
+    exu: Any = field(init=False)
+    items: Any = field(init=False)
+    container: Any = field(init=False)
+    mbs: Any = field(init=False)
     ground: Carrier = field(init=False)
 
     def __post_init__(self) -> None:

@@ -9,10 +9,11 @@ from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
 from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
+from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
 from crosscheck.engines.exudyn.wrench import drives, link_wrenches
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Marker, Scene
 
 
 class ExudynModel:
@@ -67,7 +68,7 @@ class ExudynModel:
         bending = [name for name, placed in self.assembly.bodies.items() if placed.carrier.flexible is not None]
         return body_mass_matrix(self.assembly, body or bending[0])
 
-    def _located(self, item, paths: dict[int, CarrierPath]):
+    def _located(self, item: Marker, paths: dict[int, CarrierPath]) -> tuple[CarrierPath, NodeShape]:
         placed = self.assembly.bodies[item.body]
         return paths[placed.carrier.key], placed.shape(item.node)
 
