@@ -285,10 +285,11 @@ def _check_comparison(run: RunFile, comparison: Comparison, where: str) -> None:
         _require(comparison.a is None and comparison.b is None, where, "give either variant, or a and b")
         _check_engines(run.variant(comparison.variant), comparison.engines, where)
         return
-    _require(comparison.a is not None and comparison.b is not None, where, "give either variant, or a and b")
     _require(not comparison.engines, f"{where}.engines", "engines belongs to variant; a and b name theirs")
-    _check_side(run, comparison.a, f"{where}.a")
-    _check_side(run, comparison.b, f"{where}.b")
+    for key, side in (("a", comparison.a), ("b", comparison.b)):
+        if side is None:
+            raise CaseError(f"$.{where}: give either variant, or a and b")
+        _check_side(run, side, f"{where}.{key}")
 
 
 def _check_side(run: RunFile, side: Side, where: str) -> None:

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from msgspec.structs import replace
@@ -19,6 +19,7 @@ from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import (
     AngularCoordinate,
     BeamBody,
+    Body,
     Gimbal,
     Hinge,
     LinearCoordinate,
@@ -90,9 +91,9 @@ def _modal(beam: BeamBody) -> ModalBody:
     free = beam.modes.boundary == "free-free"
     nodes = tuple(
         ModalNode(
-            name=name, position_m=_floats(node.position), quaternion=quaternions[name],
-            translation_modes=tuple(map(_floats, node.translation.T)),
-            rotation_modes=tuple(map(_floats, node.rotation_modes.T)),
+            name=name, position_m=_vector(node.position), quaternion=quaternions[name],
+            translation_modes=tuple(map(_vector, node.translation.T)),
+            rotation_modes=tuple(map(_vector, node.rotation_modes.T)),
         )
         for name, node in model.nodes.items()
         if free or name != "origin"
@@ -117,7 +118,7 @@ def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
     inboard = next(hinge for hinge in scene.hinges if hinge.child == beam.name)
     root = places[inboard.child_node][0]
 
-    def moved(item, body_key: str, node_key: str):
+    def moved(item: Any, body_key: str, node_key: str) -> Any:
         """The same hinge, wheel, load ... on the segment that carries its node."""
         if getattr(item, body_key) != beam.name:
             return item
@@ -129,7 +130,7 @@ def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
         hinges.append(moved(moved(hinge, "child", "child_node"), "parent", "parent_node"))
         if hinge is inboard:
             hinges += _hinges(beam, cuts, ends, root)
-    bodies = []
+    bodies: list[Body] = []
     for each in scene.bodies:
         bodies += _segments(beam, ends, places) if each is beam else [each]
     on_bodies = {
@@ -239,3 +240,8 @@ def _piece_at(ends: list[float], x: float) -> int:
 
 def _floats(values: Array) -> tuple[float, ...]:
     return tuple(float(value) for value in values)
+
+
+def _vector(values: Array) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -25,8 +25,8 @@ _ADVICE = {
     Status.OK: "finished",
     Status.NOT_POSITIVE_DEFINITE: (
         "the articulated inertia of body {body} is not positive definite: it moves without mass, its gimbal is at its "
-        "singular angle, or its first-order mass matrix left its range of validity; give it mass, use a spherical hinge, "
-        'or use level "full"'
+        "singular angle, or its first-order mass matrix left its range of validity; give it mass, use a spherical "
+        'hinge, or use level "full"'
     ),
     Status.NONFINITE: (
         "the state is no longer finite: the motion diverged; look for an instability (level, negative stiffness or "
@@ -37,8 +37,8 @@ _ADVICE = {
         "singular angle, a flexible body beyond its range), or rtol and atol ask for more than double precision gives"
     ),
     Status.OUT_OF_RANGE: (
-        "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; look "
-        "for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
+        "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
+        "look for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
     ),
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
 }

@@ -1,7 +1,7 @@
 """What an engine must offer, and the only data engines exchange.
 
-Everything crosses this boundary in World axes, SI, at named markers and hinges; quaternions are scalar-first and map body
-components to World components; spatial vectors are angular first. Native coordinates never leave an engine.
+Everything crosses this boundary in World axes, SI, at named markers and hinges; quaternions are scalar-first and map
+body components to World components; spatial vectors are angular first. Native coordinates never leave an engine.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Articulated-body forward dynamics of trees with rigid and flexible bodies, O(N): Jain & Rodriguez (63), (64).
 
-Per body the modes are eliminated first (explicit D_f by Cholesky), then the hinge. Every quantity is a scalar tuple or a
-row of the workspace. Bodies are numbered base to tip, hence the inward sweep runs from N-1 to 0. Gravity enters as
+Per body the modes are eliminated first (explicit D_f by Cholesky), then the hinge. Every quantity is a scalar tuple or
+a row of the workspace. Bodies are numbered base to tip, hence the inward sweep runs from N-1 to 0. Gravity enters as
 acceleration -g of the ground.
 """
 
