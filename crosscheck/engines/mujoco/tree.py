@@ -23,7 +23,7 @@ from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
 
 Array = NDArray[np.float64]
 
-ARMATURE = 1e15
+ARMATURE = 1e20
 LEAST_INERTIA = 1e-14
 
 

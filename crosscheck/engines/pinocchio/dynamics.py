@@ -22,8 +22,8 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 
-BALLAST = 1e15
-"""kg m^2 or kg."""
+BALLAST = 1e20
+"""kg m^2 or kg: so large that drive loads of any scene, divided by it, are below round-off of the accelerations."""
 
 
 class Solution(NamedTuple):
