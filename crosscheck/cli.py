@@ -8,6 +8,7 @@ from typing import Annotated, NoReturn
 
 import typer
 from rich.console import Console
+from rich.markup import escape
 
 from crosscheck import library
 from crosscheck.case import CaseError
@@ -152,7 +153,7 @@ def _conclude(records: Path, out: Path, open_report: bool) -> None:
 
 
 def _refuse(message: str) -> NoReturn:
-    console.print(f"[red]{message}[/red]", soft_wrap=True)
+    console.print(f"[red]{escape(message)}[/red]", soft_wrap=True)
     raise typer.Exit(EXIT_USAGE)
 
 

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
 
 from crosscheck.plan import Job
@@ -51,7 +52,7 @@ class LiveProgress:
         """Show one event."""
         if self._overall is None:
             self._overall = self._progress.add_task("[bold]all runs[/bold]", total=len(jobs))
-        title = jobs[event.job].title
+        title = escape(jobs[event.job].title)
         if event.kind == "started":
             self._started[event.job] = time.perf_counter()
             self._records[event.job] = []
@@ -59,7 +60,7 @@ class LiveProgress:
         elif event.kind == "emitted" and isinstance(event.content, RunRecord):
             self._records[event.job].append(event.content)
         elif event.kind == "emitted":
-            self._progress.update(self._lines[event.job], description=f"{title}: {event.content}")
+            self._progress.update(self._lines[event.job], description=f"{title}: {escape(event.content)}")
         else:
             self._progress.remove_task(self._lines.pop(event.job))
             self._progress.advance(self._overall)
@@ -68,14 +69,13 @@ class LiveProgress:
     def _ending(self, title: str, event: Event) -> str:
         """The lasting line of a job."""
         if event.kind == "crashed":
-            return f"{MARKS['failed']} {title}: {event.content}"
+            return f"{MARKS['failed']} {title}: {escape(event.content)}"
         records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
         if not records:
             return f"{MARKS['finished']} {title}: already recorded"
         last = records[-1]
         if last.status != "finished":
-            return (
-                f"{MARKS[last.status]} {title}: {last.status}: {last.message.splitlines()[-1] if last.message else ''}"
-            )
+            why = escape(last.message.splitlines()[-1]) if last.message else ""
+            return f"{MARKS[last.status]} {title}: {last.status}: {why}"
         efforts = f"{len(records)} effort{'s' if len(records) > 1 else ''}"
         return f"{MARKS['finished']} {title}: {efforts} in {spent:.1f} s"
