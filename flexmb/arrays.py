@@ -181,6 +181,8 @@ class Workspace:
 
     q: Real  # (nq,) quaternions normalised, prescribed coordinates exact
     u: Real  # (nu,)
+    raw: Real  # (nq,) coordinates as the integrator has them
+    rate: Real  # (nq,) qdot
     ground: Real  # (3,) acceleration of the ground, World axes: -gravity
     body: Record  # (N,) BODY_STATE
     mode: Record  # (N,m) MODE_STATE

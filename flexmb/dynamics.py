@@ -28,9 +28,11 @@ def rhs(t, y, dy, c, w):
     if status != OK:
         return status
     drive_loads(c, w)
-    configuration_rate(y, dy, c, w)
+    configuration_rate(c, w)
     nq = w.q.shape[0]
     nu = w.u.shape[0]
+    for i in range(nq):
+        dy[i] = w.rate[i]
     for j in range(nu):
         dy[nq + j] = w.speed[j].acceleration
     dy[nq + nu] = power(c, w)

@@ -279,6 +279,8 @@ def _workspace(c: Constants, nq: int, nu: int) -> Workspace:
     w = Workspace(
         q=np.zeros(nq),
         u=np.zeros(nu),
+        raw=np.zeros(nq),
+        rate=np.zeros(nq),
         ground=-c.gravity,
         body=np.zeros(n, arrays.BODY_STATE),
         mode=np.zeros((n, m), arrays.MODE_STATE),

@@ -38,6 +38,7 @@ def load_state(t, y, c, w):
         w.function[f, 2] = acceleration
     nq = w.q.shape[0]
     for i in range(nq):
+        w.raw[i] = y[i]
         w.q[i] = y[i]
     for j in range(w.u.shape[0]):
         w.u[j] = y[nq + j]
@@ -296,14 +297,16 @@ def store_body_acceleration(c, w, k, alpha, a):
 
 
 @helper
-def configuration_rate(y, dy, c, w):
-    """qdot(q, u) into dy; quaternions are taken raw from y, so that their norm is an invariant of the flow."""
+def configuration_rate(c, w):
+    """qdot(q, u) into w.rate; quaternions are taken raw, so that their norm is an invariant of the flow."""
     for k in range(c.body.shape[0]):
-        catalogue.rate(c.body[k].hinge_kind, y, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, dy)
+        catalogue.rate(
+            c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, w.rate
+        )
         for n in range(c.body[k].modes):
-            dy[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
+            w.rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
     for i in range(c.wheel.shape[0]):
-        dy[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
+        w.rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
 
 
 @helper
