@@ -16,7 +16,7 @@ KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 
-    Needs the velocity and pose sweeps of this state. Overwrites w.inertia, w.pff, w.pfr.
+    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff and w.mode.
     """
     for i in range(4):
         energy[i] = 0.0

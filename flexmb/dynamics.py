@@ -57,7 +57,7 @@ def project(t, y, c):
 
 @kernel
 def accelerations(t, y, c, w):
-    """udot into w.acceleration; returns a status code."""
+    """udot into w.speed.acceleration; returns a status code."""
     load_state(t, y, c, w)
     return forward_dynamics(c, w)
 
@@ -80,7 +80,7 @@ def mass_matrix(t, y, c, w, M):
 
 @kernel
 def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, energy, momentum):
-    """Everything observable at one state; w.acceleration and w.drive are filled as well. Returns a status code.
+    """Everything observable at one state; w.speed is filled as well. Returns a status code.
     Loads are those of the model: a ruthless body shows them at its rest shape. Markers move with the true deformation.
 
     markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6)

@@ -11,7 +11,7 @@ from flexmb.spatial.vector import add, axpy, cross, dot, mat3, scale, store3, su
 
 @helper
 def hinge_loads(c, w):
-    """f = P_R alpha + z_R at O of every body, body axes, into w.load (N,6)."""
+    """f = P_R alpha + z_R at O of every body, body axes, into w.body.load."""
     for k in range(c.body.shape[0]):
         hinge_load(w, k)
 
@@ -27,7 +27,7 @@ def hinge_load(w, k):
 
 @helper
 def drive_loads(c, w):
-    """Generalised load of every prescribed speed, H'f, beyond its spring and damper, into w.drive (nu,)."""
+    """Generalised load of every prescribed speed, H'f, beyond its spring and damper, into w.speed.drive."""
     for k in range(c.body.shape[0]):
         j = c.body[k].u_index
         for n in range(c.body[k].nv):

@@ -19,7 +19,7 @@ from flexmb.spatial.vector import (
 
 @helper
 def hinge_forces(c, w):
-    """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.applied (nu,)."""
+    """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
     for j in range(w.u.shape[0]):
         force = -c.speed[j].damping * w.u[j]
         i = c.speed[j].coordinate

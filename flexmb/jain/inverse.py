@@ -22,7 +22,7 @@ from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, t
 
 @helper
 def inverse_dynamics(c, w, tau):
-    """tau (nu,) for the state in w.q, w.u and the rates in w.acceleration; w.load receives the loads across hinges."""
+    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads."""
     velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0:
         pose_sweep(c, w)
@@ -58,7 +58,7 @@ def mass_matrix(c, w, M):
 
 @helper
 def _inertial_force(c, w, k, tau):
-    """f_m = M_m alpha_m + b_m (36), rigid part into w.force, modal part into w.zf; wheels' own rows into tau."""
+    """f_m = M_m alpha_m + b_m (36), rigid part into w.body.force, modal part into w.mode.zf; wheels' rows into tau."""
     alpha, a = vec3(w.body[k].accel, 0), vec3(w.body[k].accel, 3)
     torque, force = inertia_times(load_inertia(w.body[k].inertia, 0), alpha, a)
     for n in range(c.body[k].modes):

@@ -247,7 +247,7 @@ def pose_sweep(c, w):
 
 @helper
 def acceleration_sweep(c, w):
-    """Accelerations of all bodies for given udot in w.acceleration (24): the outward half of inverse dynamics."""
+    """Accelerations of all bodies for given udot in w.speed.acceleration (24): inverse dynamics, outward."""
     for k in range(c.body.shape[0]):
         alpha, a = inboard_acceleration(c, w, k)
         alpha = add(alpha, vec3(w.body[k].bias, 0))

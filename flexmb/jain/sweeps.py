@@ -42,7 +42,7 @@ SINGLE = -1  # free_count of a hinge with one free speed along z: no small matri
 
 @helper
 def forward_dynamics(c, w):
-    """Accelerations udot into w.acceleration from the state in w.q, w.u; returns a status code."""
+    """Accelerations udot into w.speed.acceleration from the state in w.q, w.u; returns a status code."""
     hinge_forces(c, w)
     velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0:
