@@ -167,7 +167,7 @@ def _numbers(verdict: Verdict) -> str:
     if verdict.kind == "conservation":
         return f"drift {verdict.E:.1e} of ≤ {verdict.goal:.0e}"
     doubt = "unknown" if verdict.U is None else f"{verdict.U:.1e}"
-    return f"E {verdict.E:.1e}  U {doubt}"
+    return f"E {verdict.E:.1e}\nU {doubt}"
 
 
 def _kind(channel: str) -> str:
