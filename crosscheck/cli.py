@@ -62,7 +62,7 @@ def run(
     **Exit code**: 0 every verdict is the one the case expects and everything asked for ran;
     1 something is not as expected or did not run; 2 the request itself makes no sense.
 
-    **Examples**: `crosscheck run canonical` · `crosscheck run spin/beam_k -e native -e exudyn` ·
+    **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
     """
     chosen = _found(tuple(cases))

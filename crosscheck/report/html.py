@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from typing import Any
 
 import msgspec
 from jinja2 import Environment, PackageLoader, select_autoescape
-from markupsafe import Markup
+from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
 from crosscheck.report.charts import payload
@@ -25,6 +26,7 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
         lstrip_blocks=True,
         keep_trailing_newline=False,
     )
+    templates.filters["code"] = _code
     data = payload([(case, outcome.verdicts[case.case.case]) for case in session.cases])
     page = templates.get_template("report.html.j2").render(
         outcome=outcome,
@@ -45,6 +47,11 @@ def _inline(templates: Environment, name: str) -> Markup:
     """A file of the templates folder as it is."""
     assert templates.loader is not None
     return Markup(templates.loader.get_source(templates, name)[0])
+
+
+def _code(text: str) -> Markup:
+    """Text of a README or a note with `words in backticks` set as code."""
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
 
 
 def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:

@@ -13,6 +13,7 @@ import pytest
 
 from crosscheck.library import load_case
 from crosscheck.report import Outcome, write_all
+from crosscheck.report.html import _code
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.sweep import sweep
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
@@ -135,3 +136,7 @@ def test_the_summary_says_it_all(mixed: tuple[Outcome, Path], sound: tuple[Outco
     good = sound[1].with_name("summary.md").read_text(encoding="utf-8")
     assert good.startswith("# ✅ All 15 verdicts are as expected")
     assert "Not as expected" not in good
+
+
+def test_backticks_become_code_and_nothing_else_becomes_markup() -> None:
+    assert _code("as `a < b`, <b>not</b> bold") == "as <code>a &lt; b</code>, &lt;b&gt;not&lt;/b&gt; bold"
