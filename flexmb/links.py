@@ -58,6 +58,8 @@ class Link:
 
 def links(scene: s.Scene) -> list[Link]:
     """All links base to tip: bodies depth-first, then point masses."""
+    if scene.closures:
+        raise NotImplementedError(f'closure "{scene.closures[0].name}": loop closures are not supported yet')
     models = {"ground": _ground()} | {body.name: _model(body) for body in scene.bodies}
     for wheel in scene.wheels:
         models[wheel.body] = _with_wheel(models[wheel.body], wheel)

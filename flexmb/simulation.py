@@ -12,13 +12,13 @@ from scipy.spatial.transform import Rotation
 from flexmb import propagate
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
 from flexmb.labels import state_names
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
 from flexmb.status import Status
-from flexmb.system import ENERGIES, DynamicsError, Evaluation, System, compile
+from flexmb.system import ENERGIES, DynamicsError, Evaluation, System
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 Method = Literal["dop853", "rk4"]
@@ -58,10 +58,13 @@ def simulate(
     not supported yet, ValueError for settings that make no sense. A run that fails raises nothing: `status` and
     `message` of the trajectory say why it stopped, and what was reached is kept.
     """
-    check_scene(scene.scene if isinstance(scene, System) else scene, t_end)
+    if isinstance(scene, System):
+        check_run(scene.scene, t_end)
+    else:
+        check_scene(scene, t_end)
     _check_settings(method, rtol, atol, step, max_steps)
     times = _sample_times(samples, t_end)
-    system = scene if isinstance(scene, System) else compile(scene)
+    system = scene if isinstance(scene, System) else System(scene)
     raw = _integrate(system, times, method, rtol, atol, step, max_steps)
     return _observed(system, times, raw)
 

@@ -74,7 +74,7 @@ class DynamicsError(ArithmeticError):
 
 
 class System:
-    """A scene turned into arrays; made by `compile`. Not safe to share between threads: it owns one workspace."""
+    """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
 
     def __init__(self, scene: s.Scene) -> None:
         self.scene = scene
@@ -242,8 +242,6 @@ def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as
     supported yet (loop closures, SID files, levels "linear" and "stiffened").
     """
     check_scene(scene)
-    if scene.closures:
-        raise NotImplementedError(f'closure "{scene.closures[0].name}": loop closures are not supported yet')
     return System(scene)
 
 

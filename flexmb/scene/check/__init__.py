@@ -37,9 +37,16 @@ def check_scene(scene: Scene, t_end: float | None = None) -> None:
         raise SceneError(scene.name, problems)
 
 
+def check_run(scene: Scene, t_end: float) -> None:
+    """Raise SceneError unless a scene that was checked before can be run to `t_end` (s): its profiles cover the run."""
+    problems = [*_run_time(t_end), *functions(scene, t_end)]
+    if problems:
+        raise SceneError(scene.name, problems)
+
+
 def _run_time(t_end: float | None) -> Iterator[Problem]:
     if t_end is not None and not (isfinite(t_end) and t_end > 0.0):
         yield Problem("t_end", f"the run ends at {t_end} s", "give a positive, finite time")
 
 
-__all__ = ["Problem", "SceneError", "check_scene"]
+__all__ = ["Problem", "SceneError", "check_run", "check_scene"]
