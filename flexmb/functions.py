@@ -6,7 +6,6 @@ from collections.abc import Sequence
 from math import cos, pi, sin
 
 import numpy as np
-from scipy.interpolate import PPoly, make_interp_spline
 
 from flexmb.arrays import FUNCTION, Real, Record
 from flexmb.kernel import helper
@@ -35,6 +34,9 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
             case Pulse(value=value, start_s=begin, duration_s=duration):
                 row["kind"], row["data"] = _PULSE, (value, begin, begin + duration, 0.0)
             case Table(times_s=times, values=values):
+                # here, because this import takes longer than everything else a run without tables imports
+                from scipy.interpolate import PPoly, make_interp_spline
+
                 row["kind"] = _TABLE
                 spline = PPoly.from_spline(make_interp_spline(times, values, k=5))
                 ends = zip(spline.x[:-1], spline.x[1:], strict=True)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import cos, sin
 
-from scipy.interpolate import make_interp_spline
-
 from flexmb.scene.bodies import _Strict
 from flexmb.scene.check.walk import non_finite, values
 from flexmb.scene.convert import ROOT
@@ -46,6 +44,9 @@ def start_of(function: Function) -> tuple[float, float] | None:
         case SpinUp(duration_s=duration) if duration > 0.0:
             return 0.0, 0.0
         case Table(times_s=times, values=samples) if not any((*_table(ROOT, function), *_covers(ROOT, function, None))):
+            # here, because this import takes longer than everything else a scene without tables imports
+            from scipy.interpolate import make_interp_spline
+
             spline = make_interp_spline(times, samples, k=5)
             return float(spline(0.0)), float(spline(0.0, 1))
     return None
