@@ -1,8 +1,6 @@
-"""From links to the arrays of flexmb.arrays: numbering of coordinates, ports, wheels, loads, functions."""
+"""From links to the arrays of flexmb.arrays: bodies, ports, wheels, loads, springs, functions of time."""
 
 from __future__ import annotations
-
-from collections.abc import Iterable
 
 import numpy as np
 
@@ -13,40 +11,17 @@ from flexmb.links import Link, Port, port
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
 from flexmb.modal.model import FlexibleModel
+from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
 
-AXIS_VECTORS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 
 def six(m: a.Real) -> list[float]:
     """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
-    return [float(m[i, j]) for i, j in AXIS_VECTORS]
-
-
-class Numbering:
-    """Places of all coordinates in q and speeds in u: body by body hinge, modes, wheels."""
-
-    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
-        self.q: dict[str, slice] = {}
-        self.u: dict[str, slice] = {}
-        self.nq = self.nu = 0
-        for link in chain:
-            kind = catalogue.KINDS[link.kind]
-            self._append(link.hinge.name, kind.NQ, kind.NV)
-            self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
-            for wheel in wheels.get(link.name, ()):
-                self._append(wheel.name, 1, 1)
-        for link in chain:
-            self.q[f"{link.name}.hinge"] = self.q[link.hinge.name]
-            self.u[f"{link.name}.hinge"] = self.u[link.hinge.name]
-
-    def _append(self, name: str, nq: int, nu: int) -> None:
-        self.q[name] = slice(self.nq, self.nq + nq)
-        self.u[name] = slice(self.nu, self.nu + nu)
-        self.nq += nq
-        self.nu += nu
+    return [float(m[i, j]) for i, j in _SIX]
 
 
 class Functions:
@@ -82,14 +57,6 @@ class Ports:
 
     def all(self) -> list[Port]:
         return [port for ports in self.by_body for port in ports]
-
-
-def group(items: Iterable, key: str) -> dict[str, list]:
-    """Items by the value of an attribute, in order."""
-    found: dict[str, list] = {}
-    for item in items:
-        found.setdefault(getattr(item, key), []).append(item)
-    return found
 
 
 def body_port(link: Link, node: str, offset: s.Vector) -> Port:

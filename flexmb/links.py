@@ -17,7 +17,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.model import FlexibleModel, ModalNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
-from flexmb.scene.tree import NamedCoordinate, coordinates, ordered, rest_frames
+from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
 
 LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "full": FULL}
 
@@ -60,7 +60,7 @@ def links(scene: s.Scene) -> list[Link]:
     """All links base to tip: bodies depth-first, then point masses."""
     if scene.closures:
         raise NotImplementedError(f'closure "{scene.closures[0].name}": loop closures are not supported yet')
-    models = {"ground": _ground()} | {body.name: _model(body) for body in scene.bodies}
+    models = {GROUND: _ground()} | {body.name: _model(body) for body in scene.bodies}
     for wheel in scene.wheels:
         models[wheel.body] = _with_wheel(models[wheel.body], wheel)
     found = []

@@ -19,8 +19,9 @@ from scipy.spatial.transform import Rotation
 
 from flexmb import arrays, dynamics
 from flexmb.arrays import Constants, Real, Workspace
-from flexmb.assemble import Numbering, assemble, group
+from flexmb.assemble import assemble
 from flexmb.links import Link, links
+from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
 from flexmb.status import OK, Status
@@ -79,7 +80,9 @@ class System:
     def __init__(self, scene: s.Scene) -> None:
         self.scene = scene
         self._links = links(scene)
-        self._wheels = group(scene.wheels, "body")
+        self._wheels: dict[str, list[s.Wheel]] = {}
+        for wheel in scene.wheels:
+            self._wheels.setdefault(wheel.body, []).append(wheel)
         self._numbering = Numbering(self._links, self._wheels)
         self.constants, self._markers = assemble(scene, self._links, self._numbering)
         self.nq, self.nu = self._numbering.nq, self._numbering.nu

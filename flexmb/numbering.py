@@ -1,0 +1,31 @@
+"""Places of coordinates in q and of speeds in u."""
+
+from __future__ import annotations
+
+from flexmb.hinges import catalogue
+from flexmb.links import Link
+from flexmb.scene import schema as s
+
+
+class Numbering:
+    """Places of all coordinates in q and speeds in u: body by body hinge, modes, wheels."""
+
+    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
+        self.q: dict[str, slice] = {}
+        self.u: dict[str, slice] = {}
+        self.nq = self.nu = 0
+        for link in chain:
+            kind = catalogue.KINDS[link.kind]
+            self._append(link.hinge.name, kind.NQ, kind.NV)
+            self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
+            for wheel in wheels.get(link.name, ()):
+                self._append(wheel.name, 1, 1)
+        for link in chain:
+            self.q[f"{link.name}.hinge"] = self.q[link.hinge.name]
+            self.u[f"{link.name}.hinge"] = self.u[link.hinge.name]
+
+    def _append(self, name: str, nq: int, nu: int) -> None:
+        self.q[name] = slice(self.nq, self.nq + nq)
+        self.u[name] = slice(self.nu, self.nu + nu)
+        self.nq += nq
+        self.nu += nu
