@@ -36,7 +36,11 @@ inboard ones. References are by name. A key without default is required.
 
 def json_schema() -> str:
     """The JSON Schema of a scene."""
-    return json.dumps(msgspec.json.schema(Scene), indent=2, ensure_ascii=False) + "\n"
+    schema = msgspec.json.schema(Scene)
+    for struct in schema["$defs"].values():
+        if "description" in struct:  # a docstring: Python 3.13 takes its indentation away, older ones keep it
+            struct["description"] = cleandoc(struct["description"])
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
 
 
 def reference() -> str:
