@@ -88,12 +88,8 @@ class Trajectory:
     @property
     def energy_scale(self) -> float:
         """What a drift of energy is compared with (J): the largest change of work or of any kind of energy."""
-        changes = [
-            np.ptp(self.work),
-            *(np.ptp(energy) for energy in self.energy.values()),
-            self.energy["kinetic"].max(),
-        ]
-        return float(max(changes))
+        changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
+        return max(*changes, float(np.max(self.energy["kinetic"])))
 
     @property
     def momentum_drift(self) -> Array:
