@@ -63,12 +63,17 @@ def accelerations(t, y, c, w):
 
 
 @kernel
-def inverse_dynamics(t, y, rates, c, w, tau):
-    """tau (nu,) = M rates + c: inertia, gravity, elasticity and node loads."""
+def inverse_dynamics(t, y, rates, c, w, tau, loads):
+    """tau (nu,) = M rates + c: inertia, gravity, elasticity and node loads.
+
+    loads (N,6): what each hinge then transmits, [torque; force] on the body about O, World axes.
+    """
     load_state(t, y, c, w)
     for j in range(rates.shape[0]):
         w.speed[j].acceleration = rates[j]
     inverse.inverse_dynamics(c, w, tau)
+    pose_sweep(c, w)
+    _world_loads(c, w, loads)
 
 
 @kernel
@@ -92,7 +97,9 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
         return status
     drive_loads(c, w)
     pose_sweep(c, w)
-    _world_loads(c, w, loads, wheel_loads)
+    hinge_loads(c, w)
+    _world_loads(c, w, loads)
+    _world_wheel_loads(c, w, wheel_loads)
     velocity_sweep(c, w, False, True)
     energy_and_momentum(c, w, energy, momentum)
     velocity_sweep(c, w, True, True)
@@ -114,14 +121,20 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
 
 
 @helper
-def _world_loads(c, w, loads, wheel_loads):
-    """Hinge and wheel loads of every body in World axes."""
-    hinge_loads(c, w)
+def _world_loads(c, w, loads):
+    """w.body.load of every body in World axes."""
     for k in range(c.body.shape[0]):
         R = mat3(w.body[k].pose_rotation, 0)
         store3(loads[k], 0, times(R, vec3(w.body[k].load, 0)))
         store3(loads[k], 3, times(R, vec3(w.body[k].load, 3)))
+
+
+@helper
+def _world_wheel_loads(c, w, loads):
+    """Loads on all wheels in World axes."""
+    for k in range(c.body.shape[0]):
+        R = mat3(w.body[k].pose_rotation, 0)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             tau, f = wheel_load(c, w, k, i)
-            store3(wheel_loads[i], 0, times(R, tau))
-            store3(wheel_loads[i], 3, times(R, f))
+            store3(loads[i], 0, times(R, tau))
+            store3(loads[i], 3, times(R, f))
