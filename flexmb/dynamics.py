@@ -1,13 +1,11 @@
 """Entry points of the compiled dynamics: right-hand side, projection, and everything observable at one state."""
 
 from flexmb.balance import energy_and_momentum, power
+from flexmb.coordinates import configuration_rate, load_state, normalise_quaternions
 from flexmb.functions import evaluate
 from flexmb.jain import inverse
 from flexmb.jain.kinematics import (
     acceleration_sweep,
-    configuration_rate,
-    load_state,
-    normalise_quaternions,
     port_acceleration,
     port_velocity,
     pose_sweep,

@@ -4,7 +4,6 @@ from flexmb.arrays import FORCE, NODE_AXES
 from flexmb.jain.kinematics import add_force, port_bias, port_velocity
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
-from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.vector import (
     axpy,
     cross,
@@ -15,26 +14,6 @@ from flexmb.spatial.vector import (
     times_t,
     vec3,
 )
-
-
-@helper
-def hinge_forces(c, w):
-    """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
-    for j in range(w.u.shape[0]):
-        force = -c.speed[j].damping * w.u[j]
-        i = c.speed[j].coordinate
-        if i >= 0:
-            force -= c.speed[j].stiffness * (w.q[i] - c.speed[j].rest)
-        f = c.speed[j].motor
-        if f >= 0:
-            force += w.function[f, 0]
-        w.speed[j].applied = force
-    for k in range(c.body.shape[0]):
-        if c.body[k].ball_spring != 0.0:
-            i = c.body[k].q_index
-            theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
-            for n in range(3):
-                w.speed[c.body[k].u_index + n].applied -= c.body[k].ball_spring * theta[n]
 
 
 @helper

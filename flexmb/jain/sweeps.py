@@ -8,8 +8,9 @@ acceleration -g of the ground.
 from math import sqrt
 
 from flexmb.arrays import FULL, RUTHLESS
+from flexmb.coordinates import hinge_forces
 from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
-from flexmb.jain.forces import elastic_forces, hinge_forces, node_loads, wheel_forces
+from flexmb.jain.forces import elastic_forces, node_loads, wheel_forces
 from flexmb.jain.kinematics import (
     inboard_acceleration,
     motion_column,
