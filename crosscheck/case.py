@@ -16,6 +16,7 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
     name = "full"
     scene = "flexible.toml"
     engines = ["native"]
+    also = ["native-frisch"]          # charted, and compared where named
 
     [[variant]]
     name = "segments"
@@ -128,7 +129,8 @@ class Variant(_Strict, frozen=True, kw_only=True):
 
     `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes) or "segments" (every
     flexible body, or `segment_body` only, as `segments` rigid segments). `level` replaces the level of every flexible
-    body. `duration_s` and `samples` replace the case's. `note` is shown in the report.
+    body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
+    names them. `duration_s` and `samples` replace the case's. `note` is shown in the report.
     """
 
     name: str
@@ -139,6 +141,7 @@ class Variant(_Strict, frozen=True, kw_only=True):
     level: Level | None = None
     refined: Refined | None = None
     engines: tuple[str, ...]
+    also: tuple[str, ...] = ()
     efforts: tuple[EffortLadder, ...] = ()
     duration_s: float | None = None
     samples: int | None = None
@@ -268,6 +271,8 @@ def check_run_file(run: RunFile) -> None:
 
 def _check_variant(variant: Variant, where: str) -> None:
     _require(bool(variant.engines), f"{where}.engines", "name at least one engine")
+    twice = set(variant.engines) & set(variant.also)
+    _require(not twice, f"{where}.also", f"{', '.join(sorted(twice))} is among the engines already")
     segmented = variant.transform == "segments"
     given = variant.segments is not None
     _require(segmented == given, f"{where}.segments", 'give it exactly with transform = "segments"')
@@ -299,7 +304,7 @@ def _check_side(run: RunFile, side: Side, where: str) -> None:
 def _check_engines(variant: Variant, engines: tuple[str, ...], where: str) -> None:
     for engine in engines:
         message = f'engine "{engine}" does not run variant "{variant.name}": add it to the variant\'s engines'
-        _require(engine in variant.engines, where, message)
+        _require(engine in (*variant.engines, *variant.also), where, message)
 
 
 def _require(condition: bool, where: str, message: str) -> None:

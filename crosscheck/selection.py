@@ -1,4 +1,5 @@
 """What of a case is run: its run file reduced to the engines that were asked for, every comparison an explicit pair.
+A variant then has one list of engines, those beside it among them.
 
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
@@ -12,8 +13,7 @@ from itertools import combinations
 import msgspec
 
 from crosscheck.case import Chart, Comparison, Conservation, RunFile, Side, Variant
-
-SHIPPED = frozenset({"native", "pinocchio", "mujoco", "exudyn", "exudyn-beam"})
+from crosscheck.engines.registry import BUILT_IN
 
 
 def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
@@ -25,7 +25,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
     needed = {(side.variant, side.engine) for item in (*kept, *controls) for side in (item.a, item.b)}
     needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
-    needed |= {(v.name, engine) for v in run.variants for engine in v.engines if engine in asked or not asked}
+    needed |= {(v.name, engine) for v in run.variants for engine in _all(v) if engine in asked or not asked}
     variants = tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines)
     return msgspec.structs.replace(
         run,
@@ -39,7 +39,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The run file with foreign engines added to the variants that are compared engine by engine."""
-    known = SHIPPED.union(*(variant.engines for variant in run.variants))
+    known = set(BUILT_IN).union(*(_all(variant) for variant in run.variants))
     foreign = tuple(engine for engine in asked if engine not in known)
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
     variants = tuple(
@@ -81,9 +81,13 @@ def _narrowed(run: RunFile, item: Conservation, asked: tuple[str, ...]) -> Conse
 
 
 def _keep(variant: Variant, needed: set[tuple[str, str]]) -> Variant:
-    engines = tuple(engine for engine in variant.engines if (variant.name, engine) in needed)
+    engines = tuple(engine for engine in _all(variant) if (variant.name, engine) in needed)
     efforts = tuple(ladder for ladder in variant.efforts if ladder.engine in engines)
-    return msgspec.structs.replace(variant, engines=engines, efforts=efforts)
+    return msgspec.structs.replace(variant, engines=engines, also=(), efforts=efforts)
+
+
+def _all(variant: Variant) -> tuple[str, ...]:
+    return (*variant.engines, *variant.also)
 
 
 def _charts(charts: tuple[Chart, ...], names: set[str]) -> tuple[Chart, ...]:

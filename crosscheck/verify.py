@@ -131,7 +131,7 @@ def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Resu
     """The engine's result on the variant, run here and now."""
     run = msgspec.structs.replace(
         case.run,
-        variants=(msgspec.structs.replace(variant, engines=(engine,), refined=None),),
+        variants=(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None),),
         comparisons=(),
         controls=(),
         conservations=(),

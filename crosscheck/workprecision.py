@@ -1,8 +1,9 @@
 """Speed against accuracy: the error of every engine, variant and effort in one observable, against wall time.
 
-One chart has one reference for all: the most certain result of its reference variant. The error of a run is its largest
-distance from the reference over the run, relative to the reference's range. The reference cannot judge errors below its
-own uncertainty; its own finest run is shown at that uncertainty. Runs that failed have no error and are kept as such.
+One chart has one reference for all: the most certain result of its reference variant, of an engine that represents the
+scene exactly if there is one. The error of a run is its largest distance from the reference over the run, relative to
+the reference's range. The reference cannot judge errors below its own uncertainty; its own finest run is shown at that
+uncertainty. Runs that failed have no error and are kept as such.
 """
 
 from __future__ import annotations
@@ -71,13 +72,17 @@ def work_precision(case: CaseResults, chart: Chart) -> WorkPrecision | None:
 
 
 def _reference(case: CaseResults, chart: Chart) -> Result | None:
-    """The finished result of the reference variant with the smallest U in the observable."""
+    """The finished result of the reference variant with the smallest U in the observable, exact engines first."""
     found = [
         result
         for (variant, _, role), result in case.results.items()
         if role == "main" and variant == chart.reference and chart.observable in result.channels
     ]
-    return min(found, key=lambda result: result.uncertainty(chart.observable).value, default=None)
+
+    def doubt(result: Result) -> tuple[bool, float]:
+        return bool(result.finest.support), result.uncertainty(chart.observable).value
+
+    return min(found, key=doubt, default=None)
 
 
 def _point(run: RunRecord, observable: str, reference: Result, scale: float, doubt: float) -> Point:

@@ -10,7 +10,7 @@ from crosscheck.engines.contract import Engine
 
 GROUP = "crosscheck.engines"
 
-_BUILT_IN = {
+BUILT_IN = {
     "native": "crosscheck.engines.native:NativeEngine",
     "pinocchio": "crosscheck.engines.pinocchio:PinocchioEngine",
     "mujoco": "crosscheck.engines.mujoco:MujocoEngine",
@@ -24,9 +24,9 @@ def engines() -> dict[str, Engine]:
 
     An engine without its library raises `EngineMissing` from `version`. A plug-in may not take a built-in name.
     """
-    found = {name: _load(path)() for name, path in _BUILT_IN.items()}
+    found = {name: _load(path)() for name, path in BUILT_IN.items()}
     for point in entry_points(group=GROUP):
-        if point.name in _BUILT_IN:
+        if point.name in BUILT_IN:
             continue
         engine = point.load()()
         if not isinstance(engine, Engine):

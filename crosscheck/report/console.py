@@ -74,7 +74,7 @@ def cases_table(cases: Iterable[Case]) -> Table:
     """The case library."""
     table = Table("case", "title", "tags", "variants", "engines", header_style="bold")
     for case in cases:
-        engines = dict.fromkeys(engine for variant in case.run.variants for engine in variant.engines)
+        engines = dict.fromkeys(name for each in case.run.variants for name in (*each.engines, *each.also))
         variants = ", ".join(variant.name for variant in case.run.variants)
         table.add_row(case.name, case.run.title, ", ".join(case.run.tags), variants, ", ".join(engines))
     return table

@@ -10,10 +10,9 @@ import msgspec
 import pytest
 
 from crosscheck import case as case_module
-from crosscheck.case import CaseError, RunFile, check_run_file
-from crosscheck.engines.registry import engines
+from crosscheck.case import CaseError, Comparison, RunFile, Side, check_run_file
 from crosscheck.library import load_case, resolve
-from crosscheck.selection import SHIPPED, select
+from crosscheck.selection import select
 from tests.crosscheck.sessions import CASE, copy_case
 
 EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
@@ -40,6 +39,7 @@ def test_the_documented_example_is_valid() -> None:
         ("segments = 16", "", r"\$.variant\[2\].segments"),
         ('transform = "segments"', "", r"\$.variant\[2\].segments"),
         ('engines = ["native"]', "engines = []", "name at least one engine"),
+        ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also: native is among the engines already"),
         ('name = "full"', 'name = "rigid"', "two variants have the same name"),
         ('reference = "rigid"', 'reference = "stiff"', 'no variant "stiff"'),
         ("duration_s = 10.0", "duration_s = 0.0", "needs a duration"),
@@ -124,7 +124,21 @@ def test_charts_follow_their_variants() -> None:
     assert [chart.variants for chart in run.charts] == [("rigid",)]
 
 
-def test_the_shipped_engines_are_those_of_the_registry() -> None:
-    """A case that leaves a shipped engine out does so on purpose: the list must not fall behind."""
-    from_us = {name for name, engine in engines().items() if type(engine).__module__.startswith("crosscheck.")}
-    assert from_us == SHIPPED
+def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
+    """Not as the first of all pairs, but where asked for, charted, and where a comparison names it."""
+    variants = tuple(
+        msgspec.structs.replace(v, engines=("native", "mujoco"), also=("exudyn",)) if v.name == "rigid" else v
+        for v in example().variants
+    )
+    named = Comparison(
+        name="named", goals={"energy": 1e-9},
+        a=Side(variant="rigid", engine="native"), b=Side(variant="rigid", engine="exudyn"),
+    )  # fmt: skip
+    run = msgspec.structs.replace(example(), variants=variants, comparisons=example().comparisons[:1], controls=())
+    chosen = select(run, ())
+    assert pairs(chosen) == {("native", "mujoco")}
+    assert chosen.variant("rigid").engines == ("native", "mujoco", "exudyn")
+    assert chosen.variant("rigid").also == ()
+    run = msgspec.structs.replace(run, comparisons=(*run.comparisons, named))
+    check_run_file(run)
+    assert pairs(select(run, ())) == {("native", "mujoco"), ("native", "exudyn")}

@@ -5,9 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from crosscheck.library import load_case
-from crosscheck.records import read
+from crosscheck.records import Record, RunRecord, read
 from crosscheck.results import collect
 from crosscheck.sweep import sweep
 from crosscheck.workprecision import WorkPrecision, work_precision
@@ -26,11 +27,20 @@ reference = "rigid"
 
 
 @pytest.fixture(scope="module")
-def chart(tmp_path_factory: pytest.TempPathFactory) -> WorkPrecision:
+def records(tmp_path_factory: pytest.TempPathFactory) -> list[Record]:
     folder: Path = tmp_path_factory.mktemp("chart")
     case = load_case(copy_case(folder, RUN_FILE))
     sweep([case], (), folder / "records.jsonl", workers=2, provider=PROVIDER)
-    (results,) = collect(read(folder / "records.jsonl")).cases
+    return read(folder / "records.jsonl")
+
+
+@pytest.fixture(scope="module")
+def chart(records: list[Record]) -> WorkPrecision:
+    return drawn(records)
+
+
+def drawn(records: list[Record]) -> WorkPrecision:
+    (results,) = collect(records).cases
     found = work_precision(results, results.case.run.charts[0])
     assert found is not None
     return found
@@ -50,6 +60,17 @@ def test_errors_fall_with_effort_down_to_the_reference(chart: WorkPrecision) -> 
 
 def test_a_biased_engine_has_a_floor(chart: WorkPrecision) -> None:
     assert min(errors(chart, "biased")) > 1e-4
+
+
+def test_an_approximation_is_no_reference_however_certain_it_is(records: list[Record], chart: WorkPrecision) -> None:
+    certain = chart.reference.partition(" on ")[0]
+
+    def approximate(record: Record) -> Record:
+        if isinstance(record, RunRecord) and record.engine == certain:
+            return replace(record, support="to first order only")
+        return record
+
+    assert not drawn([approximate(record) for record in records]).reference.startswith(certain)
 
 
 def test_failed_runs_are_kept_without_an_error(chart: WorkPrecision) -> None:

@@ -1,6 +1,8 @@
 // Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
 "use strict";
-const COLOURS = { native: "#1b62a5", pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00", "exudyn-beam": "#7a4fb5" };
+const COLOURS = { native: "#1b62a5", "native-frisch": "#4aa8e0", "native-frisch-as-printed": "#6b7785",
+  pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00", "exudyn-beam": "#7a4fb5" };
+const SHIPPED = Object.keys(COLOURS).length;
 const SPARE = ["#0f8b8d", "#a44a3f", "#5b6675", "#b5179e", "#3f6212"];
 const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
 const DASHES = ["solid", "dash", "dot"];
@@ -8,7 +10,7 @@ const PAIRS = ["#44546a", "#c2410c", "#6d28d9", "#0e7490", "#9d174d", "#4d7c0f",
 const CONFIG = { displayModeBar: false, responsive: true };
 
 function colour(name) {
-  if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - 5 + SPARE.length) % SPARE.length];
+  if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - SHIPPED) % SPARE.length];
   return COLOURS[name];
 }
 
@@ -115,14 +117,14 @@ function drawWork(node, work) {
     line: { color: "#c3cad3", width: 7, shape: "hv" }, hoverinfo: "skip" });
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
-    xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)" }, exponentformat: "power" },
+    xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)", standoff: 4 }, exponentformat: "power" },
     yaxis: { type: "log", title: { text: "error of " + work.observable + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
-      range: [low, Math.log10(margin) + 0.4] },
+      range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 12) },
     shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: "#eef1f4", line: { width: 0 }, layer: "below" }],
     annotations: [
       { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: "#5b6675" },
         text: "below the reference's own uncertainty (" + work.reference + ")" },
       { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: "#5b6675" }, text: "× at the top: failed runs" }],
-    legend: { orientation: "v", x: 1.01, y: 1, font: { size: 11 } },
+    legend: { orientation: "h", y: -0.14, yanchor: "top", font: { size: 11 } },
   }), CONFIG);
 }
