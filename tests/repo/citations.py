@@ -1,0 +1,93 @@
+"""Citations of numbered equations, read from the docstrings of functions and classes.
+
+A citation is a number or a range in parentheses: "(107)", "(98), (99)", "(129)-(134)". In a paper's own folders every
+one counts that does not stand behind the name of another paper; elsewhere those that stand behind its name, as in
+"Frisch (48)" and "Frisch's (47), (49)". A module's docstring is read for numbers that do not exist, but cites nothing:
+an equation belongs to the function that does it.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+_NUMBER = r"\(\d{1,3}\)"
+_ITEM = rf"{_NUMBER}(?:(?:\s*[-\u2013]\s*|\s+to\s+){_NUMBER})?"  # a number or a range
+_LIST = rf"{_ITEM}(?:(?:,?\s+and\s+|[,;]\s*){_ITEM})*"
+_FREE_ITEM = re.compile(rf"(?<![\w\])]){_ITEM}")  # not the argument of a function
+
+
+@dataclass(frozen=True)
+class Sources:
+    """How a paper is cited: bare numbers in `folders`, behind `names` elsewhere, behind `other_names` nowhere."""
+
+    folders: tuple[str, ...]
+    names: tuple[str, ...]
+    other_names: tuple[str, ...]
+
+
+@dataclass(frozen=True, order=True)
+class Place:
+    """A function or class: its file relative to the repository and its qualified name, empty for the module."""
+
+    path: str
+    name: str
+
+    @property
+    def is_test(self) -> bool:
+        """Whether pytest runs it: a function `test_*` in a file `test_*.py`."""
+        function = self.name.rpartition(".")[2]
+        return Path(self.path).name.startswith("test_") and function.startswith("test_")
+
+
+def numbers(text: str, sources: Sources, in_folder: bool) -> list[int]:
+    """Equation numbers that a docstring cites, ranges written out, in order and without repetition."""
+    if in_folder:
+        passages = [_behind(sources.other_names).sub("", text)]
+    else:
+        passages = [match[0] for match in _behind(sources.names).finditer(text)]
+    found: dict[int, None] = {}
+    for passage in passages:
+        for item in _FREE_ITEM.findall(passage):
+            ends = [int(number) for number in re.findall(r"\d+", item)]
+            found.update(dict.fromkeys(range(ends[0], ends[-1] + 1)))
+    return list(found)
+
+
+def _behind(names: tuple[str, ...]) -> re.Pattern[str]:
+    """A list of numbers behind one of the names."""
+    spelled = "|".join(re.escape(name).replace(r"\ ", r"\s+") for name in names)
+    return re.compile(rf"(?<!\w)(?:{spelled})(?:'s)?\s+{_LIST}")
+
+
+def docstrings(source: str) -> Iterator[tuple[str, str]]:
+    """Qualified name and docstring of a module (name ""), its classes and its functions, nested ones included."""
+
+    def visit(node: ast.AST, prefix: str) -> Iterator[tuple[str, str]]:
+        for child in ast.iter_child_nodes(node):
+            if isinstance(child, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+                name = f"{prefix}{child.name}"
+                yield name, ast.get_docstring(child) or ""
+                yield from visit(child, f"{name}.")
+            else:
+                yield from visit(child, prefix)
+
+    tree = ast.parse(source)
+    yield "", ast.get_docstring(tree) or ""
+    yield from visit(tree, "")
+
+
+def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[Place, list[int]]:
+    """What every function, class and module below root/packages cites; those that cite nothing are left out."""
+    cited: dict[Place, list[int]] = {}
+    for package in packages:
+        for path in sorted((root / package).rglob("*.py")):
+            relative = path.relative_to(root).as_posix()
+            in_folder = any(relative.startswith(f"{folder}/") for folder in sources.folders)
+            for name, text in docstrings(path.read_text(encoding="utf-8")):
+                if found := numbers(text, sources, in_folder):
+                    cited[Place(relative, name)] = found
+    return cited

@@ -1,0 +1,131 @@
+"""docs/equations.md is what the generator writes, complete and true; and the generator sees what it must see."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.repo.citations import Sources, docstrings, numbers
+from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, page, papers
+from tests.repo.project import ROOT
+
+SOURCES = Sources(
+    folders=("flexmb/frisch", "tests/flexmb/frisch"), names=("Frisch",), other_names=("Jain & Rodriguez", "Jain")
+)
+CODE, TEST = Path("flexmb/frisch/mass.py"), Path("tests/flexmb/frisch/test_mass.py")
+Write = Callable[[Path, str], None]
+
+
+@pytest.fixture(scope="module")
+def indices() -> list[Index]:
+    return [Index.of(paper) for paper in papers()]
+
+
+def test_the_page_is_what_the_generator_writes(indices: list[Index]) -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(indices), "run `python -m tests.repo.equations`"
+
+
+def test_every_equation_has_code_and_test_or_a_reason(indices: list[Index]) -> None:
+    assert indices
+    faults = [fault for index in indices for fault in index.faults()]
+    assert not faults, "\n".join(faults)
+
+
+def test_errata_name_tests_and_equations_that_exist(indices: list[Index]) -> None:
+    """`path.py::test_name` on a page of errata is a test; a link to an equation is one of the table."""
+    for index in indices:
+        text = (ROOT / "docs" / index.paper.errata).read_text(encoding="utf-8")
+        for path, name in re.findall(r"`([\w/]+\.py)::(\w+)`", text):
+            assert name in dict(docstrings((ROOT / path).read_text(encoding="utf-8"))), f"{path} has no {name}"
+        linked = {int(number) for number in re.findall(r"equations\.md#eq-(\d+)", text)}
+        assert linked <= {equation.number for equation in index.paper.equations}
+
+
+@pytest.mark.parametrize(
+    ("text", "in_folder", "elsewhere"),
+    [
+        ("G of (98)", [98], []),
+        ("Rows (129)-(131), (136).", [129, 130, 131, 136], []),
+        ("from (43) to\n(45)", [43, 44, 45], []),
+        ("The print's Frisch (48) and (50)-(52); see (70)", [48, 50, 51, 52, 70], [48, 50, 51, 52]),
+        ("Frisch's (12), beside (13) of another", [12, 13], [12]),
+        ("Jain &\nRodriguez (44), (45), but Frisch (107)", [107], [107]),
+        ("shapes (3,), (n, 3), f(4), theta(5)(6), NASA (1975)", [], []),
+        ("Frischs (7), frisch (8)", [7, 8], []),
+    ],
+)
+def test_numbers(text: str, in_folder: list[int], elsewhere: list[int]) -> None:
+    assert numbers(text, SOURCES, in_folder=True) == in_folder
+    assert numbers(text, SOURCES, in_folder=False) == elsewhere
+
+
+def test_docstrings_of_methods_and_nested_functions() -> None:
+    source = '"""M"""\nclass A:\n  """A"""\n  def f(self):\n    """F"""\n    if 1:\n      def g():\n        """G"""\n'
+    assert dict(docstrings(source)) == {"": "M", "A": "A", "A.f": "F", "A.f.g": "G"}
+
+
+def test_anchor() -> None:
+    assert anchor("(52), (12): E_n of `points` that turn") == "52-12-e_n-of-points-that-turn"
+
+
+@pytest.fixture()
+def write(tmp_path: Path) -> Write:
+    """Write a file below a small repository in which (1) is implemented and held, and (2) needs no function."""
+
+    def put(path: Path, text: str) -> None:
+        (tmp_path / path).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / path).write_text(text, encoding="utf-8")
+
+    put(CODE, 'def mass():\n    """Total mass (1)."""\n')
+    put(TEST, 'def test_mass():\n    """(1) of a sum."""\n')
+    put(Path("docs/errata.md"), "# Errata\n\n## (2): a sign\n")
+    return put
+
+
+def _paper(none: str = "notation") -> Paper:
+    equations = (Equation(1, "Bodies", "mass", ""), Equation(2, "Bodies", "name", none))
+    return Paper("P", "A. Paper", SOURCES, "errata.md", 2, equations)
+
+
+def test_faultless(tmp_path: Path, write: Write) -> None:
+    index = Index.of(_paper(), tmp_path)
+    assert index.faults() == []
+    text = page([index], tmp_path)
+    assert "[`frisch.mass.mass`](../flexmb/frisch/mass.py) | [`test_mass`](../tests/flexmb/frisch/test_mass.py)" in text
+    assert "[erratum](errata.md#2-a-sign)" in text and "none needed: notation" in text
+
+
+@pytest.mark.parametrize(
+    ("path", "text", "fault"),
+    [
+        (CODE, 'def mass():\n    """(1), (3)"""\n', "cites (3), which does not exist"),
+        (CODE, 'def mass():\n    """(0), (1)"""\n', "cites (0), which does not exist"),
+        (CODE, '"""Module: (1)-(7)."""\ndef mass():\n    """(1)"""\n', "cites (7), which does not exist"),
+        (Path("flexmb/jain/a.py"), 'def f():\n    """As in Frisch (4)."""\n', "cites (4), which does not exist"),
+        (CODE, 'def mass():\n    """(1), (2)"""\n', "(2) is cited by flexmb/frisch/mass.py mass: take the reason out"),
+        (CODE, '"""(1)"""\ndef mass():\n    pass\n', "(1) mass: no function cites it"),
+        (CODE, "# (1)\ndef mass():\n    pass\n", "(1) mass: no function cites it"),
+        (TEST, 'def reference():\n    """(1)"""\n', "(1) is cited by flexmb/frisch/mass.py mass, but by no test"),
+        (TEST, '"""(1)"""\ndef test_mass():\n    pass\n', "(1) is cited by flexmb/frisch/mass.py mass, but by no test"),
+    ],
+)
+def test_a_fault_is_seen(tmp_path: Path, write: Write, path: Path, text: str, fault: str) -> None:
+    write(path, text)
+    assert any(fault in found for found in Index.of(_paper(), tmp_path).faults())
+
+
+def test_faults_of_the_data_file(tmp_path: Path, write: Write) -> None:
+    assert any("no reason is given" in fault for fault in Index.of(_paper(none=""), tmp_path).faults())
+    assert any("its reason names (9)" in fault for fault in Index.of(_paper(none="see (9)"), tmp_path).faults())
+    paper = _paper()
+    short = Paper(paper.title, paper.reference, paper.sources, paper.errata, paper.last, paper.equations[:1])
+    assert any("does not list (1) to (2)" in fault for fault in Index.of(short, tmp_path).faults())
+
+
+def test_a_changed_citation_changes_the_page(tmp_path: Path, write: Write) -> None:
+    before = page([Index.of(_paper(), tmp_path)], tmp_path)
+    write(Path("crosscheck/frisch.py"), 'def engine():\n    """Frisch (1) again."""\n')
+    assert page([Index.of(_paper(), tmp_path)], tmp_path) != before
