@@ -1,26 +1,28 @@
 """Mode-dependent parameters of one flexible body, (48)-(72): every sum over its elements, done once.
 
-An element is a mass centre: point i of the model carries its mass at x_i = position + com_offset, moved by
-phiT_n = translation - com_offset x ... (`_elements`), turned by phiR_n = rotation. All vectors are in body axes; the
-origin is the hinge point lambda-1, from which alpha leads to the undeformed mass centre. a_n are modal coordinates.
+Body axes; the body origin is the hinge point lambda-1; a_n are modal coordinates (`eta` elsewhere).
 
-As printed, the parameters are exactly (48)-(72). As corrected, they give the mass matrix and the bias of the exact
-kinetic energy of the elements (which turn by exp(theta~), with their inertia) to first order in a_n and its rate:
+As printed, the parameters are exactly (48)-(72). As corrected, they give mass matrix and bias of the exact kinetic
+energy of the elements to first order in a_n and its rate. The two differ only where elements turn:
 
-    E_n    holds the turning of the elements' inertia, which (12) takes for second order and (52) leaves out;
-    K_mn   is the antisymmetric part of dC_n/da_m, of which (72) has another rotary part;
-    F_mn   is half the second derivative of the inertia about the hinge point, of which (70) has the particles' part;
-    A1, Q1, M1_slope   are what (64) and (96) drop: the slopes of A_n, Q_n and of the modal mass.
+    E_n    is H_n + H_n', for the inertia of elements turns at first order: (12) takes it for second, (52) leaves it out
+    K_mn   has the rotary part 1/2 (tr(Phi_i) 1 - 2 Phi_i)(phiR_m x phiR_n), not that of (72), which produces power
+    F_mn   is half the second derivative of the inertia about the hinge point, (70) that of the masses alone
+    A1, Q1, M1_slope   are the slopes of A_n, Q_n and of the modal mass; (64) and (96) drop them
+
+except for the slopes Q1, which masses have as well, and for F_mn, of which only the symmetric part acts: corrected, it
+is symmetric.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.modal.cross import cross_matrix
+from flexmb.frisch.elements import Elements, Particles, elements, mass_centre, particles, rotary, slopes, turning
+from flexmb.frisch.normalisation import check_boundary
 from flexmb.modal.model import FlexibleModel
 
 Array = NDArray[np.float64]
@@ -77,124 +79,65 @@ class ModeParameters:
         return self.A.shape[0]
 
 
-@dataclass(frozen=True)
-class _Elements:
-    """The elements of a body: mass (p,), mass centre x (p,3), its offset c (p,3) from the turning point, inertia
-    (p,3,3) about it, and modes phiT, phiR (p,n,3) of mass centre and rotation."""
+def mode_parameters(model: FlexibleModel, *, as_printed: bool = False, name: str = "flexible body") -> ModeParameters:
+    """Parameters of one flexible body, corrected or exactly as printed, (48)-(72).
 
-    mass: Array
-    x: Array
-    c: Array
-    inertia: Array
-    phiT: Array
-    phiR: Array
-
-
-def mode_parameters(model: FlexibleModel, *, as_printed: bool = False) -> ModeParameters:
-    """Parameters of one flexible body, corrected or exactly as printed; any assumed modes, normalised or not."""
-    elements = _elements(model)
-    return _printed(elements, model) if as_printed else _corrected(elements, model)
-
-
-def _elements(model: FlexibleModel) -> _Elements:
-    """Mass centres as elements: x = position + c, phiT = translation + rotation x c, phiR = rotation."""
-    phi, psi = np.swapaxes(model.translation, 1, 2), np.swapaxes(model.rotation, 1, 2)
-    c = model.com_offset
-    return _Elements(model.mass, model.position + c, c, model.inertia, phi + np.cross(psi, c[:, None]), psi)
+    Modes may be any assumed modes: with modes that (41) does not normalise, M1 is full, and the printed parameters are
+    the paper's in other coordinates. The corrected ones hold for free-free modes too. Raises ValueError, which calls
+    the body `name`, for printed parameters of modes that are not clamped at the body origin as the paper demands.
+    """
+    if as_printed:
+        if not model.clamped:
+            raise ValueError(
+                f"{name}: its modes are free-free, but the paper's are clamped at the hinge point; give modes with the "
+                'boundary "clamped-free", or use the corrected equations, which hold for both'
+            )
+        check_boundary(model, name)
+    every = elements(model)
+    alpha = mass_centre(every)
+    masses = particles(every, alpha)
+    return assemble(alpha, masses, turning(every), model.stiffness, model.damping, as_printed=as_printed)
 
 
-def _printed(e: _Elements, model: FlexibleModel) -> ModeParameters:
-    """(48)-(72) to the letter."""
-    mass = float(e.mass.sum())  # (7)
-    alpha = e.mass @ e.x / mass  # (8)
-    rho = e.x - alpha
-    Phi = e.inertia.sum(axis=0) + _inertia(np.einsum("p,pa,pb->ab", e.mass, rho, rho))  # (15), (17)
-    A = np.einsum("p,pna->na", e.mass, e.phiT) / mass  # (48)
-    D = _inertia(np.einsum("p,pa,pnb->nab", e.mass, rho, e.phiT))  # (50), (51)
-    B = np.einsum("p,pna->na", e.mass, np.cross(e.x[:, None], e.phiT)) / mass  # (54)
-    C = np.einsum("pab,pnb->na", e.inertia, e.phiR)  # (55)
-    J = np.einsum("pnab,pbc->nac", cross_matrix(e.phiR), e.inertia)  # (67)
-    F = _inertia(np.einsum("p,pma,pnb->mnab", e.mass, e.phiT, e.phiT, optimize=True))  # (70)
-    turned = np.einsum("pab,pnb->pna", e.inertia, e.phiR)
-    K = _cross_sum(e.mass[:, None, None] * e.phiT, e.phiT) + 0.5 * _cross_sum(turned, e.phiR)  # (72)
-    M1 = np.einsum("p,pma,pna->mn", e.mass, e.phiT, e.phiT, optimize=True)  # (41)
-    M1 += np.einsum("pma,pna->mn", turned, e.phiR, optimize=True)
+def assemble(
+    alpha: Array, masses: Particles, turned: Elements, stiffness: Array, damping: Array, *, as_printed: bool
+) -> ModeParameters:
+    """Parameters out of the sums over all masses, about their mass centre alpha, and the elements that turn."""
+    m, D = masses.mass, masses.D
+    A = masses.mA / m  # (48)
+    own = rotary(turned)
+    H = D + own.J  # (68)
+    M1 = masses.M1 + own.M1
     n = len(A)
+    if as_printed:
+        E, F, K = D + np.swapaxes(D, 1, 2), masses.F, masses.K + own.K  # (52), (70), (72)
+        A1, Q1, M1_slope = np.zeros((n, n, 3)), np.zeros((n, n, 3)), np.zeros((n, n, n))
+    else:
+        slope = slopes(turned, alpha)
+        E = H + np.swapaxes(H, 1, 2)
+        F = 0.5 * (masses.F + np.swapaxes(masses.F, 2, 3)) + slope.F
+        K = masses.K + slope.K
+        A1 = slope.mA1 / m
+        Q1 = masses.K - m * np.cross(A[:, None], A[None]) + slope.Q1
+        M1_slope = slope.M1
     return ModeParameters(
-        mass=mass,
+        mass=m,
         alpha=alpha,
-        Phi=Phi,
+        Phi=masses.Phi + own.Phi,  # (15), (17)
         A=A,
-        B=B,
-        C=C,
-        Q=C + mass * (B - np.cross(alpha, A)),  # (56)
+        B=masses.mQ / m + np.cross(alpha, A),  # (54)
+        C=own.C,
+        Q=own.C + masses.mQ,  # (56)
         D=D,
-        E=D + np.swapaxes(D, 1, 2),  # (52)
-        H=D + J,  # (68)
-        J=J,
+        E=E,
+        H=H,
+        J=own.J,
         F=F,
         K=K,
         M1=0.5 * (M1 + M1.T),
-        A1=np.zeros((n, n, 3)),
-        Q1=np.zeros((n, n, 3)),
-        M1_slope=np.zeros((n, n, n)),
-        stiffness=model.stiffness,
-        damping=model.damping,
+        A1=A1,
+        Q1=Q1,
+        M1_slope=M1_slope,
+        stiffness=stiffness,
+        damping=damping,
     )
-
-
-def _corrected(e: _Elements, model: FlexibleModel) -> ModeParameters:
-    """(48)-(72) with what the exact kinetic energy has besides, to first order in the coordinates and their rates."""
-    print_ = _printed(e, model)
-    rho = e.x - print_.alpha
-    bend = _curvature(e)
-    turn = np.cross(e.phiR[:, :, None], e.phiR[:, None])  # phiR_m x phiR_n
-    turned = np.einsum("pab,pnb->pna", e.inertia, e.phiR)
-    inertia_turn = np.einsum("pab,pmnb->pmna", e.inertia, turn, optimize=True)
-    trace = np.trace(e.inertia, axis1=1, axis2=2)
-
-    # Inertia tensors turn with their element: [phiR~, Phi_i] at first order, instead of (12).
-    E = print_.H + np.swapaxes(print_.H, 1, 2)
-    A1 = np.einsum("p,pmna->mna", e.mass, bend) / print_.mass
-    particles = _cross_sum(e.mass[:, None, None] * e.phiT, e.phiT)
-    K = particles + 0.5 * (np.einsum("p,pmna->mna", trace, turn) - 2.0 * inertia_turn.sum(axis=0))
-    Q1 = particles - print_.mass * np.cross(print_.A[:, None], print_.A[None])
-    Q1 += np.einsum("p,pmna->mna", e.mass, np.cross(rho[:, None, None], bend))
-    Q1 += _cross_sum(e.phiR, turned) - 0.5 * inertia_turn.sum(axis=0)
-    half = np.einsum("p,pkma,pna->kmn", e.mass, bend, e.phiT, optimize=True)
-    half -= 0.5 * np.einsum("pkma,pna->kmn", turn, turned, optimize=True)
-    return replace(
-        print_, E=E, F=_curved_inertia(e, bend), K=K, A1=A1, Q1=Q1, M1_slope=half + np.swapaxes(half, 1, 2)
-    )
-
-
-def _curvature(e: _Elements) -> Array:
-    """Second derivatives (p,n,n,3) of the mass centres exp(theta~) c: (phiR_m x (phiR_n x c) + the same n, m) / 2."""
-    arm = np.cross(e.phiR, e.c[:, None])
-    nested = np.cross(e.phiR[:, :, None], arm[:, None])
-    return 0.5 * (nested + np.swapaxes(nested, 1, 2))
-
-
-def _curved_inertia(e: _Elements, bend: Array) -> Array:
-    """F[m,n] (n,n,3,3): half the second derivatives of sum m (x.x 1 - x x') + R Phi_i R' about the hinge point."""
-    moment = np.einsum("p,pma,pnb->mnab", e.mass, e.phiT, e.phiT, optimize=True)
-    moment += np.einsum("p,pa,pmnb->mnab", e.mass, e.x, bend, optimize=True)
-    moment = 0.5 * (moment + np.swapaxes(moment, 2, 3))
-    P = cross_matrix(e.phiR)
-    PJ = np.einsum("pnab,pbc->pnac", P, e.inertia)
-    # exp(theta~) J exp(-theta~) at second order: (theta~ theta~ J + J theta~ theta~) / 2 - theta~ J theta~
-    outer = np.einsum("pmab,pnbc->mnac", P, PJ, optimize=True)
-    inner = np.einsum("pmab,pnbc->mnac", PJ, P, optimize=True)
-    squared = 0.5 * (outer + np.swapaxes(outer, 2, 3)) - inner
-    return _inertia(moment) + 0.5 * (squared + np.swapaxes(squared, 0, 1))
-
-
-def _inertia(moment: Array) -> Array:
-    """tr(S) 1 - S of second moments (..., 3, 3)."""
-    return np.trace(moment, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - moment
-
-
-def _cross_sum(a: Array, b: Array) -> Array:
-    """sum_p a_m x b_n (m,n,3) of vectors (p,m,3) and (p,n,3)."""
-    moment = np.einsum("pma,pnb->mnab", a, b, optimize=True)
-    return np.stack([moment[..., i, j] - moment[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
