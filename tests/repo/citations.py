@@ -1,16 +1,17 @@
-"""Citations of numbered equations, read from the docstrings of functions and classes.
+"""Citations of numbered equations, read from the docstrings and comments of functions and classes.
 
 A citation is a number or a range in parentheses: "(107)", "(98), (99)", "(129)-(134)". In a paper's own folders every
 one counts that does not stand behind the name of another paper; elsewhere those that stand behind its name, as in
-"Frisch (48)" and "Frisch's (47), (49)". A module's docstring is read for numbers that do not exist, but cites nothing:
-an equation belongs to the function that does it.
+"Frisch (48)" and "Frisch's (47), (49)". What stands in a module, outside its functions and classes, is read for numbers
+that do not exist, but cites nothing: an equation belongs to the function that does it.
 """
 
 from __future__ import annotations
 
 import ast
+import io
 import re
-from collections.abc import Iterator
+import tokenize
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -43,18 +44,19 @@ class Place:
         return Path(self.path).name.startswith("test_") and function.startswith("test_")
 
 
-def numbers(text: str, sources: Sources, in_folder: bool) -> list[int]:
-    """Equation numbers that a docstring cites, ranges written out, in order and without repetition."""
+def numbers(text: str, sources: Sources, in_folder: bool) -> dict[int, bool]:
+    """Equation numbers that a text cites, and whether each is named by itself, not only in a range."""
     if in_folder:
         passages = [_behind(sources.other_names).sub("", text)]
     else:
         passages = [match[0] for match in _behind(sources.names).finditer(text)]
-    found: dict[int, None] = {}
+    found: dict[int, bool] = {}
     for passage in passages:
         for item in _FREE_ITEM.findall(passage):
             ends = [int(number) for number in re.findall(r"\d+", item)]
-            found.update(dict.fromkeys(range(ends[0], ends[-1] + 1)))
-    return list(found)
+            for n in range(ends[0], ends[-1] + 1):
+                found[n] = len(ends) == 1 or found.get(n, False)
+    return found
 
 
 def _behind(names: tuple[str, ...]) -> re.Pattern[str]:
@@ -63,31 +65,37 @@ def _behind(names: tuple[str, ...]) -> re.Pattern[str]:
     return re.compile(rf"(?<!\w)(?:{spelled})(?:'s)?\s+{_LIST}")
 
 
-def docstrings(source: str) -> Iterator[tuple[str, str]]:
-    """Qualified name and docstring of a module (name ""), its classes and its functions, nested ones included."""
+def texts(source: str) -> dict[str, str]:
+    """Docstring and comments of a module (name ""), its classes and its functions, by qualified name."""
+    found: dict[str, list[str]] = {}
+    owner: dict[int, str] = {}  # of each line: the innermost function or class
 
-    def visit(node: ast.AST, prefix: str) -> Iterator[tuple[str, str]]:
+    def visit(node: ast.AST, prefix: str) -> None:
         for child in ast.iter_child_nodes(node):
+            inner = prefix
             if isinstance(child, ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
-                name = f"{prefix}{child.name}"
-                yield name, ast.get_docstring(child) or ""
-                yield from visit(child, f"{name}.")
-            else:
-                yield from visit(child, prefix)
+                inner = f"{prefix}.{child.name}" if prefix else child.name
+                found[inner] = [ast.get_docstring(child) or ""]
+                owner.update(dict.fromkeys(range(child.lineno, (child.end_lineno or child.lineno) + 1), inner))
+            visit(child, inner)
 
     tree = ast.parse(source)
-    yield "", ast.get_docstring(tree) or ""
-    yield from visit(tree, "")
+    found[""] = [ast.get_docstring(tree) or ""]
+    visit(tree, "")
+    for token in tokenize.generate_tokens(io.StringIO(source).readline):
+        if token.type == tokenize.COMMENT:
+            found[owner.get(token.start[0], "")].append(token.string.lstrip("# "))
+    return {name: "\n".join(parts) for name, parts in found.items()}
 
 
-def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[Place, list[int]]:
+def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[Place, dict[int, bool]]:
     """What every function, class and module below root/packages cites; those that cite nothing are left out."""
-    cited: dict[Place, list[int]] = {}
+    cited: dict[Place, dict[int, bool]] = {}
     for package in packages:
         for path in sorted((root / package).rglob("*.py")):
             relative = path.relative_to(root).as_posix()
             in_folder = any(relative.startswith(f"{folder}/") for folder in sources.folders)
-            for name, text in docstrings(path.read_text(encoding="utf-8")):
+            for name, text in texts(path.read_text(encoding="utf-8")).items():
                 if found := numbers(text, sources, in_folder):
                     cited[Place(relative, name)] = found
     return cited

@@ -1,7 +1,7 @@
 """docs/equations.md: which function implements every numbered equation of a paper, and which test holds it.
 
 Every docs/equations/<paper>.toml lists the equations of a paper; who implements and who holds them is read from
-docstrings (citations.py). Write the page with
+docstrings and comments (citations.py). Write the page with
 
     python -m tests.repo.equations
 """
@@ -24,8 +24,8 @@ INTRODUCTION = """# Equations
 
 Every numbered equation of the paper, the functions that implement or use it and the tests that hold it, or why none is
 needed. This page is generated: `python -m tests.repo.equations` reads `docs/equations/*.toml` and the equation numbers
-that the docstrings of functions, classes and tests cite. What the print gets wrong is in [errata](errata.md), symbols
-and frames are in [notation](notation.md).
+that docstrings and comments of functions, classes and tests cite. What the print gets wrong is in [errata](errata.md),
+symbols and frames are in [notation](notation.md).
 """
 TABLE_HEAD = "| | states | implemented or used in | held by |\n|---|---|---|---|\n"
 
@@ -75,12 +75,14 @@ class Index:
 
     @classmethod
     def of(cls, paper: Paper, root: Path = ROOT) -> Index:
-        """Citations of the paper in the code and the tests below root."""
+        """Citations of the paper in the code and the tests below root; a range passes over what needs no function."""
         cited = citations(root, paper.sources, CODE + TESTS)
-        known = {equation.number for equation in paper.equations}
+        known = {equation.number: equation for equation in paper.equations}
         index = cls(paper, {}, {}, [(place, n) for place, found in cited.items() for n in found if n not in known])
         for place, found in sorted(cited.items()):
-            for n in found:
+            for n, alone in found.items():
+                if n in known and known[n].none and not alone:
+                    continue
                 if place.is_test:
                     index.tests.setdefault(n, []).append(place)
                 elif place.name and place.path.startswith(tuple(f"{package}/" for package in CODE)):

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.repo.citations import Sources, docstrings, numbers
+from tests.repo.citations import Sources, numbers, texts
 from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, page, papers
 from tests.repo.project import ROOT
 
@@ -39,7 +39,7 @@ def test_errata_name_tests_and_equations_that_exist(indices: list[Index]) -> Non
     for index in indices:
         text = (ROOT / "docs" / index.paper.errata).read_text(encoding="utf-8")
         for path, name in re.findall(r"`([\w/]+\.py)::(\w+)`", text):
-            assert name in dict(docstrings((ROOT / path).read_text(encoding="utf-8"))), f"{path} has no {name}"
+            assert name in texts((ROOT / path).read_text(encoding="utf-8")), f"{path} has no {name}"
         linked = {int(number) for number in re.findall(r"equations\.md#eq-(\d+)", text)}
         assert linked <= {equation.number for equation in index.paper.equations}
 
@@ -58,13 +58,33 @@ def test_errata_name_tests_and_equations_that_exist(indices: list[Index]) -> Non
     ],
 )
 def test_numbers(text: str, in_folder: list[int], elsewhere: list[int]) -> None:
-    assert numbers(text, SOURCES, in_folder=True) == in_folder
-    assert numbers(text, SOURCES, in_folder=False) == elsewhere
+    assert list(numbers(text, SOURCES, in_folder=True)) == in_folder
+    assert list(numbers(text, SOURCES, in_folder=False)) == elsewhere
 
 
-def test_docstrings_of_methods_and_nested_functions() -> None:
-    source = '"""M"""\nclass A:\n  """A"""\n  def f(self):\n    """F"""\n    if 1:\n      def g():\n        """G"""\n'
-    assert dict(docstrings(source)) == {"": "M", "A": "A", "A.f": "F", "A.f.g": "G"}
+def test_numbers_named_by_themselves() -> None:
+    assert numbers("(1)-(3), (2); (4), (4) to (5)", SOURCES, in_folder=True) == {
+        1: False, 2: True, 3: False, 4: True, 5: False,
+    }  # fmt: skip
+
+
+SOURCE = '''"""M"""
+# m
+class A:
+    """A"""
+    x = 1  # a
+    def f(self):
+        """F"""
+        if 1:
+            def g():
+                """G"""
+                "#" # g
+        return 1  # f
+'''
+
+
+def test_texts_of_methods_and_nested_functions() -> None:
+    assert texts(SOURCE) == {"": "M\nm", "A": "A\na", "A.f": "F\nf", "A.f.g": "G\ng"}
 
 
 def test_anchor() -> None:
@@ -108,6 +128,7 @@ def test_faultless(tmp_path: Path, write: Write) -> None:
         (CODE, 'def mass():\n    """(1), (2)"""\n', "(2) is cited by flexmb/frisch/mass.py mass: take the reason out"),
         (CODE, '"""(1)"""\ndef mass():\n    pass\n', "(1) mass: no function cites it"),
         (CODE, "# (1)\ndef mass():\n    pass\n", "(1) mass: no function cites it"),
+        (CODE, "def mass():\n    return 1  # (1), (5)\n", "cites (5), which does not exist"),
         (TEST, 'def reference():\n    """(1)"""\n', "(1) is cited by flexmb/frisch/mass.py mass, but by no test"),
         (TEST, '"""(1)"""\ndef test_mass():\n    pass\n', "(1) is cited by flexmb/frisch/mass.py mass, but by no test"),
     ],
@@ -115,6 +136,12 @@ def test_faultless(tmp_path: Path, write: Write) -> None:
 def test_a_fault_is_seen(tmp_path: Path, write: Write, path: Path, text: str, fault: str) -> None:
     write(path, text)
     assert any(fault in found for found in Index.of(_paper(), tmp_path).faults())
+
+
+def test_a_range_passes_over_what_needs_no_function(tmp_path: Path, write: Write) -> None:
+    write(CODE, 'def mass():\n    """(1)-(2)"""\n')
+    assert Index.of(_paper(), tmp_path).faults() == []
+    assert any("(2)" in fault for fault in Index.of(_paper(none=""), tmp_path).faults())
 
 
 def test_faults_of_the_data_file(tmp_path: Path, write: Write) -> None:
