@@ -1,0 +1,132 @@
+"""From links to the constants of Frisch's route: parameters of the bodies, places in the expanded equations."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import fields, replace
+
+import numpy as np
+
+from flexmb import arrays as a
+from flexmb.frisch import tables as t
+from flexmb.frisch.errata import Erratum
+from flexmb.frisch.parameters import ModeParameters, mode_parameters
+from flexmb.links import Link
+
+_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+_SWITCHES = (
+    Erratum.ONE_SIDED, Erratum.NO_LOADS_ON_MODES, Erratum.FIXED_SPIN_AXIS, Erratum.FIXED_SHAPES, Erratum.SECOND_ORDER,
+)  # fmt: skip
+
+
+def nested_constants(constants: a.Constants, chain: list[Link], errata: Set[Erratum]) -> t.NestedConstants:
+    """The scene's constants with the tables Frisch's equations need, keeping the print's `errata`.
+
+    ValueError where a body has modes that are not clamped at its origin and the print is to be followed.
+    """
+    parameters = [_parameters(link, errata) for link in chain]
+    element, mode, pair, slopes = _elements(parameters, constants.mode.shape[1])
+    column, rows, wheel_entry = _places(constants, element)
+    return t.NestedConstants(
+        **{field.name: getattr(constants, field.name) for field in fields(constants)},
+        element=element,
+        element_mode=mode,
+        element_pair=pair,
+        M1_slope=slopes,
+        wheel_entry=wheel_entry,
+        column=column,
+        entry_row=rows,
+        printed=np.array([erratum in errata for erratum in _SWITCHES], np.int64),
+    )
+
+
+def _parameters(link: Link, errata: Set[Erratum]) -> ModeParameters:
+    """(48)-(72) of one body; the tensors of its despun wheels are left to I_W (26), their masses are elements."""
+    model = link.model
+    first_wheel = len(model.mass) - link.wheels
+    inertia = np.where((np.arange(len(model.mass)) < first_wheel)[:, None, None], model.inertia, 0.0)
+    model = replace(model, inertia=inertia)
+    corrected = mode_parameters(model)
+    if not errata:
+        return corrected
+    if link.outboard.deforms:
+        raise ValueError(
+            f'body "{link.name}": its inboard hinge sits on a node that its modes move, but the print clamps every '
+            'body at its hinge point; use clamped modes, or algorithm "frisch"'
+        )
+    printed = mode_parameters(model, as_printed=True)
+    if Erratum.INERTIA_SLOPE in errata:
+        corrected = replace(corrected, E=printed.E)
+    if Erratum.ROTARY_CORIOLIS in errata:
+        corrected = replace(corrected, K=printed.K)
+    if Erratum.DROPPED_DEFORMATION in errata:
+        corrected = replace(corrected, F=printed.F, A1=printed.A1, Q1=printed.Q1, M1_slope=printed.M1_slope)
+    return corrected
+
+
+def _elements(parameters: list[ModeParameters], m: int) -> tuple[a.Record, a.Record, a.Record, a.Real]:
+    """Parameters as tables, m the largest number of modes."""
+    bodies = len(parameters)
+    element = np.zeros(bodies, t.ELEMENTS)
+    mode, pair = np.zeros((bodies, m), t.ELEMENT_MODE), np.zeros((bodies, m, m), t.ELEMENT_PAIR)
+    slopes: list[a.Real] = []
+    for k, p in enumerate(parameters):
+        n = p.mode_count
+        element["mass"][k], element["alpha"][k], element["Phi"][k] = p.mass, p.alpha, _six(p.Phi)
+        element["slope"][k] = -1
+        if np.any(p.M1_slope):
+            element["slope"][k] = len(slopes)
+            slopes.append(np.pad(p.M1_slope, [(0, m - n)] * 3))
+        mode["A"][k, :n], mode["Q"][k, :n] = p.A, p.Q
+        mode["E"][k, :n], mode["H"][k, :n] = _six(p.E), _six(p.H)
+        pair["M1"][k, :n, :n], pair["F"][k, :n, :n], pair["K"][k, :n, :n] = p.M1, _six(p.F), p.K
+        pair["A1"][k, :n, :n], pair["Q1"][k, :n, :n] = p.A1, p.Q1
+    return element, mode, pair, np.array(slopes).reshape(len(slopes), m, m, m)
+
+
+def _six(tensors: a.Real) -> a.Real:
+    """xx, yy, zz, xy, xz, yz of the symmetric parts, over the leading axes."""
+    return np.stack([0.5 * (tensors[..., i, j] + tensors[..., j, i]) for i, j in _SIX], axis=-1)
+
+
+def _places(c: a.Constants, element: a.Record) -> tuple[a.Record, a.Index, a.Record]:
+    """Columns of S and their expanded rows; completes `element`. Partitions that are null have no entries."""
+    bodies, wheels = len(c.body), len(c.wheel)
+    modes = int(np.sum(c.body["modes"]))
+    hinges = 3 * bodies + 3 * wheels + modes
+    element["mode_row"] = 3 * bodies + 3 * wheels + np.cumsum(c.body["modes"]) - c.body["modes"]
+    element["inboard_entry"] = element["outboard_entry"] = -1
+    wheel_entry = np.zeros(wheels, t.WHEEL_ENTRY)
+    own: dict[int, list[int]] = {}
+    modal: dict[int, list[int]] = {}
+    body_of = np.zeros(len(c.speed), np.int64)
+
+    def relative_rows(k: int) -> list[int]:
+        return [*range(3 * k, 3 * k + 3), *range(hinges + 3 * k, hinges + 3 * k + 3)]
+
+    for k in range(bodies):
+        body = c.body[k]
+        for j in range(body["u_index"], body["u_index"] + body["nv"]):
+            own[j], modal[j], body_of[j] = relative_rows(k), [], k
+        moved = relative_rows(k) if body["outboard_port"] >= 0 else []
+        element["outboard_entry"][k] = 1 if moved else -1
+        for child in range(k + 1, bodies):
+            if c.body["parent"][child] == k and c.body["inboard_port"][child] >= 0:
+                element["inboard_entry"][child] = 1 + len(moved)
+                moved = moved + relative_rows(child)
+        for i in range(body["wheel_start"], body["wheel_stop"]):
+            wheel_rows = [*range(3 * bodies + 3 * i, 3 * bodies + 3 * i + 3)]
+            own[int(c.wheel["u_index"][i])], modal[int(c.wheel["u_index"][i])] = wheel_rows, []
+            body_of[c.wheel["u_index"][i]] = k
+            turns = np.any(c.port_mode["rotation"][c.wheel["port"][i]])
+            wheel_entry[i] = (k, 1 + len(moved) if turns else -1)
+            moved = moved + (wheel_rows if turns else [])
+        for n in range(body["modes"]):
+            j = int(body["etad_index"]) + n
+            own[j], modal[j], body_of[j] = [int(element["mode_row"][k]) + n], moved, k
+    column, rows = np.zeros(len(c.speed), t.SPEED_COLUMN), list[int]()
+    for j in range(len(c.speed)):
+        start = len(rows)
+        rows += [*own[j], *modal[j]]
+        column[j] = (start, start + len(own[j]), len(rows), body_of[j])
+    return column, np.array(rows, np.int64), wheel_entry

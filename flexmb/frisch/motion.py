@@ -1,0 +1,173 @@
+"""Relative motion of contiguous bodies, base to tip: (78), (79), (116)-(132), and the entries of S = (126) (133).
+
+The hinge point of the paper is the origin of a body's frame. Extensions, all in S alone: hinges may translate along
+free coordinate vectors, may sit off their nodes, and a body's own frame may move with its modes where its inboard
+hinge sits on a node that deforms (free-free modes). Node frames move exactly: by the translation shapes, turned by the
+exponential of the rotation shapes. As printed they move by constant shapes, (118), (121), (124).
+"""
+
+from flexmb.arrays import RUTHLESS
+from flexmb.frisch.tables import FIXED_SHAPES
+from flexmb.hinges import catalogue
+from flexmb.kernel import helper
+from flexmb.levels.field import field_motion
+from flexmb.spatial.vector import (
+    add,
+    axpy,
+    cross,
+    mat3,
+    matmul,
+    scale,
+    store3,
+    store9,
+    sub,
+    times,
+    transpose,
+    vec3,
+)
+
+
+@helper
+def relative_motion(c, w):
+    """Poses, rates and kinematic biases of all bodies and ports, World axes, and the entries of S."""
+    for k in range(c.body.shape[0]):
+        seen = c.body[k].level != RUTHLESS
+        for n in range(c.body[k].modes):
+            w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if seen else 0.0
+            w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if seen else 0.0
+        for i in range(c.body[k].port_start, c.body[k].port_stop):
+            _port_in_body(c, w, k, i)
+        _across_hinge(c, w, k)
+        for i in range(c.body[k].port_start, c.body[k].port_stop):
+            _port_in_world(c, w, k, i)
+
+
+@helper
+def _port_in_body(c, w, k, i):
+    """Pose and relative motion of port i of body k, body axes: (2), (43), (44), (118), (124) and their derivatives."""
+    nm = c.body[k].modes
+    x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
+    r, R, w_rel, v_rel, alpha, a = field_motion(x, p, c.port_mode[i], w.mode[k], nm, w.port_mode[i])
+    if c.printed[FIXED_SHAPES] == 1:
+        zero = (0.0, 0.0, 0.0)
+        r, w_rel, v_rel, alpha, a = add(x, p), zero, zero, zero, zero
+        for n in range(nm):
+            psi = vec3(c.port_mode[i, n].rotation, 0)
+            phi = add(vec3(c.port_mode[i, n].translation, 0), cross(psi, p))
+            store3(w.port_mode[i, n].W, 0, psi)
+            store3(w.port_mode[i, n].L, 0, phi)
+            r = axpy(w.mode[k, n].eta, phi, r)
+            w_rel = axpy(w.mode[k, n].etad, psi, w_rel)
+            v_rel = axpy(w.mode[k, n].etad, phi, v_rel)
+    store3(w.port[i].r, 0, r)
+    store9(w.port[i].R, 0, matmul(R, mat3(c.port[i].frame, 0)))
+    store3(w.port[i].w, 0, w_rel)
+    store3(w.port[i].v, 0, v_rel)
+    store3(w.port[i].alpha, 0, alpha)
+    store3(w.port[i].a, 0, a)
+
+
+@helper
+def _port_in_world(c, w, k, i):
+    """The same in World axes, once the body's attitude is known."""
+    R = mat3(w.nest[k].rotation, 0)
+    port = w.port[i]
+    store9(port.R, 0, matmul(R, mat3(port.R, 0)))
+    store3(port.r, 0, times(R, vec3(port.r, 0)))
+    store3(port.w, 0, times(R, vec3(port.w, 0)))
+    store3(port.v, 0, times(R, vec3(port.v, 0)))
+    store3(port.alpha, 0, times(R, vec3(port.alpha, 0)))
+    store3(port.a, 0, times(R, vec3(port.a, 0)))
+    for n in range(c.body[k].modes):
+        store3(w.port_mode[i, n].W, 0, times(R, vec3(w.port_mode[i, n].W, 0)))
+        store3(w.port_mode[i, n].L, 0, times(R, vec3(w.port_mode[i, n].L, 0)))
+
+
+@helper
+def _across_hinge(c, w, k):
+    """Body k relative to its parent: rates (116), (123), derivatives (119), (125) at udot = 0, and inertial motion."""
+    zero = (0.0, 0.0, 0.0)
+    p, i, o = c.body[k].parent, c.body[k].inboard_port, c.body[k].outboard_port
+    R_parent, omega = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), zero
+    if p >= 0:
+        R_parent, omega = mat3(w.nest[p].rotation, 0), vec3(w.nest[p].omega, 0)
+    r, R = times(R_parent, vec3(c.body[k].placement_position, 0)), mat3(c.body[k].placement_rotation, 0)
+    R, w_node, v_node, alpha_node, a_node = matmul(R_parent, R), zero, zero, zero, zero
+    if i >= 0:
+        r, R = vec3(w.port[i].r, 0), mat3(w.port[i].R, 0)
+        w_node, v_node = vec3(w.port[i].w, 0), vec3(w.port[i].v, 0)
+        alpha_node, a_node = vec3(w.port[i].alpha, 0), vec3(w.port[i].a, 0)
+    kind, at_q, at_u, sequence = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index, c.body[k].sequence
+    R_hinge, translation = catalogue.pose(kind, w.q, at_q, sequence)
+    w_hinge, v_hinge, alpha_hinge, a_hinge = catalogue.motion(
+        kind, w.q, at_q, w.u, at_u, sequence, w.nest[k].hinge_map
+    )
+    arm = times(R, translation)
+    R = matmul(R, R_hinge)
+    w_hinge, v_hinge = times(R, w_hinge), times(R, v_hinge)
+    spin = add(w_node, w_hinge)  # (116), (129)
+    beta = add(r, arm)
+    beta_rate = add(add(v_node, cross(w_node, arm)), v_hinge)  # (123), (124)
+    spin_rate = add(add(alpha_node, cross(w_node, w_hinge)), times(R, alpha_hinge))  # (130)
+    turning = add(cross(w_node, add(cross(w_node, arm), scale(2.0, v_hinge))), times(R, a_hinge))
+    beta_rate2 = add(add(a_node, cross(alpha_node, arm)), turning)
+    back = zero
+    _hinge_columns(c, w, k, R)
+    if o >= 0:
+        # from O to the body frame, which the modes move away from it
+        R = matmul(R, transpose(mat3(w.port[o].R, 0)))
+        back = times(R, vec3(w.port[o].r, 0))
+        w_own, v_own = times(R, vec3(w.port[o].w, 0)), times(R, vec3(w.port[o].v, 0))
+        spin = sub(spin, w_own)
+        spin_rate = sub(spin_rate, add(times(R, vec3(w.port[o].alpha, 0)), cross(spin, w_own)))
+        beta = sub(beta, back)
+        beta_rate = sub(beta_rate, add(cross(spin, back), v_own))
+        turning = cross(spin, add(cross(spin, back), scale(2.0, v_own)))
+        beta_rate2 = sub(beta_rate2, add(add(cross(spin_rate, back), turning), times(R, vec3(w.port[o].a, 0))))
+    _modal_columns(c, w, k, R, arm, back)
+    nest = w.nest[k]
+    store9(nest.rotation, 0, R)
+    store3(nest.beta, 0, beta)
+    store3(nest.hinge_point, 0, back)
+    store3(nest.omega, 0, add(omega, spin))
+    store3(nest.spin_bias, 0, add(spin_rate, cross(omega, spin)))  # (119)
+    store3(nest.beta_bias, 0, beta_rate2)  # (125)
+    origin, velocity, path = zero, zero, zero
+    if p >= 0:
+        origin, velocity, path = vec3(w.nest[p].origin, 0), vec3(w.nest[p].velocity, 0), vec3(w.nest[p].path, 0)
+    store3(nest.origin, 0, add(origin, beta))  # (78), (79)
+    store3(nest.velocity, 0, add(velocity, add(beta_rate, cross(omega, beta))))
+    store3(nest.path, 0, add(path, cross(omega, add(cross(omega, beta), scale(2.0, beta_rate)))))  # the sum in (89)
+
+
+@helper
+def _hinge_columns(c, w, k, R):
+    """Columns q of (133): the free coordinate vectors of hinge k, rotation and translation of O."""
+    H = w.nest[k].hinge_map
+    for n in range(c.body[k].nv):
+        at = c.column[c.body[k].u_index + n].start
+        store3(w.S, at, times(R, (H[0, n], H[1, n], H[2, n])))
+        store3(w.S, at + 3, times(R, (H[3, n], H[4, n], H[5, n])))
+
+
+@helper
+def _modal_columns(c, w, k, R, arm, back):
+    """Partitions phiR_H, phiT_H of (126) for hinge k, referred to the body origin; `back` leads from it to O."""
+    for n in range(c.body[k].nv):
+        at = c.column[c.body[k].u_index + n].start
+        store3(w.S, at + 3, sub(vec3(w.S, at + 3), cross(vec3(w.S, at), back)))
+    p, i, o = c.body[k].parent, c.body[k].inboard_port, c.body[k].outboard_port
+    if i >= 0:
+        for n in range(c.body[p].modes):
+            at = c.column[c.body[p].etad_index + n].start + c.element[k].inboard_entry
+            W, L = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+            store3(w.S, at, W)
+            store3(w.S, at + 3, add(L, cross(W, sub(arm, back))))
+    for n in range(c.body[k].modes):
+        start = c.column[c.body[k].etad_index + n].start
+        w.S[start] = 1.0
+        if o >= 0:
+            at = start + c.element[k].outboard_entry
+            W, L = times(R, vec3(w.port_mode[o, n].W, 0)), times(R, vec3(w.port_mode[o, n].L, 0))
+            store3(w.S, at, scale(-1.0, W))
+            store3(w.S, at + 3, sub(cross(W, back), L))

@@ -1,0 +1,131 @@
+"""Frisch's route to a system's accelerations and loads, and its matrices by the names of the paper."""
+
+from __future__ import annotations
+
+from collections.abc import Set
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.arrays import Constants, Real
+from flexmb.frisch import evaluation
+from flexmb.frisch.constants import nested_constants
+from flexmb.frisch.errata import CORRECTED, Erratum
+from flexmb.frisch.tables import NestedWorkspace, workspace
+from flexmb.links import Link
+
+
+@dataclass(frozen=True)
+class Partitions:
+    """The equations of motion (111), partition by partition, all vectors in World axes.
+
+    First rows: rotation of every nest of a body, then translation of those nests whose hinge translates: point masses
+    and the base of the paper, here prismatic hinges and their like too. Second: wheels. Third: modes. Last: translation
+    of the remaining nests, whose hinges suppress it. `bodies` numbers the body of each block of three.
+
+    X, I_c, F, Gamma, I_s, M1, A, M2   as in (111)
+    eta                                right sides eta_1 .. eta_4 with external loads, without those of hinges
+    S                                  (126) times (133), rows as above, a column for each speed
+    """
+
+    X: Real
+    I_c: Real
+    F: Real
+    Gamma: Real
+    I_s: Real
+    M1: Real
+    A: Real
+    M2: Real
+    eta: tuple[Real, Real, Real, Real]
+    S: Real
+
+    @property
+    def matrix(self) -> Real:
+        """The coefficient matrix of (111)."""
+        wheels, modes, last = len(self.I_s), len(self.M1), len(self.M2)
+        return np.block([
+            [self.X, self.I_c, self.F, self.Gamma],
+            [self.I_c.T, self.I_s, np.zeros((wheels, modes)), np.zeros((wheels, last))],
+            [self.F.T, np.zeros((modes, wheels)), self.M1, self.A],
+            [self.Gamma.T, np.zeros((last, wheels)), self.A.T, self.M2],
+        ])
+
+
+class Motion(NamedTuple):
+    """Accelerations (nu,), drive loads (nu,) of prescribed speeds, loads (N,6) of hinges, torques (W,3) of wheels."""
+
+    accelerations: Real
+    drives: Real
+    loads: Real
+    wheel_torques: Real
+
+
+class NestedSystem:
+    """The equations of one scene. It owns one workspace: threads must not share it."""
+
+    def __init__(self, constants: Constants, chain: list[Link], nq: int, errata: Set[Erratum] = CORRECTED) -> None:
+        self.constants = nested_constants(constants, chain, errata)
+        self._nq = nq
+        self._w = self.workspace()
+
+    def workspace(self) -> NestedWorkspace:
+        """A fresh workspace for the right-hand side; one per thread."""
+        return workspace(self.constants, self._nq)
+
+    def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
+        """Status code and udot (nu,) at y = [q, u, work]."""
+        status = evaluation.accelerations(t, y, self.constants, self._w)
+        return status, self._w.speed["acceleration"].copy()
+
+    def motion(self, t: float, y: Real) -> tuple[int, Motion]:
+        """Status code, and accelerations with everything the suppressed rows give."""
+        w = self._w
+        status = evaluation.loads(t, y, self.constants, w)
+        drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
+        return status, Motion(w.speed["acceleration"].copy(), drives, w.nest["load"].copy(), w.wheel["torque"].copy())
+
+    @property
+    def fault(self) -> int:
+        """Body at which the last evaluation failed."""
+        return int(self._w.fault[0])
+
+    def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Matrix (nu,nu) and right side (nu,) of (136)."""
+        evaluation.assemble(t, y, self.constants, self._w)
+        return self._w.M.copy(), self._w.right.copy()
+
+    def partitions(self, t: float, y: Real) -> Partitions:
+        """The named blocks of (111) at y."""
+        evaluation.assemble(t, y, self.constants, self._w)
+        first, wheels, modes, last = self._rows()
+        Z, eta = self._w.Z, self._w.eta
+        S = np.zeros((len(Z), len(self.constants.column)))
+        for j, column in enumerate(self.constants.column):
+            entries = slice(column["start"], column["stop"])
+            S[self.constants.entry_row[entries], j] = self._w.S[entries]
+        return Partitions(
+            X=Z[np.ix_(first, first)],
+            I_c=Z[np.ix_(first, wheels)],
+            F=Z[np.ix_(first, modes)],
+            Gamma=Z[np.ix_(first, last)],
+            I_s=Z[np.ix_(wheels, wheels)],
+            M1=Z[np.ix_(modes, modes)],
+            A=Z[np.ix_(modes, last)],
+            M2=Z[np.ix_(last, last)],
+            eta=(eta[first], eta[wheels], eta[modes], eta[last]),
+            S=S[np.concatenate([first, wheels, modes, last])],
+        )
+
+    def _rows(self) -> tuple[Real, Real, Real, Real]:
+        """Expanded rows of the four partitions."""
+        c, w = self.constants, self._w
+        bodies, nx = len(c.body), len(w.x)
+        rows = np.arange(nx)
+        rotation = rows[: 3 * bodies].reshape(-1, 3)[np.any(c.element["Phi"], axis=1)]
+        translation = rows[nx - 3 * bodies :].reshape(-1, 3)
+        free = np.any(w.nest["hinge_map"][:, 3:, :], axis=(1, 2))
+        first = np.concatenate([rotation.ravel(), translation[free].ravel()])
+        wheels = rows[3 * bodies : 3 * bodies + 3 * len(c.wheel)]
+        modes = rows[3 * bodies + 3 * len(c.wheel) : nx - 3 * bodies]
+        return first, wheels, modes, translation[~free].ravel()

@@ -1,0 +1,16 @@
+"""How far a modal field means anything."""
+
+from flexmb.kernel import helper
+
+RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
+
+
+@helper
+def is_out_of_range(c, w, k):
+    """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
+    squares = 0.0
+    for n in range(c.body[k].modes):
+        for i in range(c.body[k].modes):
+            squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
+    body = c.body[k].rigid
+    return squares > RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
