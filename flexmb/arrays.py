@@ -20,7 +20,7 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 Record = NDArray[np.void]
 
-RIGID, RUTHLESS, FULL = range(3)
+RIGID, RUTHLESS, FULL, LINEAR = range(4)
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
 
@@ -33,7 +33,7 @@ def _record(*fields: tuple) -> np.dtype:
 
 BODY = _record(
     ("parent", _I),  # -1 for ground
-    ("level", _I),  # RIGID, RUTHLESS or FULL
+    ("level", _I),  # RIGID, RUTHLESS, FULL or LINEAR
     ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
@@ -46,8 +46,11 @@ BODY = _record(
     ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
     ("placement_position", _F, (3,)),  # O+ in the parent's frame
     ("placement_rotation", _F, (9,)),  # R_parent_O+
-    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; level full: of the polynomial part
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear: without the
+    # summed points
     ("rigid", _F, (10,)),
+    ("slope", _I),  # level linear: row of `slope`
+    ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
     ("ball_spring", _F),  # stiffness of a spherical hinge
     ("point_start", _I),
     ("point_stop", _I),
@@ -61,7 +64,7 @@ BODY = _record(
 MODE = _record(  # mode n of a body
     ("mfr", _F, (6,)),  # coupling to [angular; linear] at rest
     ("moment", _F, (9,)),  # P0_n = sum m phi_n r', r at rest
-    ("gyration", _F, (6,)),  # ruthless: symmetric B_n, centrifugal force w' B_n w on the mode
+    ("gyration", _F, (6,)),  # ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
 )
 PAIR = _record(  # modes n, i of a body
     ("mff", _F),  # modal mass matrix
@@ -69,7 +72,12 @@ PAIR = _record(  # modes n, i of a body
     ("stiffness", _F),
     ("damping", _F),
 )
-POINT = _record(  # summed at run time (level full): points with rotating inertia or an offset mass centre
+SLOPE = _record(  # level linear: mode n of a body by eta_k
+    ("mfr", _F, (6,)),  # d mfr_n / deta_k = [C1_kn; L1_kn]
+    ("coriolis", _F, (3,)),  # C1_kn - C1_nk, velocity-dependent force w . coriolis etad_k on the mode
+    ("gyration", _F, (6,)),  # symmetric G_nk = 1/2 d2J/(deta_n deta_k)
+)
+POINT = _record(  # summed at run time: points with rotating inertia or an offset mass centre; level linear: wheels
     ("mass", _F),  # 0 where the mass is in the polynomial part
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # mass centre from the point, in point axes
@@ -121,6 +129,8 @@ class Constants:
     body: Record  # (N,) BODY
     mode: Record  # (N,m) MODE
     pair: Record  # (N,m,m) PAIR
+    slope: Record  # (bodies of level linear,m,m) SLOPE
+    mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT
     point_mode: Record  # (S,m) SHAPE
     port: Record  # (P,) PORT

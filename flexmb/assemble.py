@@ -7,21 +7,12 @@ import numpy as np
 from flexmb import arrays as a
 from flexmb.functions import pack
 from flexmb.hinges import catalogue
+from flexmb.inertia_arrays import group, inertia_arrays, shape_records
 from flexmb.links import Link, Port, port
-from flexmb.modal.cross import cross_matrix
-from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
-from flexmb.modal.model import FlexibleModel
 from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
-
-_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
-
-
-def six(m: a.Real) -> list[float]:
-    """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
-    return [float(m[i, j]) for i, j in _SIX]
 
 
 class Functions:
@@ -86,7 +77,7 @@ def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a
     marker_ports = {marker.name: place(marker) for marker in scene.markers}
 
     m = max((link.model.mode_count for link in chain), default=0)
-    inertia, points = _inertia(chain, m)
+    inertia, points = inertia_arrays(chain, m)
     body = inertia.pop("body")
     body["parent"] = [index.get(link.parent, -1) for link in chain]
     body["level"] = [link.level for link in chain]
@@ -102,9 +93,9 @@ def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a
     body["outboard_port"] = [ports.number(at) for at in outboard_ports]
     body["placement_position"] = [at.node.position + at.offset for at in inboard]
     body["placement_rotation"] = [at.frame.ravel() for at in inboard]
-    _group(body, "port", [len(each) for each in ports.by_body])
-    _group(body, "wheel", [sum(wheel.body == link.name for wheel in wheels) for link in chain])
-    _group(body, "load", [sum(load.body == link.name for load in loads) for link in chain])
+    group(body, "port", [len(each) for each in ports.by_body])
+    group(body, "wheel", [sum(wheel.body == link.name for wheel in wheels) for link in chain])
+    group(body, "load", [sum(load.body == link.name for load in loads) for link in chain])
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, [ports.number(at) for at in load_ports], functions)
     function, table = pack(functions.all)
@@ -112,7 +103,7 @@ def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
         port=_ports(ports),
-        port_mode=_shapes([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
+        port_mode=shape_records([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
         wheel=_wheels(wheels, [ports.number(at) for at in wheel_ports], numbering),
         load=load,
         speed=speed,
@@ -130,22 +121,6 @@ def _moved(inboard: Port, parent: Link) -> Port:
         return inboard
     back, origin = parent.outboard.frame.T, parent.outboard.origin
     return Port(inboard.node.seen_from(origin, back), back @ inboard.offset, back @ inboard.frame)
-
-
-def _group(body: a.Record, name: str, counts: list[int]) -> None:
-    """Consecutive groups of items by body: their start and stop."""
-    stop = np.cumsum(counts)
-    body[f"{name}_stop"] = stop
-    body[f"{name}_start"] = stop - counts
-
-
-def _shapes(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Record:
-    """SHAPE records (len, m) of (translation, rotation) mode shapes (3, modes)."""
-    out = np.zeros((len(shapes), m), a.SHAPE)
-    for i, (translation, rotation) in enumerate(shapes):
-        out["translation"][i, : translation.shape[1]] = translation.T
-        out["rotation"][i, : rotation.shape[1]] = rotation.T
-    return out
 
 
 def _ports(ports: Ports) -> a.Record:
@@ -206,59 +181,3 @@ def _speeds(
             0.0,
         )
     return out
-
-
-def _inertia(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict[str, a.Record]]:
-    """Inertia at rest and modal integrals by body; the points left to sum at run time."""
-    body = np.zeros(len(chain), a.BODY)
-    mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
-    turning: list[tuple[TurningPoints, int]] = []
-    counts = []
-    for k, link in enumerate(chain):
-        integrals = modal_integrals(link.model)
-        n = integrals.mode_count
-        _body_inertia(link, integrals, body[k], mode[k, :n], pair[k, :n, :n])
-        summed = range(len(integrals.turning.mass)) if link.level == a.FULL else range(0)
-        turning += [(integrals.turning, i) for i in summed]
-        counts.append(len(summed))
-    _group(body, "point", counts)
-    point = np.zeros(len(turning), a.POINT)
-    for row, (p, i) in zip(point, turning, strict=True):
-        row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
-        row["inertia"] = six(p.inertia[i])
-    shapes = _shapes([(p.translation[i], p.rotation[i]) for p, i in turning], m)
-    return {"body": body, "mode": mode, "pair": pair}, {"point": point, "point_mode": shapes}
-
-
-def _body_inertia(link: Link, i: ModalIntegrals, body: a.Record, mode: a.Record, pair: a.Record) -> None:
-    """One body: all its inertia at rest, or for level full the polynomial part."""
-    n = i.mode_count
-    if link.level == a.FULL:
-        body["rigid"] = [i.mass, *i.s0, *six(i.J0)]
-        pair["mff"], mode["mfr"] = i.M_ff, np.hstack([i.C0.T, i.s1.T])
-    else:
-        block = i.spatial_mass
-        rr = block[n:, n:]
-        body["rigid"] = [rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]
-        pair["mff"], mode["mfr"] = block[:n, :n], block[:n, n:]
-    mode["moment"] = _from_cross_products(i.J1).reshape(n, 9)
-    mode["gyration"] = _gyration(link.model)
-    pair["product"] = _from_cross_products(i.J2).reshape(n, n, 9)
-    pair["stiffness"], pair["damping"] = i.stiffness, i.damping
-
-
-def _from_cross_products(J: a.Real) -> a.Real:
-    """sum m a b' from sum m a~' b~ = (a.b) 1 - b a', over the leading axes."""
-    half_trace = 0.5 * np.trace(J, axis1=-2, axis2=-1)
-    return np.swapaxes(half_trace[..., None, None] * np.eye(3) - J, -1, -2)
-
-
-def _gyration(model: FlexibleModel) -> a.Real:
-    """B_n, symmetric: centrifugal force on mode n at rest shape, sum m phi . (w x (w x r)) + psi . (w x J w)."""
-    centre = model.position + model.com_offset
-    moves = model.translation + cross_matrix(model.com_offset).swapaxes(-1, -2) @ model.rotation
-    P = np.einsum("p,pan,pb->nab", model.mass, moves, centre)
-    B = P - np.trace(P, axis1=1, axis2=2)[:, None, None] * np.eye(3)
-    B = B - np.einsum("pnac,pcb->nab", cross_matrix(np.swapaxes(model.rotation, 1, 2)), model.inertia)
-    B = 0.5 * (B + np.swapaxes(B, 1, 2))
-    return np.array([six(b) for b in B]).reshape(-1, 6)

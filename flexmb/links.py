@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.arrays import FULL, RIGID, RUTHLESS, Real
+from flexmb.arrays import FULL, LINEAR, RIGID, RUTHLESS, Real
 from flexmb.hinges import catalogue
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.model import FlexibleModel, ModalNode
@@ -19,7 +19,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
 
-LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "full": FULL}
+LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "linear": LINEAR, "full": FULL}
 
 
 @dataclass(frozen=True)
@@ -42,13 +42,17 @@ class Port:
 
 @dataclass(frozen=True)
 class Link:
-    """One body as the dynamics sees it, and the hinge that holds it."""
+    """One body as the dynamics sees it, and the hinge that holds it.
+
+    The last `wheels` points of its model are the despun wheels of the body.
+    """
 
     name: str
     hinge: s.Hinge | s.PointMass
     parent: str
     level: int
     model: FlexibleModel
+    wheels: int
     kind: int
     sequence: tuple[int, ...]
     inboard: Port
@@ -73,6 +77,7 @@ def links(scene: s.Scene) -> list[Link]:
                 parent=hinge.parent,
                 level=_level(body),
                 model=models[body.name],
+                wheels=sum(wheel.body == body.name for wheel in scene.wheels),
                 kind=kind,
                 sequence=sequence,
                 inboard=port(
@@ -134,7 +139,8 @@ def _model(body: s.Body) -> FlexibleModel:
         raise NotImplementedError(f'body "{body.name}": SID files are not supported yet; use kind = "modal"')
     if body.level not in LEVELS:
         raise NotImplementedError(
-            f'body "{body.name}": level "{body.level}" is not supported yet; use "rigid", "ruthless" or "full"'
+            f'body "{body.name}": level "{body.level}" is not supported yet; '
+            'use "rigid", "ruthless", "linear" or "full"'
         )
     model = flexible_model(body)
     return _without_modes(model) if body.level == "rigid" else model
@@ -223,6 +229,7 @@ def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> Link:
         parent=mass.body,
         level=RIGID,
         model=point,
+        wheels=0,
         kind=kind,
         sequence=(),
         inboard=port(models[mass.body], mass.node, mass.offset_m, IDENTITY, turn),

@@ -48,7 +48,9 @@ class Recipe:
 RIGID = Recipe(carriers=("rigid",))
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
+LINEAR = Recipe(levels=("linear",))
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
+EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
 FREE_FLYING = replace(CONSERVATIVE, grounded=False)
 

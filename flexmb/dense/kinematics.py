@@ -63,20 +63,20 @@ def member_frames(tree: Tree, motion: Motion) -> list[Frame]:
     for member in tree.members:
         inboard = seat_frame(tree, frames, member.parent, member.inboard, motion)
         outboard = inboard.carry(hinge_frame(member, motion))
-        frames.append(outboard.carry(_on_body(member.outboard, motion.modes(member)).inverse()))
+        frames.append(outboard.carry(on_body(member.outboard, motion.modes(member)).inverse()))
     return frames
 
 
 def seat_frame(tree: Tree, frames: list[Frame], k: int, seat: Seat, motion: Motion) -> Frame:
     """A seat on member k (-1: ground) in World."""
     if k < 0:
-        return _on_body(seat, constant(np.zeros((1, 1, 0))))
-    return frames[k].carry(_on_body(seat, motion.modes(tree.members[k])))
+        return on_body(seat, constant(np.zeros((1, 1, 0))))
+    return frames[k].carry(on_body(seat, motion.modes(tree.members[k])))
 
 
 def point_frames(tree: Tree, frames: list[Frame], motion: Motion) -> Frame:
     """Mass centres and axes of all inertia points in World, in the order of `points`."""
-    found = [frame.carry(_field(member, motion)) for frame, member in zip(frames, tree.members, strict=True)]
+    found = [frame.carry(field(member, motion)) for frame, member in zip(frames, tree.members, strict=True)]
     for rotor in tree.rotors:
         spin = _rotated((rotor.wheel.axis, motion.spin(rotor)))
         found.append(seat_frame(tree, frames, rotor.member, rotor.seat, motion).carry(spin))
@@ -142,7 +142,7 @@ def _attitude(quaternion: Array, w: Array, w_rate: Array) -> Jet:
     return Jet(R, R @ skew(w), R @ (skew(w) @ skew(w) + skew(w_rate)))
 
 
-def _on_body(seat: Seat, eta: Jet) -> Frame:
+def on_body(seat: Seat, eta: Jet) -> Frame:
     """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset."""
     node = seat.node
     moved = constant(node.position) + eta.map(lambda x: x @ node.translation.T)
@@ -150,7 +150,7 @@ def _on_body(seat: Seat, eta: Jet) -> Frame:
     return Frame(moved, turned).carry(Frame(constant(seat.offset), constant(seat.rotation)))
 
 
-def _field(member: Member, motion: Motion) -> Frame:
+def field(member: Member, motion: Motion) -> Frame:
     """Mass centres and axes of a member's inertia points seen from its body."""
     model, eta = member.model, motion.modes(member)[:, 0]
     rotation = rotation_exponential(eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x)))

@@ -1,7 +1,8 @@
 """Mass matrix, bias, accelerations, loads, energy and momentum of a scene as sums over its inertia points.
 
 At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
-Rodriguez, Appendix B); markers move with the true deformation.
+Rodriguez, Appendix B); markers move with the true deformation. Bodies of level linear are not summed point by point:
+each has a modal mass matrix and bias of first order (`flexmb.dense.first_order`).
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flexmb.dense.first_order import FirstOrderBody, body_jacobian, first_order_body
 from flexmb.dense.jets import Frame
 from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames, points, seat_frame
 from flexmb.dense.profiles import profile
@@ -56,6 +58,12 @@ class Snapshot:
         """Mass centres and axes of all inertia points, (P, ...)."""
         return point_frames(self._tree, self._frames, self._motion).first
 
+    @property
+    def first_order(self) -> dict[int, FirstOrderBody]:
+        """Members of level linear by number."""
+        tree = self._tree
+        return {k: first_order_body(tree, k, self._frames[k], self._motion) for k in tree.linear}
+
     def seat(self, k: int, seat: Seat) -> Frame:
         """One frame on member k."""
         found = seat_frame(self._tree, self._frames, k, seat, self._motion).first
@@ -85,18 +93,29 @@ class DenseSystem:
         """All inertia points."""
         return points(self.tree)
 
+    @cached_property
+    def _summed(self) -> Points:
+        """The same without the elements of bodies of level linear; of their wheels the rotary inertia is left."""
+        truncated = np.isin(self.points.member, self.tree.linear)
+        elements = truncated & (np.arange(len(truncated)) < len(truncated) - len(self.tree.rotors))
+        inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
+        return Points(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
+
     def mass_matrix(self, q: Array) -> Array:
-        """M (nu,nu) = sum over points m v'v + w' J w."""
-        J, I = self._jacobian(q), self._inertia(self._at(q).points)
-        return np.einsum("p,pai,paj->ij", self.points.mass, J.linear, J.linear) + np.einsum(
-            "pai,pab,pbj->ij", J.angular, I, J.angular
-        )
+        """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of bodies of level linear."""
+        J, now = self._jacobian(q), self._at(q)
+        M = np.einsum("p,pai,paj->ij", self._summed.mass, J.linear, J.linear)
+        M += np.einsum("pai,pab,pbj->ij", J.angular, _turned(self._summed, now.points), J.angular)
+        S = self._body_jacobians(q)
+        return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
 
     def bias(self, q: Array, u: Array, t: float = 0.0) -> Array:
         """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes."""
-        J = self._jacobian(q)
-        inertial = self._inertial(self._seen(q, u, np.zeros(self.nu)))
+        J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
+        inertial = self._inertial(now, self._summed)
         c = np.einsum("pai,pa->i", J.linear, inertial.force) + np.einsum("pai,pa->i", J.angular, inertial.torque)
+        for k, body in now.first_order.items():
+            c += S[k].T @ body.force(self._gravity)
         for name, load in self._loads(q, t).items():
             site = self._site_jacobian(f"load:{name}", q)
             c -= load.torque[0] @ site.angular[0] + load.force[0] @ site.linear[0]
@@ -154,12 +173,15 @@ class DenseSystem:
         """
         q, u = self.on_profile(q, u, t)
         now = self._seen(q, u, rates)
-        inertial, loads = self._inertial(now), self._loads(q, t)
+        inertial, loads = self._inertial(now, self._summed), self._loads(q, t)
+        bodies = {k: Wrenches(*body.world(body.force(self._gravity))) for k, body in now.first_order.items()}
         found = {}
         for k, member in enumerate(self.tree.members):
             outboard = self._outboard(k)
             origin = now.seat(k, member.outboard).position.value
             total = inertial.about(origin, np.isin(self.points.member, outboard))
+            for i in bodies.keys() & set(outboard):
+                total += bodies[i].about(origin, np.array([True]))
             for load in self.scene.loads:
                 if self.tree.index(load.body) in outboard:
                     total -= loads[load.name].about(origin, np.array([True]))
@@ -169,7 +191,7 @@ class DenseSystem:
     def wheel_loads(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
         """Load (6,) [torque; force] of bearing and motor on each wheel about its centre."""
         q, u = self.on_profile(q, u, t)
-        inertial = self._inertial(self._seen(q, u, rates))
+        inertial = self._inertial(self._seen(q, u, rates), self.points)
         first = len(self.points.mass) - len(self.tree.rotors)
         return {
             rotor.wheel.name: np.concatenate([inertial.torque[first + i], inertial.force[first + i]])
@@ -190,9 +212,12 @@ class DenseSystem:
 
     def energy(self, q: Array, u: Array) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
-        frames = self._at(q, u).points
+        now = self._at(q, u)
+        frames, bodies = now.points, now.first_order.values()
         w, v = frames.angular_velocity(), frames.position.rate
-        mass, inertia = self.points.mass, self._inertia(frames)
+        mass, inertia = self._summed.mass, _turned(self._summed, frames)
+        first_moment = mass @ frames.position.value + sum((body.mass_moment() for body in bodies), start=np.zeros(3))
+        kinetic = 0.5 * float(mass @ (v * v).sum(axis=1) + np.einsum("pa,pab,pb->", w, inertia, w))
         spring = sum(0.5 * x.stiffness * (q[x.q] - x.rest) ** 2 for x in self.tree.scalars)
         strain = 0.0
         for member in self.tree.members:
@@ -202,19 +227,22 @@ class DenseSystem:
                 theta = rotation_vector(q[member.q_hinge])
                 spring += 0.5 * member.hinge.stiffness_Nm_rad * float(theta @ theta)
         return {
-            "kinetic": 0.5 * float(mass @ (v * v).sum(axis=1) + np.einsum("pa,pab,pb->", w, inertia, w)),
+            "kinetic": kinetic + sum(body.kinetic for body in bodies),
             "strain": strain,
             "spring": spring,
-            "gravity": -float(mass @ frames.position.value @ self._gravity),
+            "gravity": -float(first_moment @ self._gravity),
         }
 
     def momentum(self, q: Array, u: Array) -> Array:
         """(6,) [angular about the World origin; linear]."""
-        frames = self._at(q, u).points
-        spin = np.einsum("pab,pb->pa", self._inertia(frames), frames.angular_velocity())
-        linear = self.points.mass[:, None] * frames.position.rate
-        everything = np.ones(len(linear), dtype=bool)
-        return Wrenches(spin, linear, frames.position.value).about(np.zeros(3), everything)
+        now = self._at(q, u)
+        frames = now.points
+        spin = np.einsum("pab,pb->pa", _turned(self._summed, frames), frames.angular_velocity())
+        linear = self._summed.mass[:, None] * frames.position.rate
+        total = Wrenches(spin, linear, frames.position.value).about(np.zeros(3), np.ones(len(linear), dtype=bool))
+        for body in now.first_order.values():
+            total += Wrenches(*body.world(body.M @ body.speeds)).about(np.zeros(3), np.array([True]))
+        return total
 
     @property
     def _prescribed(self) -> list[Scalar]:
@@ -224,7 +252,7 @@ class DenseSystem:
         """q with the modal coordinates of ruthless bodies at zero."""
         q = q.copy()
         for member in self.tree.members:
-            if member.ruthless:
+            if member.level == "ruthless":
                 q[member.q_modes] = 0.0
         return q
 
@@ -232,7 +260,7 @@ class DenseSystem:
         """As inertia sees the motion: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
-            if member.ruthless:
+            if member.level == "ruthless":
                 u[member.u_modes] = 0.0
         return Snapshot(self.tree, self._undeformed(q), u, rates)
 
@@ -240,11 +268,6 @@ class DenseSystem:
         """Configuration and velocities: eta = 0 for ruthless bodies, at rest without u."""
         zero = np.zeros(self.nu)
         return Snapshot(self.tree, self._undeformed(q), zero if u is None else u, zero)
-
-    def _inertia(self, frames: Frame) -> Array:
-        """(P,3,3) in World axes."""
-        R = frames.rotation.value
-        return R @ self.points.inertia @ np.swapaxes(R, -1, -2)
 
     def _unit_motions(self, q: Array) -> Motion:
         return Motion(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
@@ -254,18 +277,23 @@ class DenseSystem:
         motion = self._unit_motions(q)
         return _columns(point_frames(self.tree, member_frames(self.tree, motion), motion))
 
+    def _body_jacobians(self, q: Array) -> dict[int, Array]:
+        """Of the bodies of level linear by number, (m+6,nu)."""
+        frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.linear else []
+        return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.linear}
+
     def _site_jacobian(self, name: str, q: Array) -> Jacobian:
         """Of one load's node."""
         motion = self._unit_motions(q)
         frames = member_frames(self.tree, motion)
         return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
-    def _inertial(self, now: Snapshot) -> Wrenches:
+    def _inertial(self, now: Snapshot, chosen: Points) -> Wrenches:
         """What each point needs to move so, beyond gravity: m (a - g), J alpha + w x J w."""
         frames = now.points
-        J, w, alpha = self._inertia(frames), frames.angular_velocity(), frames.angular_acceleration()
+        J, w, alpha = _turned(chosen, frames), frames.angular_velocity(), frames.angular_acceleration()
         torque = np.einsum("pab,pb->pa", J, alpha) + np.cross(w, np.einsum("pab,pb->pa", J, w))
-        force = self.points.mass[:, None] * (frames.position.acceleration - self._gravity)
+        force = chosen.mass[:, None] * (frames.position.acceleration - self._gravity)
         return Wrenches(torque, force, frames.position.value)
 
     def _loads(self, q: Array, t: float) -> dict[str, Wrenches]:
@@ -289,6 +317,12 @@ class DenseSystem:
             if member.parent in found:
                 found.append(i)
         return found
+
+
+def _turned(chosen: Points, frames: Frame) -> Array:
+    """Inertia tensors (P,3,3) in World axes."""
+    R = frames.rotation.value
+    return np.asarray(R @ chosen.inertia @ np.swapaxes(R, -1, -2))
 
 
 def rotation_vector(quaternion: Array) -> Array:

@@ -21,6 +21,8 @@ from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_fra
 
 Array = NDArray[np.float64]
 
+LEVELS = ("rigid", "ruthless", "linear", "full")
+
 
 @dataclass(frozen=True)
 class Seat:
@@ -41,7 +43,7 @@ class Member:
     inboard: Seat
     outboard: Seat
     model: FlexibleModel
-    ruthless: bool
+    level: s.Level
     q_hinge: slice
     u_hinge: slice
     q_modes: slice
@@ -91,6 +93,11 @@ class Tree:
     nq: int
     nu: int
 
+    @property
+    def linear(self) -> list[int]:
+        """Numbers of the members of level linear."""
+        return [k for k, member in enumerate(self.members) if member.level == "linear"]
+
     def index(self, name: str) -> int:
         """Number of a member; -1 for the ground."""
         return -1 if name == GROUND else [member.name for member in self.members].index(name)
@@ -104,15 +111,15 @@ def build(scene: s.Scene, folder: Path | None = None) -> Tree:
     for body, hinge in ordered(scene):
         inboard = _seat(models[hinge.parent], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = _seat(models[body.name], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-        ruthless = not isinstance(body, s.RigidBody) and body.level == "ruthless"
-        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], ruthless)
+        level: s.Level = "rigid" if isinstance(body, s.RigidBody) else body.level
+        tree = _append(tree, body.name, hinge.parent, hinge, inboard, outboard, models[body.name], level)
         for wheel in scene.wheels:
             if wheel.body == body.name:
                 tree = _append_wheel(tree, wheel, _seat(models[body.name], wheel.node, wheel.offset_m))
     for mass in scene.point_masses:
         point = _rigid(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})
         inboard, outboard = _seat(models[mass.body], mass.node, mass.offset_m), _seat(point, "origin")
-        tree = _append(tree, mass.name, mass.body, mass, inboard, outboard, point, False)
+        tree = _append(tree, mass.name, mass.body, mass, inboard, outboard, point, "rigid")
     sites = {f"load:{x.name}": (tree.index(x.body), _seat(models[x.body], x.node)) for x in scene.loads}
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
@@ -132,12 +139,12 @@ def hinge_sizes(hinge: s.Hinge | s.PointMass) -> tuple[int, int]:
 
 def _append(
     tree: Tree, name: str, parent: str, hinge: s.Hinge | s.PointMass, inboard: Seat, outboard: Seat,
-    model: FlexibleModel, ruthless: bool,
+    model: FlexibleModel, level: s.Level,
 ) -> Tree:  # fmt: skip
     (nq, nu), m = hinge_sizes(hinge), model.mode_count
     q, u = tree.nq, tree.nu
     member = Member(
-        name, tree.index(parent), hinge, inboard, outboard, model, ruthless,
+        name, tree.index(parent), hinge, inboard, outboard, model, level,
         slice(q, q + nq), slice(u, u + nu), slice(q + nq, q + nq + m), slice(u + nu, u + nu + m),
     )  # fmt: skip
     scalars = [_scalar(hinge.name, q + n, u + n, c) for n, (_, c) in enumerate(coordinates(hinge))]
@@ -173,8 +180,8 @@ def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
     if isinstance(body, s.RigidBody):
         frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
         return _rigid(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
-    if isinstance(body, s.SidBody) or body.level not in ("rigid", "ruthless", "full"):
-        raise NotImplementedError(f'body "{body.name}": the dense route knows levels "rigid", "ruthless" and "full"')
+    if isinstance(body, s.SidBody) or body.level not in LEVELS:
+        raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
     model = flexible_model(body, folder)
     return _stiff(model) if body.level == "rigid" else model
 

@@ -7,7 +7,7 @@ acceleration -g of the ground.
 
 from math import sqrt
 
-from flexmb.arrays import FULL, RUTHLESS
+from flexmb.arrays import FULL, LINEAR, RUTHLESS
 from flexmb.coordinates import hinge_forces
 from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
 from flexmb.jain.forces import elastic_forces, node_loads, wheel_forces
@@ -20,7 +20,8 @@ from flexmb.jain.kinematics import (
     velocity_sweep,
 )
 from flexmb.kernel import helper
-from flexmb.levels import full, rigid, ruthless
+from flexmb.levels import full, linear, rigid, ruthless
+from flexmb.levels.range import is_out_of_range
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_column,
@@ -37,7 +38,6 @@ from flexmb.spatial.vector import add, add3, cross, dot, mat3, scale, store3, su
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
-RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
 SINGLE = -1  # free_count of a hinge with one free speed along z: no small matrices
 
 
@@ -65,23 +65,14 @@ def forward_dynamics(c, w):
 
 
 @helper
-def is_out_of_range(c, w, k):
-    """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
-    squares = 0.0
-    for n in range(c.body[k].modes):
-        for i in range(c.body[k].modes):
-            squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    body = c.body[k].rigid
-    return squares > RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
-
-
-@helper
 def body_inertia(c, w, k):
     """M_m and b_m of body k at its level."""
     if c.body[k].level == FULL:
         full.inertia_and_bias(c, w, k)
     elif c.body[k].level == RUTHLESS:
         ruthless.inertia_and_bias(c, w, k)
+    elif c.body[k].level == LINEAR:
+        linear.inertia_and_bias(c, w, k)
     else:
         rigid.inertia_and_bias(c, w, k)
 

@@ -6,16 +6,14 @@ points is left. Points with rotating inertia, or with a mass centre off the poin
 """
 
 from flexmb.kernel import helper
-from flexmb.levels.field import field_motion
-from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
+from flexmb.levels.summed_point import add_point
+from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import (
     add,
-    add3,
     axpy,
     cross,
     dot,
     mat3,
-    rotate_sym,
     scale,
     store3,
     sub,
@@ -54,7 +52,7 @@ def inertia_and_bias(c, w, k):
     """Polynomial part, then the summed points."""
     _polynomial(c, w, k)
     for j in range(c.body[k].point_start, c.body[k].point_stop):
-        _add_point(c, w, k, j)
+        add_point(c, w, k, j)
 
 
 @helper
@@ -95,49 +93,3 @@ def _polynomial(c, w, k):
     coriolis = sub(scale(flow[0] + flow[4] + flow[8], omega), times(flow, omega))
     store3(w.body[k].force, 0, add(cross(omega, sym_times(j, omega)), scale(2.0, coriolis)))
     store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, momentum))))
-
-
-@helper
-def _add_point(c, w, k, j):
-    """One rotating point: mass mu with its centre at R p from the point, inertia R J R' about that centre."""
-    nm = c.body[k].modes
-    omega = vec3(w.body[k].velocity, 0)
-    mass = c.point[j].mass
-    r, rotation, w_rel, v_rel, alpha_rel, a_rel = field_motion(
-        vec3(c.point[j].position, 0),
-        vec3(c.point[j].offset, 0),
-        c.point_mode[j],
-        w.mode[k],
-        nm,
-        w.point_mode,
-    )
-    inertia = rotate_sym(rotation, sym6(c.point[j].inertia, 0))
-    # about the body origin: the mass mu at r, and the central inertia
-    s = scale(mass, r)
-    r2 = dot(r, r)
-    steiner = (
-        mass * (r2 - r[0] * r[0]),
-        mass * (r2 - r[1] * r[1]),
-        mass * (r2 - r[2] * r[2]),
-        -mass * r[0] * r[1],
-        -mass * r[0] * r[2],
-        -mass * r[1] * r[2],
-    )
-    add_inertia(w.body[k].inertia, 0, rigid_inertia(mass, s, sym_add(inertia, steiner)))
-    # force and torque left at wdot = vdot = etaddot = 0
-    spin = add(omega, w_rel)
-    acceleration = add(cross(omega, add(cross(omega, r), scale(2.0, v_rel))), a_rel)
-    force = scale(mass, acceleration)
-    turning = add(alpha_rel, cross(omega, w_rel))
-    torque = add(sym_times(inertia, turning), cross(spin, sym_times(inertia, spin)))
-    add3(w.body[k].force, 0, add(cross(r, force), torque))
-    add3(w.body[k].force, 3, force)
-    for n in range(nm):
-        wn = vec3(w.point_mode[n].W, 0)
-        ln = vec3(w.point_mode[n].L, 0)
-        hn = sym_times(inertia, wn)
-        add3(w.mode[k, n].pfr, 0, add(scale(mass, cross(r, ln)), hn))
-        add3(w.mode[k, n].pfr, 3, scale(mass, ln))
-        w.mode[k, n].zf += dot(ln, force) + dot(wn, torque)
-        for i in range(nm):
-            w.pff[k, n, i] += mass * dot(ln, vec3(w.point_mode[i].L, 0)) + dot(hn, vec3(w.point_mode[i].W, 0))

@@ -119,6 +119,19 @@ def sym_add(a, b):
 
 
 @helper
+def sym_axpy(s, a, b):
+    """s A + B for symmetric 6-tuples."""
+    return (
+        s * a[0] + b[0],
+        s * a[1] + b[1],
+        s * a[2] + b[2],
+        s * a[3] + b[3],
+        s * a[4] + b[4],
+        s * a[5] + b[5],
+    )
+
+
+@helper
 def rotate_sym(r, s):
     """R S R' for a symmetric 6-tuple S."""
     t = matmul(r, sym_full(s))

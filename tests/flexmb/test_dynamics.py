@@ -17,7 +17,10 @@ from flexmb.system import DynamicsError, System
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma
 
-RECIPES = {"rigid": trees.RIGID, "full": trees.FULL, "mixed": trees.MIXED, "free-flying": trees.FREE_FLYING}
+RECIPES = {
+    "rigid": trees.RIGID, "full": trees.FULL, "mixed": trees.MIXED, "free-flying": trees.FREE_FLYING,
+    "linear": trees.LINEAR, "every level": trees.EVERY_LEVEL,
+}  # fmt: skip
 CASES = [(name, seed) for name in RECIPES for seed in (10, 11)]
 POINTS = 15  # most inertia points of a body in the random trees: three elements, five sections
 
@@ -140,11 +143,30 @@ def _forget_turning_inertia(c):
     c.point["inertia"] = 0.0
 
 
+def _forget_the_slope_of_the_coupling(c):
+    c.slope["mfr"] = 0.0
+
+
+def _reverse_the_coriolis_force_on_modes(c):
+    c.slope["coriolis"] *= -1.0
+
+
+def _forget_the_centrifugal_softening(c):
+    c.slope["gyration"] = 0.0
+
+
+def _freeze_the_modal_masses(c):
+    c.mass_slope[:] = 0.0
+
+
 TAMPERS: list[tuple[trees.Recipe, Callable]] = [
     (trees.RUTHLESS, _reverse_gyration), (trees.RIGID, _transpose_a_placement), (trees.FULL, _drop_coriolis),
     (trees.RIGID, _mass_one_in_a_million_more), (trees.FULL, _transpose_a_port),
     (trees.RIGID, _lose_a_wheels_gyroscopic_torque), (trees.RIGID, _reverse_a_spring),
     (trees.FULL, _forget_turning_inertia),
+    (trees.LINEAR, _forget_the_slope_of_the_coupling), (trees.LINEAR, _reverse_the_coriolis_force_on_modes),
+    (trees.LINEAR, _forget_the_centrifugal_softening), (trees.LINEAR, _freeze_the_modal_masses),
+    (trees.LINEAR, _forget_turning_inertia),
 ]  # fmt: skip
 
 

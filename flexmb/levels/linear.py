@@ -1,0 +1,73 @@
+"""Level linear: M_m and b_m of level full to first order in (eta, etadot), what Frisch set out to write.
+
+With s = s0 + L0 eta, J = J0 + E eta, the coupling [C; L] and the modal masses M_ff affine in eta likewise, and
+B_n = -1/2 E_n, G_nk = 1/2 d2J/(deta_n deta_k):
+
+    force    w x (w x s) + 2 w x (L0 etadot)
+    torque   w x (J w) + sum_n etadot_n (E_n w + w x C0_n)
+    modal    w.(B_n - sum_k eta_k G_nk) w + w.sum_k etadot_k (C1_kn - C1_nk)
+
+Not a kinetic energy's equations: power is balanced to first order only, and M_m is not positive definite everywhere.
+The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
+"""
+
+from flexmb.kernel import helper
+from flexmb.levels.summed_point import add_point
+from flexmb.spatial.inertia import rigid_inertia, store_inertia
+from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym6, sym_axpy, sym_times, vec3
+
+
+@helper
+def inertia_and_bias(c, w, k):
+    """The body's first-order tables at eta and etadot, then its wheels."""
+    nm = c.body[k].modes
+    omega = vec3(w.body[k].velocity, 0)
+    body = c.body[k].rigid
+    s = vec3(body, 1)
+    j = sym6(body, 4)
+    momentum = (0.0, 0.0, 0.0)  # L0 etadot
+    swirl = (0.0, 0.0, 0.0)  # C0 etadot
+    b = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum_n B_n etadot_n
+    for n in range(nm):
+        eta = w.mode[k, n].eta
+        etad = w.mode[k, n].etad
+        coupling = c.mode[k, n].mfr
+        gyration = sym6(c.mode[k, n].gyration, 0)
+        s = axpy(eta, vec3(coupling, 3), s)
+        j = sym_axpy(-2.0 * eta, gyration, j)
+        momentum = axpy(etad, vec3(coupling, 3), momentum)
+        swirl = axpy(etad, vec3(coupling, 0), swirl)
+        b = sym_axpy(etad, gyration, b)
+        _mode(c, w, k, n, omega)
+    store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
+    torque = sub(cross(omega, add(sym_times(j, omega), swirl)), scale(2.0, sym_times(b, omega)))
+    store3(w.body[k].force, 0, torque)
+    store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, momentum))))
+    for i in range(c.body[k].point_start, c.body[k].point_stop):
+        add_point(c, w, k, i)
+
+
+@helper
+def _mode(c, w, k, n, omega):
+    """Coupling, modal masses and force of mode n."""
+    row = c.body[k].slope
+    changing = c.body[k].mass_slope
+    angular = vec3(c.mode[k, n].mfr, 0)
+    linear = vec3(c.mode[k, n].mfr, 3)
+    gyration = sym6(c.mode[k, n].gyration, 0)
+    coriolis = (0.0, 0.0, 0.0)
+    for i in range(c.body[k].modes):
+        eta = w.mode[k, i].eta
+        slope = c.slope[row, n, i]
+        angular = axpy(eta, vec3(slope.mfr, 0), angular)
+        linear = axpy(eta, vec3(slope.mfr, 3), linear)
+        gyration = sym_axpy(-eta, sym6(slope.gyration, 0), gyration)
+        coriolis = axpy(w.mode[k, i].etad, vec3(slope.coriolis, 0), coriolis)
+        mass = c.pair[k, n, i].mff
+        if changing >= 0:
+            for l in range(c.body[k].modes):
+                mass += w.mode[k, l].eta * c.mass_slope[changing, n, i, l]
+        w.pff[k, n, i] = mass
+    store3(w.mode[k, n].pfr, 0, angular)
+    store3(w.mode[k, n].pfr, 3, linear)
+    w.mode[k, n].zf = dot(omega, add(sym_times(gyration, omega), coriolis))

@@ -1,0 +1,55 @@
+"""Inertia that turns with one point of the modal field, summed at run time: rotating points of level full, wheels.
+
+Angular momentum and force follow the point's exact motion; nothing is truncated.
+"""
+
+from flexmb.kernel import helper
+from flexmb.levels.field import field_motion
+from flexmb.spatial.inertia import add_inertia, rigid_inertia
+from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3
+
+
+@helper
+def add_point(c, w, k, j):
+    """Add point j to body k: mass mu with its centre at R p from the point, inertia R J R' about that centre."""
+    nm = c.body[k].modes
+    omega = vec3(w.body[k].velocity, 0)
+    mass = c.point[j].mass
+    r, rotation, w_rel, v_rel, alpha_rel, a_rel = field_motion(
+        vec3(c.point[j].position, 0),
+        vec3(c.point[j].offset, 0),
+        c.point_mode[j],
+        w.mode[k],
+        nm,
+        w.point_mode,
+    )
+    inertia = rotate_sym(rotation, sym6(c.point[j].inertia, 0))
+    # about the body origin: the mass mu at r, and the central inertia
+    s = scale(mass, r)
+    r2 = dot(r, r)
+    steiner = (
+        mass * (r2 - r[0] * r[0]),
+        mass * (r2 - r[1] * r[1]),
+        mass * (r2 - r[2] * r[2]),
+        -mass * r[0] * r[1],
+        -mass * r[0] * r[2],
+        -mass * r[1] * r[2],
+    )
+    add_inertia(w.body[k].inertia, 0, rigid_inertia(mass, s, sym_add(inertia, steiner)))
+    # force and torque left at wdot = vdot = etaddot = 0
+    spin = add(omega, w_rel)
+    acceleration = add(cross(omega, add(cross(omega, r), scale(2.0, v_rel))), a_rel)
+    force = scale(mass, acceleration)
+    turning = add(alpha_rel, cross(omega, w_rel))
+    torque = add(sym_times(inertia, turning), cross(spin, sym_times(inertia, spin)))
+    add3(w.body[k].force, 0, add(cross(r, force), torque))
+    add3(w.body[k].force, 3, force)
+    for n in range(nm):
+        wn = vec3(w.point_mode[n].W, 0)
+        ln = vec3(w.point_mode[n].L, 0)
+        hn = sym_times(inertia, wn)
+        add3(w.mode[k, n].pfr, 0, add(scale(mass, cross(r, ln)), hn))
+        add3(w.mode[k, n].pfr, 3, scale(mass, ln))
+        w.mode[k, n].zf += dot(ln, force) + dot(wn, torque)
+        for i in range(nm):
+            w.pff[k, n, i] += mass * dot(ln, vec3(w.point_mode[i].L, 0)) + dot(hn, vec3(w.point_mode[i].W, 0))

@@ -1,0 +1,138 @@
+"""Modal mass matrix and bias of a flexible body to first order in its modal coordinates: the tables of level `linear`.
+
+They are derivatives, at the rest shape, of the kinetic energy that is the sum over all inertia points, point
+inertias J turning with their points and mass centres off their points included. With sums over points, rho = r + c,
+
+    rho(eta)  = rho + u_n eta_n + 1/2 a_kn eta_k eta_n     u_n = phi_n + psi_n x c
+    L_n(eta)  = u_n + a_kn eta_k                           a_kn = 1/2 (psi_k x (psi_n x c) + psi_n x (psi_k x c))
+    W_n(eta)  = psi_n + 1/2 eta_k psi_k x psi_n            angular velocity per modal speed
+    RJR'(eta) = J + eta_k T_k                              T_k = psi_k~ J - J psi_k~
+
+every table below is a product of these, cut off after the first order (`gyration_slope`: J(eta) after the second).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.cross import cross_matrix
+from flexmb.modal.model import FlexibleModel
+
+Array = NDArray[np.float64]
+
+TOGETHER = 2**18  # vectors by point and pair of modes in memory at once
+
+
+@dataclass(frozen=True)
+class FirstOrder:
+    """First-order tables of one body about its origin, body axes; n, i, k count the m modes.
+
+    mass            kg          sum m
+    s0              (3,)        first moment                    s(eta) = s0 + sum_n eta_n L0_n
+    J0              (3,3)       inertia                         J(eta) = J0 + sum_n eta_n E_n
+    E               (m,3,3)     symmetric
+    C0, L0          (m,3)       coupling of mode n to the       C_n(eta) = C0_n + sum_k eta_k C1_kn
+    C1, L1          (m,m,3)     angular and linear velocity     L_n(eta) = L0_n + sum_k eta_k L1_kn    [k,n]
+    G               (m,m,3,3)   1/2 d2J/(deta_n deta_k), symmetric in both pairs
+    M0              (m,m)       modal masses                    M_ni(eta) = M0_ni + sum_k eta_k M1_kni
+    M1              (m,m,m)     [k,n,i]; zero where no mass centre is off its point and all J are isotropic
+    """
+
+    mass: float
+    s0: Array
+    J0: Array
+    E: Array
+    C0: Array
+    L0: Array
+    C1: Array
+    L1: Array
+    G: Array
+    M0: Array
+    M1: Array
+
+
+def first_order(model: FlexibleModel) -> FirstOrder:
+    """All tables, summed over all points of `model`."""
+    count = max(1, TOGETHER // (1 + model.mode_count**2))
+    parts = [_sums(_points(model, slice(i, i + count))) for i in range(0, len(model.mass), count)]
+    return FirstOrder(**{field.name: sum(getattr(part, field.name) for part in parts) for field in fields(FirstOrder)})
+
+
+def _points(model: FlexibleModel, chosen: slice) -> FlexibleModel:
+    """Some of the points."""
+    return replace(
+        model, mass=model.mass[chosen], position=model.position[chosen], com_offset=model.com_offset[chosen],
+        inertia=model.inertia[chosen], translation=model.translation[chosen], rotation=model.rotation[chosen],
+    )  # fmt: skip
+
+
+def _sums(model: FlexibleModel) -> FirstOrder:
+    """All tables of points few enough to have a vector for every pair of modes."""
+    m, J, psi = model.mass, model.inertia, np.swapaxes(model.rotation, 1, 2)
+    rho, u, a = _mass_centres(model)
+    T = _turning(model)
+    swirl = np.cross(psi[:, :, None], psi[:, None])  # psi_k x psi_n  (p,k,n,3)
+    spin = np.einsum("pab,pnb->pna", J, psi)  # J psi_n
+    C1 = np.einsum("p,pkna->kna", m, np.cross(u[:, :, None], u[:, None]) + np.cross(rho[:, None, None], a))
+    C1 += np.einsum("pkab,pnb->kna", T, psi) + 0.5 * np.einsum("pab,pknb->kna", J, swirl)
+    M1 = np.einsum("p,pkna,pia->kni", m, a, u, optimize=True)
+    M1 += 0.5 * np.einsum("pkna,pia->kni", swirl, spin, optimize=True)
+    M1 += np.swapaxes(M1, 1, 2) + np.einsum("pna,pkab,pib->kni", psi, T, psi, optimize=True)
+    return FirstOrder(
+        mass=float(m.sum()),
+        s0=m @ rho,
+        J0=_steiner(np.einsum("p,pa,pb->ab", m, rho, rho)) + J.sum(axis=0),
+        E=inertia_slope(model),
+        C0=np.einsum("p,pna->na", m, np.cross(rho[:, None], u)) + spin.sum(axis=0),
+        L0=np.einsum("p,pna->na", m, u),
+        C1=C1,
+        L1=np.einsum("p,pkna->kna", m, a),
+        G=_inertia_curvature(model),
+        M0=np.einsum("p,pna,pia->ni", m, u, u, optimize=True) + np.einsum("pna,pia->ni", psi, spin, optimize=True),
+        M1=M1,
+    )
+
+
+def inertia_slope(model: FlexibleModel) -> Array:
+    """E_n = dJ/deta_n at rest shape (m,3,3): twice the symmetric part of sum m (rho.u_n 1 - rho u_n'), plus T_n."""
+    rho, u, _ = _mass_centres(model)
+    return 2.0 * _steiner(np.einsum("p,pa,pnb->nab", model.mass, rho, u, optimize=True)) + _turning(model).sum(axis=0)
+
+
+def _mass_centres(model: FlexibleModel) -> tuple[Array, Array, Array]:
+    """rho (p,3), u (p,m,3) and a (p,m,m,3)."""
+    c, psi = model.com_offset[:, None], np.swapaxes(model.rotation, 1, 2)
+    swung = np.cross(psi, c)
+    a = np.cross(psi[:, :, None], swung[:, None])
+    u = np.swapaxes(model.translation, 1, 2) + swung
+    return model.position + model.com_offset, u, 0.5 * (a + np.swapaxes(a, 1, 2))
+
+
+def _turning(model: FlexibleModel) -> Array:
+    """T_k = psi_k~ J - J psi_k~ of every point, (p,m,3,3)."""
+    turned = cross_matrix(np.swapaxes(model.rotation, 1, 2)) @ model.inertia[:, None]
+    return turned + np.swapaxes(turned, -1, -2)
+
+
+def _inertia_curvature(model: FlexibleModel) -> Array:
+    """G_nk = 1/2 d2J/(deta_n deta_k): of the mass centres, and of exp(theta~) J exp(-theta~) to second order."""
+    rho, u, a = _mass_centres(model)
+    places = np.einsum("p,pna,pkb->nkab", model.mass, u, u, optimize=True)
+    places += np.einsum("p,pa,pnkb->nkab", model.mass, rho, a, optimize=True)
+    psi, J = cross_matrix(np.swapaxes(model.rotation, 1, 2)), model.inertia
+    twice = 0.5 * np.einsum("pnab,pkbc,pcd->nkad", psi, psi, J, optimize=True)
+    across = 0.5 * np.einsum("pnab,pbc,pkcd->nkad", psi, J, psi, optimize=True)
+    turned = _symmetric(twice + np.swapaxes(twice, 0, 1)) - across - np.swapaxes(across, 0, 1)
+    return _steiner(places) + turned
+
+
+def _steiner(A: Array) -> Array:
+    """sum m (a.b 1 - b a') made symmetric, of A = sum m a b' (...,3,3)."""
+    return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - _symmetric(A)
+
+
+def _symmetric(A: Array) -> Array:
+    return 0.5 * (A + np.swapaxes(A, -1, -2))
