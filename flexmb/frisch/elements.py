@@ -129,12 +129,15 @@ def rotary(e: Elements) -> Rotary:
 def slopes(e: Elements, alpha: Array) -> Slopes:
     """What the exact kinetic energy of turning elements has at first order in the coordinates, about `alpha`.
 
-    With W_n = phiR_n + 1/2 theta~ phiR_n, an element's angular velocity per rate, and phiT_n + sum_m a_m bend_mn, its
-    mass centre's velocity, the slopes of the modal mass and of the angular momentum are sums of
-    bend_km . phiT_n + phiT_m . bend_kn and, from R Phi_i R' turned by [phiR_k~, Phi_i], of
-    -1/2 ((phiR_k x phiR_m) . Phi_i phiR_n + phiR_m . Phi_i (phiR_k x phiR_n)) and
-    phiR_k x Phi_i phiR_n - 1/2 Phi_i (phiR_k x phiR_n); twice the antisymmetric part of the last one is
-    (tr(Phi_i) 1 - 2 Phi_i)(phiR_k x phiR_n), where (72) has (Phi_i phiR_k) x phiR_n.
+    Per rate adot_n an element turns by phiR_n + 1/2 theta~ phiR_n, its mass centre moves by phiT_n + sum_k a_k bend_kn,
+    and its inertia is Phi_i + [theta~, Phi_i], where (12) takes the second term for one of second order. So
+
+        M1[k,m,n] = sum m_i (bend_km . phiT_n + phiT_m . bend_kn)
+                    - 1/2 ((phiR_k x phiR_m) . Phi_i phiR_n + phiR_m . Phi_i (phiR_k x phiR_n))
+        Q1[k,n]   = sum m_i (x_i - alpha) x bend_kn + phiR_k x Phi_i phiR_n - 1/2 Phi_i (phiR_k x phiR_n)
+        K[k,n]    = (Q1[k,n] - Q1[n,k]) / 2 = sum 1/2 (tr(Phi_i) 1 - 2 Phi_i)(phiR_k x phiR_n)
+
+    where (72) has 1/2 (Phi_i phiR_k) x phiR_n.
     """
     bend = _curvature(e)
     turn = np.cross(e.phiR[:, :, None], e.phiR[:, None])  # phiR_m x phiR_n

@@ -18,7 +18,7 @@ _PRINTED = 1e-9
 
 
 def check_boundary(model: FlexibleModel, name: str = "flexible body") -> None:
-    """Raise ValueError unless clamped modes vanish at the body origin, in translation and rotation, as (46) demands.
+    """Raise ValueError unless clamped modes vanish at the body origin in translation and rotation: (33), (46).
 
     Looked at are node "origin", and nodes and inertia points that lie at the origin. The message names the body, the
     place and the mode (counted from 0), and what to do.

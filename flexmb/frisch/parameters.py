@@ -35,12 +35,12 @@ class ModeParameters:
     mass                  kg            (7)
     alpha     (3,)        m             (8), undeformed mass centre from the body origin
     Phi       (3,3)       kg m^2        (17), undeformed inertia about that mass centre
-    A         (n,3)                     (48), mass centre: alpha(a) = alpha + sum_n A_n a_n
+    A         (n,3)                     (48), mass centre (47): alpha(a) = alpha + sum_n A_n a_n
     B         (n,3)       m             (54)
     C         (n,3)       kg m          (55)
-    Q         (n,3)       kg m          (56), angular momentum about the mass centre: sum_n Q_n adot_n
+    Q         (n,3)       kg m          (56), angular momentum about the mass centre (53): sum_n Q_n adot_n
     D         (n,3,3)     kg m          (51)
-    E         (n,3,3)     kg m          (52), inertia about the mass centre: Phi(a) = Phi + sum_n E_n a_n
+    E         (n,3,3)     kg m          (52), inertia about the mass centre (49): Phi(a) = Phi + sum_n E_n a_n
     J         (n,3,3)     kg m          (67)
     H         (n,3,3)     kg m          (68)
     F         (n,n,3,3)   kg            (70), F[m,n]
