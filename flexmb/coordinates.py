@@ -5,7 +5,7 @@ Both algorithms, Jain's recursion and Frisch's matrices, start here.
 
 from flexmb.functions import evaluate
 from flexmb.hinges import catalogue
-from flexmb.kernel import helper
+from flexmb.kernel import helper, kernel
 from flexmb.spatial.rotation import rotation_vector
 
 
@@ -42,6 +42,22 @@ def normalise_quaternions(q, c):
             s = 1.0 / (q[i] * q[i] + q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3]) ** 0.5
             for n in range(4):
                 q[i + n] *= s
+
+
+@kernel
+def project(t, y, c):
+    """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
+    normalise_quaternions(y, c)
+    nu = c.speed.shape[0]
+    nq = y.shape[0] - nu - 1
+    for j in range(nu):
+        f = c.speed[j].prescribed
+        if f >= 0:
+            value, rate, _ = evaluate(
+                c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
+            )
+            y[c.speed[j].coordinate] = value
+            y[nq + j] = rate
 
 
 @helper

@@ -1,8 +1,7 @@
-"""Entry points of the compiled dynamics: right-hand side, projection, and everything observable at one state."""
+"""Entry points of the compiled recursion: right-hand side, accelerations, and everything observable at one state."""
 
 from flexmb.balance import energy_and_momentum, power
-from flexmb.coordinates import configuration_rate, load_state, normalise_quaternions
-from flexmb.functions import evaluate
+from flexmb.coordinates import configuration_rate, load_state
 from flexmb.jain import inverse
 from flexmb.jain.kinematics import (
     acceleration_sweep,
@@ -38,22 +37,6 @@ def rhs(t, y, dy, c, w):
 
 
 @kernel
-def project(t, y, c):
-    """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
-    normalise_quaternions(y, c)
-    nu = c.speed.shape[0]
-    nq = y.shape[0] - nu - 1
-    for j in range(nu):
-        f = c.speed[j].prescribed
-        if f >= 0:
-            value, rate, _ = evaluate(
-                c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
-            )
-            y[c.speed[j].coordinate] = value
-            y[nq + j] = rate
-
-
-@kernel
 def accelerations(t, y, c, w):
     """udot into w.speed.acceleration; returns a status code."""
     load_state(t, y, c, w)
@@ -84,10 +67,9 @@ def mass_matrix(t, y, c, w, M):
 @kernel
 def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, energy, momentum):
     """Everything observable at one state; w.speed is filled as well. Returns a status code.
-    Loads are those of the model: a ruthless body shows them at its rest shape. Markers move with the true deformation.
 
-    markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes; loads (N,6)
-    and wheel_loads (W,6): [torque; force] in World axes; energy (4,), momentum (6,) as in flexmb.balance.
+    Loads are those of the model: a ruthless body shows them at its rest shape. loads (N,6) and wheel_loads (W,6):
+    [torque; force] in World axes; markers, energy and momentum as in `observe_motion`.
     """
     load_state(t, y, c, w)
     status = forward_dynamics(c, w)
@@ -97,6 +79,29 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
     pose_sweep(c, w)
     hinge_loads(c, w)
     _world_loads(c, w, loads)
+    _observe_motion(c, w, marker_body, marker_port, markers, wheel_loads, energy, momentum)
+    return OK
+
+
+@kernel
+def observe_motion(t, y, rates, marker_body, marker_port, c, w, markers, wheel_loads, energy, momentum):
+    """What follows from the state and given accelerations `rates` (nu,) by kinematics and bodies' own momentum.
+
+    markers (K,24): position, R_World_marker (9), velocity (6), classical acceleration (6) in World axes, with the true
+    deformation; wheel_loads (W,6); energy (4,), momentum (6,) as in flexmb.balance.
+    """
+    load_state(t, y, c, w)
+    for j in range(rates.shape[0]):
+        w.speed[j].acceleration = rates[j]
+    velocity_sweep(c, w, False, False)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    _observe_motion(c, w, marker_body, marker_port, markers, wheel_loads, energy, momentum)
+
+
+@helper
+def _observe_motion(c, w, marker_body, marker_port, markers, wheel_loads, energy, momentum):
+    """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state."""
     _world_wheel_loads(c, w, wheel_loads)
     velocity_sweep(c, w, False, True)
     energy_and_momentum(c, w, energy, momentum)
@@ -115,7 +120,6 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
         store3(markers[i], 15, times(R, v))
         store3(markers[i], 18, times(R, alpha))
         store3(markers[i], 21, add(times(R, a), vec3(c.gravity, 0)))
-    return OK
 
 
 @helper

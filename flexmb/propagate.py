@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from flexmb.dynamics import project, rhs
+from flexmb.coordinates import project
+from flexmb.dynamics import rhs
 from flexmb.integrate.dop853 import dop853
 from flexmb.integrate.rk4 import rk4
 from flexmb.kernel import kernel

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import Literal, NamedTuple, get_args
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexmb import propagate
+from flexmb.arrays import Constants, Workspace
+from flexmb.frisch import propagation as nested_propagation
+from flexmb.frisch.tables import NestedWorkspace
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
 from flexmb.labels import state_names
 from flexmb.scene.check import check_run, check_scene
@@ -18,7 +21,7 @@ from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
 from flexmb.status import Status
-from flexmb.system import ENERGIES, DynamicsError, Evaluation, System
+from flexmb.system import ENERGIES, ERRATA, Algorithm, DynamicsError, Evaluation, System
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 Method = Literal["dop853", "rk4"]
@@ -37,6 +40,15 @@ class _Raw(NamedTuple):
     run_s: float
 
 
+class _Route(NamedTuple):
+    """An algorithm as integrators see it: its constants, a maker of workspaces, and the compiled runs."""
+
+    constants: Constants
+    workspace: Callable[[], Workspace | NestedWorkspace]
+    run_dop853: Callable[..., Any]
+    run_rk4: Callable[..., Any]
+
+
 def simulate(
     scene: Scene | System,
     t_end: float,
@@ -47,12 +59,15 @@ def simulate(
     step: float | None = None,
     samples: int | Sequence[float] | Array = 201,
     max_steps: int = 1_000_000,
+    algorithm: Algorithm = "articulated",
 ) -> Trajectory:
     """Simulate a scene from its initial state at t = 0 to `t_end` (s).
 
     method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol, in the root mean
     square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s).
     samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
+    algorithm: "articulated", the O(N) recursion, or Frisch's equations, "frisch" or "frisch_as_printed", which take
+    bodies of level `full` as `linear`; accelerations and loads of the output are theirs too.
 
     Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError for settings that make no sense. A run that fails raises nothing: `status` and
@@ -65,8 +80,8 @@ def simulate(
     _check_settings(method, rtol, atol, step, max_steps)
     times = _sample_times(samples, t_end)
     system = scene if isinstance(scene, System) else System(scene)
-    raw = _integrate(system, times, method, rtol, atol, step, max_steps)
-    return _observed(system, times, raw)
+    raw = _integrate(system, _route(system, algorithm), times, method, rtol, atol, step, max_steps)
+    return _observed(system, times, raw, algorithm)
 
 
 def switch_times(scene: Scene, t_end: float) -> list[float]:
@@ -109,8 +124,24 @@ def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array
     return times
 
 
+def _route(system: System, algorithm: Algorithm) -> _Route:
+    if algorithm == "articulated":
+        return _Route(system.constants, system.workspace, propagate.run_dop853, propagate.run_rk4)
+    if algorithm not in ERRATA:
+        raise ValueError(f"algorithm is {algorithm!r}: runs use one of 'articulated', {', '.join(map(repr, ERRATA))}")
+    nested = system.nested(algorithm)
+    return _Route(nested.constants, nested.workspace, nested_propagation.run_dop853, nested_propagation.run_rk4)
+
+
 def _integrate(
-    system: System, times: Array, method: Method, rtol: float, atol: float, step: float | None, max_steps: int
+    system: System,
+    route: _Route,
+    times: Array,
+    method: Method,
+    rtol: float,
+    atol: float,
+    step: float | None,
+    max_steps: int,
 ) -> _Raw:
     """Run once over no time at all, which compiles, and then in earnest."""
     initial = system.initial_state
@@ -118,14 +149,14 @@ def _integrate(
 
     def run(times: Array, ends: Array) -> _Raw:
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
-        counts, workspace = np.zeros(4, np.int64), system.workspace()
+        counts, workspace = np.zeros(4, np.int64), route.workspace()
         start = perf_counter()
         if method == "rk4":
-            status, t = propagate.run_rk4(y, times, ends, step, max_steps, system.constants, workspace, out, counts)
+            status, t = route.run_rk4(y, times, ends, step, max_steps, route.constants, workspace, out, counts)
         else:
             controlled = system.nq + system.nu
-            status, t = propagate.run_dop853(
-                y, times, ends, rtol, atol, controlled, max_steps, system.constants, workspace, out, counts
+            status, t = route.run_dop853(
+                y, times, ends, rtol, atol, controlled, max_steps, route.constants, workspace, out, counts
             )
         seconds = perf_counter() - start
         return _Raw(out[: counts[SAMPLES]], Status(status), int(workspace.fault[0]), t, counts.tolist(), 0.0, seconds)
@@ -134,14 +165,14 @@ def _integrate(
     return run(times, ends)._replace(compile_s=compiled.run_s)
 
 
-def _observed(system: System, times: Array, raw: _Raw) -> Trajectory:
+def _observed(system: System, times: Array, raw: _Raw, algorithm: Algorithm) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
     start = perf_counter()
     status, stopped_at, seen = raw.status, raw.t, list[Evaluation]()
     message = _message(system, raw)
     for t, y in zip(times, raw.states, strict=False):
         try:
-            evaluation = system.evaluate(t, y[: system.nq], y[system.nq : -1])
+            evaluation = system.evaluate(t, y[: system.nq], y[system.nq : -1], algorithm)
         except DynamicsError as error:  # fixed steps may have jumped over the place where the dynamics ends
             status, stopped_at, message = Status.NOT_POSITIVE_DEFINITE, float(t), f"stopped at t = {t:g} s: {error}"
             break

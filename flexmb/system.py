@@ -17,16 +17,19 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import arrays, dynamics
+from flexmb import arrays, coordinates, dynamics
 from flexmb.arrays import Constants, Real, Workspace
 from flexmb.assemble import assemble
+from flexmb.frisch.errata import AS_PRINTED, CORRECTED
+from flexmb.frisch.system import NestedSystem, Partitions
 from flexmb.links import Link, links
 from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
 from flexmb.status import OK, Status
 
-Algorithm = Literal["articulated", "composite"]
+Algorithm = Literal["articulated", "composite", "frisch", "frisch_as_printed"]
+ERRATA = {"frisch": CORRECTED, "frisch_as_printed": AS_PRINTED}
 ENERGIES = ("kinetic", "strain", "spring", "gravity")
 
 
@@ -91,7 +94,8 @@ class System:
         self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
         self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
         self._w = self.workspace()
-        self.rhs, self.project = dynamics.rhs, dynamics.project
+        self.rhs, self.project = dynamics.rhs, coordinates.project
+        self._nested: dict[str, NestedSystem] = {}
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -134,14 +138,36 @@ class System:
         """A fresh workspace for `rhs`; one per thread."""
         return _workspace(self.constants, self.nq, self.nu)
 
+    def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
+        """Frisch's equations of this scene, corrected or as printed, built at the first call.
+
+        ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
+        """
+        if algorithm not in ERRATA:
+            raise ValueError(f"algorithm must be one of {', '.join(ERRATA)}, not {algorithm!r}")
+        if algorithm not in self._nested:
+            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.nq, ERRATA[algorithm])
+        return self._nested[algorithm]
+
+    def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
+        """The partitioned equations of motion, Frisch (111), by the names of the paper."""
+        return self.nested(algorithm).partitions(state.t, _pack(state))
+
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
 
         "articulated": the O(N) recursion; "composite": mass matrix and inverse dynamics, partitioned for prescribed
-        speeds. Raises DynamicsError where an inertia is not positive definite.
+        speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter. Frisch's
+        equations are of first order in the deformation: they take bodies of level `full` as `linear`.
+        Raises DynamicsError where an inertia is not positive definite.
         """
         if algorithm not in get_args(Algorithm):
             raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
+        if algorithm in ERRATA:
+            nested = self.nested(algorithm)
+            status, rates = nested.accelerations(state.t, _pack(state))
+            self._check(status, nested.fault)
+            return rates
         self._check(dynamics.accelerations(state.t, _pack(state), self.constants, self._w))
         if algorithm == "composite":
             return self._composite(state, self._w.speed["acceleration"].copy(), self._w.speed["applied"].copy())
@@ -201,26 +227,57 @@ class System:
         """(6,) [angular about the World origin; linear], World axes."""
         return self.evaluate(state.t, state.q, state.u).momentum
 
-    def evaluate(self, t: float, q: Real, u: Real) -> Evaluation:
-        """Everything observable at one state; DynamicsError where the accelerations do not exist."""
+    def evaluate(self, t: float, q: Real, u: Real, algorithm: Algorithm = "articulated") -> Evaluation:
+        """Everything observable at one state; DynamicsError where the accelerations do not exist.
+
+        With "frisch" or "frisch_as_printed", accelerations, hinge loads, drive loads and wheel torques are those of
+        these equations; a wheel's force follows from its acceleration (the paper counts its mass as the body's).
+        """
+        if algorithm in ERRATA:
+            return self._evaluate_nested(t, np.concatenate([q, u, [0.0]]), self.nested(algorithm))
+        if algorithm != "articulated":
+            raise ValueError(f"algorithm must be articulated, {' or '.join(ERRATA)}, not {algorithm!r}")
         c, w = self.constants, self._w
-        markers, loads = np.zeros((len(self._markers), 24)), np.zeros((len(self._links), 6))
-        wheel_loads, energy, momentum = np.zeros((len(c.wheel), 6)), np.zeros(4), np.zeros(6)
+        markers, wheel_loads, energy, momentum = self._outputs()
+        loads = np.zeros((len(self._links), 6))
         y = np.concatenate([q, u, [0.0]])
         self._check(
             dynamics.observe(
                 t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
             )
         )
+        return self._evaluation(
+            w.speed["acceleration"].copy(), w.speed["drive"], markers, loads, wheel_loads, energy, momentum
+        )
+
+    def _evaluate_nested(self, t: float, y: Real, nested: NestedSystem) -> Evaluation:
+        status, motion = nested.motion(t, y)
+        self._check(status, nested.fault)
+        rates = motion.accelerations
+        markers, wheel_loads, energy, momentum = self._outputs()
+        dynamics.observe_motion(
+            t, y, rates, self._marker_body, self._marker_port, self.constants, self._w,
+            markers, wheel_loads, energy, momentum,
+        )  # fmt: skip
+        wheel_loads[:, :3] = motion.wheel_torques
+        return self._evaluation(rates, motion.drives, markers, motion.loads, wheel_loads, energy, momentum)
+
+    def _outputs(self) -> tuple[Real, Real, Real, Real]:
+        """Markers, wheel loads, energy and momentum to be filled."""
+        return np.zeros((len(self._markers), 24)), np.zeros((len(self.constants.wheel), 6)), np.zeros(4), np.zeros(6)
+
+    def _evaluation(
+        self, rates: Real, drive: Real, markers: Real, loads: Real, wheel_loads: Real, energy: Real, momentum: Real
+    ) -> Evaluation:
         return Evaluation(
-            accelerations=w.speed["acceleration"].copy(),
+            accelerations=rates,
             markers={
                 name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
                 for name, row in zip(self._markers, markers, strict=True)
             },
             loads=self._by_hinge(loads),
             wheel_loads=dict(zip(self._wheel_names, wheel_loads, strict=True)),
-            drives=self._drives(w.speed["drive"]),
+            drives=self._drives(drive),
             energy=dict(zip(ENERGIES, energy.tolist(), strict=True)),
             momentum=momentum,
         )
@@ -238,9 +295,10 @@ class System:
                 found[name] = drive[place][driven].copy()
         return found
 
-    def _check(self, status: int) -> None:
+    def _check(self, status: int, fault: int | None = None) -> None:
+        """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
-            body = self.body_names[int(self._w.fault[0])]
+            body = self.body_names[int(self._w.fault[0]) if fault is None else fault]
             raise DynamicsError(Status(status).advice.format(body=f'"{body}"'))
 
 
@@ -248,7 +306,7 @@ def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as
     """Check a scene and turn it into arrays.
 
     Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
-    supported yet (loop closures, SID files, levels "linear" and "stiffened").
+    supported yet (loop closures, SID files, level "stiffened").
     """
     check_scene(scene)
     return System(scene)
