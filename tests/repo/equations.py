@@ -103,13 +103,14 @@ class Index:
                 faults.append(f"({n}) is cited by {code[0].path} {code[0].name}: take the reason out of the data file")
             if code and not tests:
                 faults.append(f"({n}) is cited by {code[0].path} {code[0].name}, but by no test")
-            for named in _numbers_in(equation.none):
+            for named in numbers_in(equation.none):
                 if named not in expected:
                     faults.append(f"({n}): its reason names ({named}), which does not exist")
         return faults
 
 
-def _numbers_in(text: str) -> list[int]:
+def numbers_in(text: str) -> list[int]:
+    """Numbers in parentheses."""
     return [int(number) for number in re.findall(r"\((\d+)\)", text)]
 
 
@@ -152,7 +153,7 @@ def _errata(paper: Paper, root: Path) -> dict[int, str]:
     source = root / "docs" / paper.errata
     links: dict[int, str] = {}
     for heading in re.findall(r"^#+ (.*)$", source.read_text(encoding="utf-8"), flags=re.MULTILINE):
-        for number in _numbers_in(heading):
+        for number in numbers_in(heading):
             links.setdefault(number, f"{paper.errata}#{anchor(heading)}")
     return links
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from flexmb.frisch.errata import Erratum
 from tests.repo.citations import Sources, numbers, texts
-from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, page, papers
+from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, numbers_in, page, papers
 from tests.repo.project import ROOT
 
 SOURCES = Sources(
@@ -35,13 +36,36 @@ def test_every_equation_has_code_and_test_or_a_reason(indices: list[Index]) -> N
 
 
 def test_errata_name_tests_and_equations_that_exist(indices: list[Index]) -> None:
-    """`path.py::test_name` on a page of errata is a test; a link to an equation is one of the table."""
+    """`path.py::test_name` on a page of errata is a test; its headings name equations of the paper."""
     for index in indices:
-        text = (ROOT / "docs" / index.paper.errata).read_text(encoding="utf-8")
+        text = _errata(index)
         for path, name in re.findall(r"`([\w/]+\.py)::(\w+)`", text):
             assert name in texts((ROOT / path).read_text(encoding="utf-8")), f"{path} has no {name}"
-        linked = {int(number) for number in re.findall(r"equations\.md#eq-(\d+)", text)}
-        assert linked <= {equation.number for equation in index.paper.equations}
+        known = {equation.number for equation in index.paper.equations}
+        assert all(set(numbers_in(heading)) <= known for heading in _headings(text))
+
+
+def test_links_within_errata(indices: list[Index]) -> None:
+    for index in indices:
+        text = _errata(index)
+        assert set(re.findall(r"\]\(#([\w-]+)\)", text)) <= {anchor(heading) for heading in _headings(text)}
+
+
+def test_every_switch_of_the_print_is_explained(indices: list[Index]) -> None:
+    """Each member of Erratum is in the table of the page, in a row that names its equations."""
+    (frisch,) = (index for index in indices if "Frisch" in index.paper.sources.names)
+    rows = [line for line in _errata(frisch).splitlines() if line.startswith("| [(")]
+    for erratum in Erratum:
+        (row,) = (row for row in rows if f"`{erratum.name}`" in row)
+        assert set(numbers_in(erratum.value)) <= set(numbers_in(row)), row
+
+
+def _errata(index: Index) -> str:
+    return (ROOT / "docs" / index.paper.errata).read_text(encoding="utf-8")
+
+
+def _headings(text: str) -> list[str]:
+    return re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize(
