@@ -18,7 +18,7 @@ from flexmb.dense.profiles import profile
 from flexmb.scene import schema as s
 from flexmb.system import Evaluation, System
 from tests import trees
-from tests.bounds import algebra
+from tests.bounds import algebra, observed_order
 from tests.flexmb import spectral
 
 SMALL = replace(trees.FULL, bodies=5)
@@ -169,10 +169,16 @@ def test_a_force_that_belongs_to_no_energy_is_noticed(tamper):
     assert abs(power_defect(system)[1]) > 100.0 * bound
 
 
-def test_ruthless_bodies_do_not_conserve_energy():
-    """Their bias is not derived from their kinetic energy; the balance must say so."""
-    bound, defect = power_defect(flexmb.compile(trees.random_scene(23, replace(trees.RUTHLESS, bodies=4))))
-    assert abs(defect) > 100.0 * bound
+ORDERS = {"ruthless": (trees.RUTHLESS, 1.0), "linear": (trees.LINEAR, 2.0)}
+
+
+@pytest.mark.parametrize(("recipe", "order"), ORDERS.values(), ids=ORDERS.keys())
+def test_truncated_levels_do_not_conserve_energy(recipe, order):
+    """Their bias is not derived from their kinetic energy: the balance fails, by the order that was dropped."""
+    sizes = np.logspace(-1, -3, 5)
+    systems = [flexmb.compile(trees.random_scene(26, replace(recipe, bodies=4, deformation=x))) for x in sizes]
+    bounds, defects = np.abs([power_defect(system) for system in systems]).T
+    assert observed_order(sizes, defects, floor=np.max(bounds), last=3) == pytest.approx(order, abs=0.1)
 
 
 def power_defect(system: System) -> tuple[float, float]:

@@ -48,9 +48,10 @@ def test_energy_and_momentum_of_free_flying_trees_are_conserved(name, seed):
         assert np.max(np.abs(done.momentum_drift[:, part])) <= 1e-10 * np.max(np.abs(done.momentum[0, part]))
 
 
-def test_ruthless_bodies_drift():
-    """The level that is not conservative is seen to be: the bounds above can be missed."""
-    done = run(replace(FULL, levels=("ruthless",)), 40, 2.0)
+@pytest.mark.parametrize("level", ["ruthless", "linear"])
+def test_truncated_levels_drift(level):
+    """The levels that are not conservative are seen to be: the bounds above can be missed."""
+    done = run(replace(FULL, levels=(level,)), 40, 2.0)
     assert np.max(np.abs(done.energy_drift)) > 1e-6 * done.energy_scale
 
 

@@ -106,13 +106,15 @@ def test_levels_to_come_are_refused_honestly(scene):
         flexmb.compile(at_level(scene, "stiffened"))
 
 
-def mass_on_a_radial_spring(level: s.Level, eta: float, rate: float = 0.0, torque: float = 0.0) -> s.Scene:
-    """1 kg at 1 m from a hinge, on a spring of 4 N/m along its radius: its inertia is (1 + eta)^2, 1 + 2 eta, or 1."""
+def mass_on_a_radial_spring(
+    level: s.Level, eta: float, rate: float = 0.0, torque: float = 0.0, turn: float = 0.0, stiffness: float = 4.0
+) -> s.Scene:
+    """1 kg at 1 m from a hinge, on a spring along its radius: its inertia is (1 + eta)^2, 1 + 2 eta, or 1."""
     point = inertia_points([1.0], [[1.0, 0.0, 0.0]], [[[1.0], [0.0], [0.0]]])
     return (
         SceneBuilder("mass on a radial spring")
-        .modal_body("arm", points=point, stiffness=[[4.0]], level=level)
-        .revolute("pivot", "ground", "arm", torque=s.Constant(value=torque))
+        .modal_body("arm", points=point, stiffness=[[stiffness]], level=level)
+        .revolute("pivot", "ground", "arm", rate=turn, torque=s.Constant(value=torque))
         .modal_state("arm", coordinates=[eta], rates=[rate])
         .scene()
     )
@@ -133,6 +135,20 @@ def test_a_mass_matrix_that_left_its_range_is_a_status_with_advice():
     full.accelerations(full.initial_state)
     with pytest.raises(DynamicsError, match='body "arm" .* first-order mass matrix .* use level "full"'):
         linear.accelerations(linear.initial_state)
+
+
+@pytest.mark.parametrize(("level", "order"), [("ruthless", 1.0), ("linear", 2.0)])
+def test_runs_part_by_the_order_of_the_error(level, order):
+    """At 1 rad/s the arm swings out by about 2/stiffness: by that, or by its square, the hinge's rate is wrong."""
+    stiffness, errors = np.array([200.0, 400.0, 800.0, 1600.0]), []
+    for k in stiffness:
+        exact, run = (
+            flexmb.simulate(mass_on_a_radial_spring(each, 0.0, turn=1.0, stiffness=k), 1.0, rtol=1e-12, atol=1e-14)
+            for each in ("full", level)
+        )
+        assert run.finished, run.message
+        errors.append(np.max(np.abs(run.u[:, 0] - exact.u[:, 0])))
+    assert observed_order(1.0 / stiffness, errors, floor=1e-11) == pytest.approx(order, abs=0.1)
 
 
 def test_a_run_that_leaves_the_range_stops_there():

@@ -94,11 +94,13 @@ def test_an_unknown_algorithm_is_refused(system):
         system.accelerations(system.initial_state, "magic")
 
 
-def test_hinge_loads_by_inverse_dynamics_are_those_of_the_recursion(system):
+@pytest.mark.parametrize("levels", [("full",), ("linear",), ("linear", "full", "ruthless", "rigid")], ids="-".join)
+def test_hinge_loads_by_inverse_dynamics_are_those_of_the_recursion(levels):
     """Two routes: P_R alpha + z_R outward, and M alpha + b summed inward for the accelerations given.
 
     Both are sums in which modal inertia and elastic forces cancel: rounding is relative to those terms.
     """
+    system = flexmb.compile(trees.random_scene(SEED, replace(RECIPE, levels=levels, deformation=0.03)))
     state = system.initial_state
     rates = system.accelerations(state)
     ours, forced = system.hinge_loads(state), system.hinge_loads(state, rates)
