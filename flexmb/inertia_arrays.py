@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb import arrays as a
 from flexmb.links import Link
@@ -50,7 +53,7 @@ def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict
     return tables, {"point": point, "point_mode": shapes}
 
 
-def _rows(tables: list[a.Real | None], empty: a.Real) -> tuple[list[int], a.Real]:
+def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[list[int], NDArray[Any]]:
     """By body the number of its table, -1 for none; and the tables, each enlarged to the shape of `empty`."""
     some = [table for table in tables if table is not None]
     out = np.zeros((len(some), *empty.shape), empty.dtype)

@@ -106,6 +106,17 @@ def test_levels_to_come_are_refused_honestly(scene):
         flexmb.compile(at_level(scene, "stiffened"))
 
 
+def test_tables_are_no_larger_than_the_bodies_that_need_them():
+    """Slopes by body of level `linear`; those of modal masses, cubic in the modes, where inertia turns or hangs off."""
+    arm = flexmb.compile(mass_on_a_radial_spring("linear", 0.0)).constants
+    assert (arm.slope.shape, arm.mass_slope.shape) == ((1, 1, 1), (0, 1, 1, 1))
+    recipe = replace(RECIPE, carriers=("modal", "rigid"), levels=("linear", "linear", "full", "full"), bodies=4)
+    tree = flexmb.compile(trees.random_scene(32, recipe)).constants
+    assert (len(tree.slope), len(tree.mass_slope), len(tree.mode)) == (1, 1, 6)
+    full = flexmb.compile(mass_on_a_radial_spring("full", 0.0)).constants
+    assert len(full.slope) == len(full.mass_slope) == 0
+
+
 def mass_on_a_radial_spring(
     level: s.Level, eta: float, rate: float = 0.0, torque: float = 0.0, turn: float = 0.0, stiffness: float = 4.0
 ) -> s.Scene:
