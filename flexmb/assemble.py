@@ -55,8 +55,14 @@ def body_port(link: Link, node: str, offset: s.Vector) -> Port:
     return port(link.model, node, offset, IDENTITY, np.eye(3))
 
 
-def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a.Constants, dict[str, tuple[int, int]]]:
-    """Constants of the scene, and (body, port) of every marker."""
+def assemble(
+    scene: s.Scene, chain: list[Link], numbering: Numbering, null_partitions: bool = False
+) -> tuple[a.Constants, dict[str, tuple[int, int]]]:
+    """Constants of the scene, and (body, port) of every marker.
+
+    `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
+    computed all the same.
+    """
     index = {link.name: k for k, link in enumerate(chain)}
     functions, ports = Functions(), Ports(chain)
     wheels = [wheel for link in chain for wheel in scene.wheels if wheel.body == link.name]
@@ -70,7 +76,8 @@ def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering) -> tuple[a
         link.inboard if link.parent == GROUND else _moved(link.inboard, chain[index[link.parent]]) for link in chain
     ]
     inboard_ports = [
-        ports.add(index[link.parent], at) if at.deforms else None for link, at in zip(chain, inboard, strict=True)
+        ports.add(index[link.parent], at) if at.deforms or (null_partitions and link.parent != GROUND) else None
+        for link, at in zip(chain, inboard, strict=True)
     ]
     outboard_ports = [ports.add(k, link.outboard) if link.outboard.deforms else None for k, link in enumerate(chain)]
     wheel_ports, load_ports = [place(wheel) for wheel in wheels], [place(load) for load in loads]

@@ -29,3 +29,11 @@ class Numbering:
         self.u[name] = slice(self.nu, self.nu + nu)
         self.nq += nq
         self.nu += nu
+
+
+def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
+    """Wheels of every body that has some, in the scene's order."""
+    found: dict[str, list[s.Wheel]] = {}
+    for wheel in scene.wheels:
+        found.setdefault(wheel.body, []).append(wheel)
+    return found

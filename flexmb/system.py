@@ -23,7 +23,7 @@ from flexmb.assemble import assemble
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.frisch.system import NestedSystem, Partitions
 from flexmb.links import Link, links
-from flexmb.numbering import Numbering
+from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
 from flexmb.status import OK, Status
@@ -85,9 +85,7 @@ class System:
     def __init__(self, scene: s.Scene) -> None:
         self.scene = scene
         self._links = links(scene)
-        self._wheels: dict[str, list[s.Wheel]] = {}
-        for wheel in scene.wheels:
-            self._wheels.setdefault(wheel.body, []).append(wheel)
+        self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
         self.constants, self._markers = assemble(scene, self._links, self._numbering)
         self.nq, self.nu = self._numbering.nq, self._numbering.nu

@@ -19,14 +19,19 @@ _SWITCHES = (
 )  # fmt: skip
 
 
-def nested_constants(constants: a.Constants, chain: list[Link], errata: Set[Erratum]) -> t.NestedConstants:
+def nested_constants(
+    constants: a.Constants, chain: list[Link], errata: Set[Erratum], null_partitions: bool = False
+) -> t.NestedConstants:
     """The scene's constants with the tables Frisch's equations need, keeping the print's `errata`.
+
+    Null partitions phiR_H, phiT_H, phiR_W of hinges and wheels at nodes that do not deform are skipped, unless
+    `null_partitions` keeps those that the constants have ports for.
 
     ValueError where a body has modes that are not clamped at its origin and the print is to be followed.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mode.shape[1])
-    column, rows, wheel_entry = _places(constants, element)
+    column, rows, wheel_entry = _places(constants, element, null_partitions)
     return t.NestedConstants(
         **{field.name: getattr(constants, field.name) for field in fields(constants)},
         element=element,
@@ -89,8 +94,10 @@ def _six(tensors: a.Real) -> a.Real:
     return np.stack([0.5 * (tensors[..., i, j] + tensors[..., j, i]) for i, j in _SIX], axis=-1)
 
 
-def _places(c: a.Constants, element: a.Record) -> tuple[a.Record, a.Index, a.Record]:
-    """Columns of S and their expanded rows; completes `element`. Partitions that are null have no entries."""
+def _places(
+    c: a.Constants, element: a.Record, null_partitions: bool
+) -> tuple[a.Record, a.Index, a.Record]:
+    """Columns of S and their expanded rows; completes `element`."""
     bodies, wheels = len(c.body), len(c.wheel)
     modes = int(np.sum(c.body["modes"]))
     hinges = 3 * bodies + 3 * wheels + modes
@@ -118,7 +125,7 @@ def _places(c: a.Constants, element: a.Record) -> tuple[a.Record, a.Index, a.Rec
             wheel_rows = [*range(3 * bodies + 3 * i, 3 * bodies + 3 * i + 3)]
             own[int(c.wheel["u_index"][i])], modal[int(c.wheel["u_index"][i])] = wheel_rows, []
             body_of[c.wheel["u_index"][i]] = k
-            turns = np.any(c.port_mode["rotation"][c.wheel["port"][i]])
+            turns = null_partitions or np.any(c.port_mode["rotation"][c.wheel["port"][i]])
             wheel_entry[i] = (k, 1 + len(moved) if turns else -1)
             moved = moved + (wheel_rows if turns else [])
         for n in range(body["modes"]):

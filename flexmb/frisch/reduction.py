@@ -21,28 +21,58 @@ def reduce(c, w):
     """M and right side of the scalar equations (136), (138), (141) in the speeds."""
     _bias(c, w)
     _times(w, w.x, w.y)
-    nu, nx = w.M.shape[0], w.Z.shape[0]
+    _product(c, w)
+    nu = w.M.shape[0]
     one_sided = c.printed[ONE_SIDED] == 1
-    for j in range(nu):
-        row = w.product[j]
-        for r in range(nx):
-            row[r] = 0.0
-        for e in range(c.column[j].start, c.column[j].stop):
-            _axpy(w.S[e], w.Z[c.entry_row[e]], row)
     for i in range(nu):
-        stop = c.column[i].own if one_sided else c.column[i].stop
-        force = w.speed[i].applied
-        for e in range(c.column[i].start, stop):
+        start, stop = c.column[i].start, c.column[i].stop
+        first = i  # of a symmetric matrix the upper triangle is enough
+        if one_sided:
+            stop, first = c.column[i].own, 0
+        row, force = w.M[i, first:], w.speed[i].applied
+        _combine(c, w, start, stop, w.product, first, row)
+        for e in range(start, stop):
             r = c.entry_row[e]
             force += w.S[e] * (w.eta[r] - w.y[r])
         w.right[i] = force
-        for j in range(0 if one_sided else i, nu):
-            total = 0.0
-            for e in range(c.column[i].start, stop):
-                total += w.S[e] * w.product[j, c.entry_row[e]]
-            w.M[i, j] = total
-            if not one_sided:
-                w.M[j, i] = total
+        if not one_sided:
+            for j in range(i, nu):
+                w.M[j, i] = w.M[i, j]
+
+
+@helper
+def _product(c, w):
+    """Z S, expanded rows by speeds; a few columns at a time are turned into rows, a cache line of each."""
+    nu, buffer = w.M.shape[0], w.columns
+    for j in range(0, nu, buffer.shape[0]):
+        count = min(nu - j, buffer.shape[0])
+        for i in range(count):
+            _combine(c, w, c.column[j + i].start, c.column[j + i].stop, w.Z, 0, buffer[i])
+        for r in range(buffer.shape[1]):
+            for i in range(count):
+                w.product[r, j + i] = buffer[i, r]
+
+
+@helper
+def _combine(c, w, start, stop, X, first, y):
+    """y = sum of the rows of X, from `first` on, that entries start .. stop of S name, times the entries.
+
+    The one entry of a mode's own row comes first; all others are components of vectors, three at a time.
+    """
+    for i in range(y.shape[0]):
+        y[i] = 0.0
+    e = start
+    if (stop - start) % 3 == 1:
+        _axpy(w.S[e], X[c.entry_row[e], first:], y)
+        e += 1
+    while e < stop:
+        r = c.entry_row[e]
+        s0, s1, s2 = w.S[e], w.S[e + 1], w.S[e + 2]
+        a, b, d = X[r, first:], X[r + 1, first:], X[r + 2, first:]
+        if s0 != 0.0 or s1 != 0.0 or s2 != 0.0:  # revolute hinges do not translate, bending modes do not stretch
+            for i in range(y.shape[0]):
+                y[i] += s0 * a[i] + s1 * b[i] + s2 * d[i]
+        e += 3
 
 
 @helper
@@ -50,6 +80,7 @@ def solve(c, w):
     """Accelerations of the free speeds (144), given those of the predefined ones; a status code."""
     nu = w.u.shape[0]
     free = nu
+    one_sided = c.printed[ONE_SIDED] == 1
     for j in range(nu):
         f = c.speed[j].prescribed
         if f >= 0:
@@ -58,11 +89,11 @@ def solve(c, w):
     for a in range(free):
         i = w.free[a]
         w.solution[a] = w.right[i]
-        for b in range(free):
+        for b in range(0 if one_sided else a, free):
             w.factor[a, b] = w.M[i, w.free[b]]
         for b in range(free, nu):
             w.solution[a] -= w.M[i, w.free[b]] * w.speed[w.free[b]].acceleration
-    failed = _eliminate(w, free) if c.printed[ONE_SIDED] == 1 else _cholesky(w, free)
+    failed = _eliminate(w, free) if one_sided else _cholesky(w, free)
     if failed >= 0:
         w.fault[0] = c.column[w.free[failed]].body
         return NOT_POSITIVE_DEFINITE
@@ -114,33 +145,46 @@ def _times(w, x, y):
 
 @helper
 def _axpy(s, x, y):
-    for r in range(y.shape[0]):
-        y[r] += s * x[r]
+    """y += s x."""
+    if s != 0.0:
+        for r in range(y.shape[0]):
+            y[r] += s * x[r]
 
 
 @helper
 def _cholesky(w, n):
-    """Solve with w.factor = U' U, by rows; the place of a pivot that is not positive to round-off, else -1."""
+    """Solve with w.factor = U' U, row by row; the place of a pivot that is not positive to round-off, else -1."""
     U, x = w.factor, w.solution
-    for j in range(n):
-        w.floor[j] = SINGULAR * U[j, j]
-    for j in range(n):
-        if not U[j, j] > w.floor[j]:
-            return j
-        d = 1.0 / sqrt(U[j, j])
-        for i in range(j, n):
-            U[j, i] *= d
-        x[j] *= d
-        for m in range(j + 1, n):
-            s = U[j, m]
-            x[m] -= s * x[j]
-            for i in range(m, n):
-                U[m, i] -= s * U[j, i]
-    for j in range(n - 1, -1, -1):
-        for i in range(j + 1, n):
-            x[j] -= U[j, i] * x[i]
-        x[j] /= U[j, j]
+    for m in range(n):
+        row, floor = U[m, m:n], SINGULAR * U[m, m]
+        j = 0
+        while j + 3 < m:  # four rows above at a time: the row stays in registers
+            _axpy4(U[j : j + 4, m], U[j, m:n], U[j + 1, m:n], U[j + 2, m:n], U[j + 3, m:n], row)
+            j += 4
+        while j < m:
+            _axpy(-U[j, m], U[j, m:n], row)
+            j += 1
+        if not row[0] > floor:
+            return m
+        d = 1.0 / sqrt(row[0])
+        for i in range(row.shape[0]):
+            row[i] *= d
+        for j in range(m):
+            x[m] -= U[j, m] * x[j]
+        x[m] *= d
+    for m in range(n - 1, -1, -1):
+        for i in range(m + 1, n):
+            x[m] -= U[m, i] * x[i]
+        x[m] /= U[m, m]
     return -1
+
+
+@helper
+def _axpy4(s, a, b, c, d, y):
+    """y -= s0 a + s1 b + s2 c + s3 d."""
+    s0, s1, s2, s3 = s[0], s[1], s[2], s[3]
+    for i in range(y.shape[0]):
+        y[i] -= s0 * a[i] + s1 * b[i] + s2 * c[i] + s3 * d[i]
 
 
 @helper
@@ -160,10 +204,8 @@ def _eliminate(w, n):
             x[j], x[p] = x[p], x[j]
         for m in range(j + 1, n):
             s = A[m, j] / A[j, j]
-            if s != 0.0:
-                x[m] -= s * x[j]
-                for i in range(j, n):
-                    A[m, i] -= s * A[j, i]
+            x[m] -= s * x[j]
+            _axpy(-s, A[j, j:n], A[m, j:n])
     for j in range(n - 1, -1, -1):
         for i in range(j + 1, n):
             x[j] -= A[j, i] * x[i]

@@ -9,11 +9,14 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.arrays import Constants, Real
+from flexmb.assemble import assemble
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
 from flexmb.frisch.errata import CORRECTED, Erratum
 from flexmb.frisch.tables import NestedWorkspace, workspace
-from flexmb.links import Link
+from flexmb.links import Link, links
+from flexmb.numbering import Numbering, wheels_by_body
+from flexmb.scene.schema import Scene
 
 
 @dataclass(frozen=True)
@@ -61,11 +64,31 @@ class Motion(NamedTuple):
     wheel_torques: Real
 
 
+def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partitions: bool = False) -> NestedSystem:
+    """Frisch's equations of a checked scene with any of the print's defects kept.
+
+    `null_partitions` computes the partitions of (126) that vanish instead of skipping them: the difference is the
+    price of not having the paper's logic flags.
+    """
+    chain = links(scene)
+    numbering = Numbering(chain, wheels_by_body(scene))
+    constants, _ = assemble(scene, chain, numbering, null_partitions)
+    return NestedSystem(constants, chain, numbering.nq, errata, null_partitions)
+
+
 class NestedSystem:
     """The equations of one scene. It owns one workspace: threads must not share it."""
 
-    def __init__(self, constants: Constants, chain: list[Link], nq: int, errata: Set[Erratum] = CORRECTED) -> None:
-        self.constants = nested_constants(constants, chain, errata)
+    def __init__(
+        self,
+        constants: Constants,
+        chain: list[Link],
+        nq: int,
+        errata: Set[Erratum] = CORRECTED,
+        null_partitions: bool = False,
+    ) -> None:
+        """`errata` of the print are kept; `null_partitions`: see `flexmb.frisch.constants.nested_constants`."""
+        self.constants = nested_constants(constants, chain, errata, null_partitions)
         self._nq = nq
         self._w = self.workspace()
 

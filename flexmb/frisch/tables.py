@@ -126,13 +126,13 @@ class NestedWorkspace:
     x: Real  # (nx,) expanded accelerations
     y: Real  # (nx,) Z x
     eta: Real  # (nx,) right side of (111) without hinge loads
-    product: Real  # (nu,nx) rows Z S_j
+    columns: Real  # (8,nx) columns of Z S
+    product: Real  # (nx,nu) Z S
     M: Real  # (nu,nu) (136), corrected: S' Z S
     right: Real  # (nu,)
     free: Index  # (nu,) the free speeds, then the prescribed ones
     factor: Real  # (nu,nu) partition Z*_11 of (143) and its factor
     solution: Real  # (nu,)
-    floor: Real  # (nu,) pivots below it are zero to round-off
     fault: Index  # (1,)
 
 
@@ -159,12 +159,12 @@ def workspace(c: NestedConstants, nq: int) -> NestedWorkspace:
         x=np.zeros(nx),
         y=np.zeros(nx),
         eta=np.zeros(nx),
-        product=np.zeros((nu, nx)),
+        columns=np.zeros((8, nx)),
+        product=np.zeros((nx, nu)),
         M=np.zeros((nu, nu)),
         right=np.zeros(nu),
         free=np.concatenate([np.flatnonzero(~fixed), np.flatnonzero(fixed)]).astype(np.int64),
         factor=np.zeros((nu, nu)),
         solution=np.zeros(nu),
-        floor=np.zeros(nu),
         fault=np.zeros(1, np.int64),
     )
