@@ -125,7 +125,10 @@ class Model(Protocol):
 
 @runtime_checkable
 class Engine(Protocol):
-    """An independent multibody code behind one adapter. Entry-point group: `crosscheck.engines`."""
+    """An independent multibody code behind one adapter. Entry-point group: `crosscheck.engines`.
+
+    An engine may have a `summary`, one line that `crosscheck engines` shows.
+    """
 
     name: str
 

@@ -1,4 +1,9 @@
-"""The native adapter: flexmb itself behind the engine contract. Conventions already agree; nothing is converted."""
+"""The native adapters: flexmb itself behind the engine contract. Conventions already agree; nothing is converted.
+
+`native` is the O(N) recursion. `native-frisch` are the nested-body equations of Frisch (1975), corrected, and
+`native-frisch-as-printed` the same to the letter of the print: other equations for accelerations, loads and drives, on
+the same kinematics. Frisch's are of first order in the deformation, which is what level `linear` asks for.
+"""
 
 from __future__ import annotations
 
@@ -7,10 +12,9 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
-from flexmb.scene.check import SceneError
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import RigidBody, Scene
 from flexmb.simulation import simulate
-from flexmb.system import System, compile
+from flexmb.system import ERRATA, Algorithm, System, compile
 from flexmb.trajectory import Trajectory as NativeTrajectory
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
@@ -18,9 +22,17 @@ _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the
 
 
 class NativeEngine:
-    """flexmb at the levels the scene asks for, with DOP853."""
+    """flexmb with one of its algorithms, at the levels the scene asks for, with DOP853."""
 
-    name = "native"
+    def __init__(
+        self,
+        name: str = "native",
+        algorithm: Algorithm = "articulated",
+        summary: str = "flexmb: the O(N) recursion",
+    ) -> None:
+        self.name = name
+        self.summary = summary
+        self._algorithm: Algorithm = algorithm
 
     def version(self) -> str:
         try:
@@ -30,24 +42,41 @@ class NativeEngine:
 
     def supports(self, scene: Scene) -> Support:
         try:
-            compile(scene)
-        except (SceneError, NotImplementedError) as error:
+            self.compile(scene)
+        except (ValueError, NotImplementedError) as error:  # a faulty scene among the former
             return Support("no", str(error))
-        return Support("exact")
+        reason = _approximation(scene, self._algorithm)
+        return Support("surrogate", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         """A ladder of tolerances; DOP853 finds the steps that fit the scene."""
         return tuple(Effort("tolerance", value, "dop853") for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
-        return NativeModel(compile(scene))
+        """ValueError where the print does not apply: modes that are not clamped at the hinge."""
+        system = compile(scene)
+        if self._algorithm in ERRATA:
+            system.nested(self._algorithm)
+        return NativeModel(system, self._algorithm)
+
+
+def frisch() -> NativeEngine:
+    """The corrected equations of 1975."""
+    return NativeEngine("native-frisch", "frisch", "flexmb: Frisch's equations of 1975, first order")
+
+
+def frisch_as_printed() -> NativeEngine:
+    """The same to the letter."""
+    summary = "flexmb: the same as printed, errors included"
+    return NativeEngine("native-frisch-as-printed", "frisch_as_printed", summary)
 
 
 class NativeModel:
-    """A compiled system."""
+    """A compiled system with the algorithm that runs it."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, algorithm: Algorithm) -> None:
         self._system = system
+        self._algorithm: Algorithm = algorithm
 
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
@@ -55,7 +84,7 @@ class NativeModel:
 
     def evaluate(self) -> Snapshot:
         state = self._system.initial_state
-        seen = self._system.evaluate(0.0, state.q, state.u)
+        seen = self._system.evaluate(0.0, state.q, state.u, self._algorithm)
         return Snapshot(
             markers={
                 name: MarkerSnapshot(m.position, m.quaternion, m.velocity, m.acceleration)
@@ -70,13 +99,14 @@ class NativeModel:
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         """A tolerance drives DOP853 (atol a hundredth of rtol), a step RK4."""
-        t_end = float(run.times[-1])
+        t_end, system, algorithm = float(run.times[-1]), self._system, self._algorithm
         if effort.kind == "tolerance":
+            atol = _ABSOLUTE * effort.value
             done = simulate(
-                self._system, t_end, "dop853", rtol=effort.value, atol=_ABSOLUTE * effort.value, samples=run.times
+                system, t_end, "dop853", rtol=effort.value, atol=atol, samples=run.times, algorithm=algorithm
             )
         else:
-            done = simulate(self._system, t_end, "rk4", step=effort.value, samples=run.times)
+            done = simulate(system, t_end, "rk4", step=effort.value, samples=run.times, algorithm=algorithm)
         return Trajectory(
             status=_status(done),
             message="" if done.finished else done.message,
@@ -93,6 +123,19 @@ class NativeModel:
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
         )
+
+
+def _approximation(scene: Scene, algorithm: Algorithm) -> str:
+    """What an algorithm leaves out of the scene's levels or does wrong with them, "" if nothing."""
+    flexible = [body for body in scene.bodies if not isinstance(body, RigidBody) and body.level != "rigid"]
+    full = [f'"{body.name}"' for body in flexible if body.level == "full"]
+    first_order = f'level "full" of {", ".join(full)} to first order in the modal coordinates' if full else ""
+    match algorithm:
+        case "frisch":
+            return first_order
+        case "frisch_as_printed" if flexible:
+            return f"{first_order}; the print's errors included" if full else "the print's errors included"
+    return ""
 
 
 def _status(done: NativeTrajectory) -> Status:

@@ -12,6 +12,8 @@ GROUP = "crosscheck.engines"
 
 BUILT_IN = {
     "native": "crosscheck.engines.native:NativeEngine",
+    "native-frisch": "crosscheck.engines.native:frisch",
+    "native-frisch-as-printed": "crosscheck.engines.native:frisch_as_printed",
     "pinocchio": "crosscheck.engines.pinocchio:PinocchioEngine",
     "mujoco": "crosscheck.engines.mujoco:MujocoEngine",
     "exudyn": "crosscheck.engines.exudyn:ExudynEngine",

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from rich.console import Console
 from rich.markup import escape
-from rich.table import Table
+from rich.table import Column, Table
 
 from crosscheck.engine_list import EngineState
 from crosscheck.library import Case
@@ -82,10 +82,10 @@ def cases_table(cases: Iterable[Case]) -> Table:
 
 def engines_table(states: Iterable[EngineState]) -> Table:
     """The engines."""
-    table = Table("engine", "version", "how to install", header_style="bold")
+    table = Table(Column("engine", no_wrap=True), "what it is", "version", "how to install", header_style="bold")
     for state in states:
         version = (
             "[yellow]not installed[/yellow]" if state.version is None else f"[green]{escape(state.version)}[/green]"
         )
-        table.add_row(state.name, version, escape(state.advice))
+        table.add_row(state.name, escape(state.summary), version, escape(state.advice))
     return table

@@ -56,11 +56,12 @@ def test_an_unknown_case_ends_with_two(runner: CliRunner, tmp_path: Path) -> Non
 
 
 def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypatch: pytest.MonkeyPatch) -> None:
-    states = [EngineState("fine", "1.0", ""), EngineState("absent", None, "pip install 'flexmb[absent]'")]
+    states = [EngineState("fine", "1.0", "", "a pendulum"), EngineState("absent", None, "pip install 'flexmb[absent]'")]
     monkeypatch.setattr(cli, "describe_engines", lambda: states)
     output = runner.invoke(cli.app, ["engines"], env=WIDE).output
     assert "not installed" in output
     assert "pip install 'flexmb[absent]'" in output
+    assert "a pendulum" in output
 
 
 def test_help_teaches(runner: CliRunner) -> None:

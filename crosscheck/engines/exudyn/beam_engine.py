@@ -34,6 +34,7 @@ class ExudynBeamEngine:
     """A single beam on a hinge about World z, or clamped, as a planar beam of finite deflection."""
 
     name = "exudyn-beam"
+    summary = "one planar beam of finite deflection, by beam elements"
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing where it is not installed."""

@@ -23,6 +23,7 @@ class ExudynEngine:
     """Exudyn behind the engine contract."""
 
     name = "exudyn"
+    summary = "rigid bodies and floating frames in redundant coordinates"
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing where it is not installed."""

@@ -23,6 +23,7 @@ class MujocoEngine:
     """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
 
     name = "mujoco"
+    summary = "rigid trees in minimal coordinates, fixed steps"
 
     def version(self) -> str:
         try:

@@ -16,6 +16,7 @@ class PinocchioEngine:
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
+    summary = "rigid trees in minimal coordinates"
 
     def version(self) -> str:
         try:
