@@ -100,6 +100,61 @@ def check(scene: SceneFile, t_end: End = None) -> None:
 
 
 @app.command()
+def equivalence(
+    scene: SceneFile,
+    body: Annotated[str, typer.Argument(help="Name of the flexible body.", metavar="BODY", show_default=False)],
+    accuracy: Annotated[float, typer.Option(help="What counts as equal: a part of one.")] = 0.05,
+    modes: Annotated[
+        int | None, typer.Option(help="How many modes to look at; default all good ones.", show_default=False)
+    ] = None,
+    axis: Annotated[
+        list[str] | None,
+        typer.Option(help="Hinge axis, `y` or `0,0.6,0.8`, body axes; give it twice or thrice for more axes."),
+    ] = None,
+    mode: Annotated[
+        list[int] | None, typer.Option(help="Mode that the hinge stands for, from 1; one for each axis.")
+    ] = None,
+    point: Annotated[
+        str | None, typer.Option(help="A hinge to be judged as well, m from the clamp: `0.4,0,0`.", show_default=False)
+    ] = None,
+    angle: Annotated[float, typer.Option(help="Hinge angle in rad for the displacement forms (47), (49).")] = 0.1,
+    picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("equivalence.png"),
+) -> None:
+    """
+    Modes or a rigid body on a spring hinge? Compare both models of an appendage; print tables, write a picture.
+
+    The appendage is a flexible body at a limb end, clamped at its hinge. Frisch's three equivalence relations as
+    numbers, the best hinge and its spring, how many modes are needed, and which model is better for which question.
+
+    **Examples**
+
+        flexmb equivalence gyrostat.toml panel
+        flexmb equivalence gyrostat.toml panel --axis y --axis z --accuracy 0.01 --modes 20
+        flexmb equivalence gyrostat.toml panel --point 0.5,0,0 --picture panel.png
+
+    **Exit code**: 0 compared, 2 the scene, the body or an option is wrong.
+    """
+    with _no_traceback():
+        from flexmb.frisch.advice import equivalence as compare
+        from flexmb.frisch.appendage import appendage_of
+        from flexmb.frisch.equivalence_plot import write_equivalence_plot
+        from flexmb.frisch.equivalence_table import equivalence_tables
+
+        loaded = load_scene(scene)
+        check_scene(loaded)
+        result = compare(
+            appendage_of(loaded, body, modes),
+            accuracy=accuracy,
+            axes=[_vector("axis", word) for word in axis] if axis else None,
+            modes=tuple(number - 1 for number in mode) if mode else None,
+            point=None if point is None else _vector("point", point),
+        )
+        written = write_equivalence_plot(result, picture)
+    console.print(equivalence_tables(result, angle))
+    console.print("wrote", str(written), soft_wrap=True)
+
+
+@app.command()
 def schema() -> None:
     """
     Print the JSON Schema of scene files.
@@ -109,6 +164,19 @@ def schema() -> None:
         flexmb schema > scene.schema.json
     """
     print(json_schema())
+
+
+def _vector(option: str, text: str) -> tuple[float, ...]:
+    """Three numbers, or the unit vector of x, y, z."""
+    if text in ("x", "y", "z"):
+        return tuple(float(text == name) for name in "xyz")
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3:
+        raise ValueError(f"--{option} is x, y, z or three numbers such as 0,0.6,0.8; got {text!r}")
+    return numbers
 
 
 @contextmanager

@@ -1,0 +1,155 @@
+"""An elastic appendage at a limb end: modal data of a body clamped to its inboard body, and where a scene has one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.frisch.elements import inertia_of
+from flexmb.frisch.normalisation import normalised
+from flexmb.frisch.parameters import ModeParameters, mode_parameters
+from flexmb.modal.beam import beam_elements
+from flexmb.modal.cross import cross_matrix
+from flexmb.modal.flexible import flexible_model
+from flexmb.modal.model import FlexibleModel
+from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+DEFAULT_MODES = 40
+
+
+@dataclass(frozen=True)
+class Appendage:
+    """A flexible body clamped at its origin, body axes, modes normalised as in (41) and ordered by frequency.
+
+    `name`; `model` with those modes; `parameters`, the corrected ones; `frequencies` (n,) rad/s with the base fixed.
+    """
+
+    name: str
+    model: FlexibleModel
+    parameters: ModeParameters
+    frequencies: Array
+
+    @property
+    def mode_count(self) -> int:
+        return len(self.frequencies)
+
+    @cached_property
+    def rigid_inertia(self) -> Array:
+        """(6,6), order [angular; linear]: the undeformed body about its clamp."""
+        p = self.parameters
+        arm = p.mass * cross_matrix(p.alpha)
+        inertia = p.Phi + p.mass * inertia_of(np.outer(p.alpha, p.alpha))
+        return np.block([[inertia, arm], [arm.T, p.mass * np.eye(3)]])
+
+    @cached_property
+    def momenta(self) -> Array:
+        """(n,6) [angular about the clamp; linear] momentum of each mode at unit rate: Q_n + m alpha x A_n and m A_n."""
+        p = self.parameters
+        linear = p.mass * p.A
+        return np.hstack([p.Q + np.cross(p.alpha, linear), linear])
+
+
+def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:
+    """The appendage of a flexible model. Raises ValueError, which calls it `name`, where the paper's comparison has no
+    sense: no modes, modes that are not clamped at the origin, or modes without stiffness."""
+    if model.mode_count == 0:
+        raise ValueError(f"{name}: a rigid body has no modes to compare with a hinge; choose a flexible body")
+    if not model.clamped:
+        raise ValueError(
+            f"{name}: its modes are free-free, but a hinge is compared with modes clamped at the hinge point; give the "
+            'body modes with the boundary "clamped-free"'
+        )
+    own = normalised(model, name)
+    squares = np.diag(own.stiffness) / own.mass.sum()
+    if np.any(squares <= 0.0):
+        n = int(np.argmin(squares))
+        raise ValueError(f"{name}: mode {n + 1} has no stiffness; a mode of a clamped body needs a frequency")
+    # Frequencies equal to nine digits keep their order: a degenerate pair is no reason to change it.
+    order = np.argsort([float(f"{square:.8e}") for square in squares], kind="stable")
+    own = with_modes(own, order)
+    return Appendage(name, own, mode_parameters(own), np.sqrt(squares[order]))
+
+
+def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
+    """The same body with some of its modes, in the order of `chosen`."""
+    nodes = {
+        key: replace(node, translation=node.translation[:, chosen], rotation_modes=node.rotation_modes[:, chosen])
+        for key, node in model.nodes.items()
+    }
+    return replace(
+        model,
+        translation=model.translation[:, :, chosen],
+        rotation=model.rotation[:, :, chosen],
+        stiffness=model.stiffness[np.ix_(chosen, chosen)],
+        damping=model.damping[np.ix_(chosen, chosen)],
+        nodes=nodes,
+    )
+
+
+def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:
+    """The body of that name as an appendage of its inboard body.
+
+    `modes`: how many modes to look at: a beam gets them from its finite elements whatever the scene says, a modal body
+    has those it was given. Default: all of those, and of a beam the lower half of the finite elements' modes, which are
+    good, up to `DEFAULT_MODES`. Raises ValueError where the body is not there, not flexible, not clamped, or not at a
+    limb end, naming what is in the way.
+    """
+    found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
+    if found is None:
+        names = ", ".join(f'"{candidate.name}"' for candidate in scene.bodies if not isinstance(candidate, RigidBody))
+        raise ValueError(f'the scene has no body "{body}"; its flexible bodies are {names or "none"}')
+    if isinstance(found, RigidBody):
+        raise ValueError(f'body "{body}" is rigid: it has no modes to compare with a hinge; choose a flexible body')
+    if isinstance(found, SidBody):
+        raise ValueError(f'body "{body}": SID files are not supported yet; use kind = "modal"')
+    _check_limb_end(scene, body)
+    name = f'body "{body}"'
+    if modes is not None and modes < 1:
+        raise ValueError(f"{name}: at least one mode is needed, got {modes}")
+    if isinstance(found, BeamBody):
+        return appendage(flexible_model(_with_modes(found, modes)), name)
+    return _first(appendage(flexible_model(found), name), modes)
+
+
+def _with_modes(body: BeamBody, modes: int | None) -> BeamBody:
+    """The beam with its lowest eigenmodes; damping does not matter here."""
+    elements = beam_elements(body)
+    rotary = any(station.rotary_y_kg_m + station.rotary_z_kg_m > 0.0 for station in body.stations)
+    idle = {"torsion"} if body.points == "line" or not rotary else set()
+    moving = [field for family, field in elements.fields.items() if family not in idle]
+    coordinates = sum(field.size - len(field.clamped_coordinates) for field in moving)
+    count = max(body.modes.count, min(DEFAULT_MODES, coordinates // 2)) if modes is None else modes
+    eigenmodes = msgspec.structs.replace(body.modes, count=count, static=False, damping_ratio=0.0)
+    return msgspec.structs.replace(body, modes=eigenmodes)
+
+
+def _first(body: Appendage, modes: int | None) -> Appendage:
+    """The lowest modes of an appendage."""
+    if modes is None or modes >= body.mode_count:
+        return body
+    return appendage(with_modes(body.model, np.arange(modes)), body.name)
+
+
+def _check_limb_end(scene: Scene, body: str) -> None:
+    """Nothing is attached to the body, and its hinge is at the clamp."""
+    attached = [f'hinge "{hinge.name}"' for hinge in scene.hinges if hinge.parent == body]
+    attached += [f'point mass "{mass.name}"' for mass in scene.point_masses if mass.body == body]
+    attached += [f'wheel "{wheel.name}"' for wheel in scene.wheels if wheel.body == body]
+    attached += [f'closure "{closure.name}"' for closure in scene.closures if body in (closure.body_a, closure.body_b)]
+    if attached:
+        raise ValueError(
+            f'body "{body}" is not at a limb end ({", ".join(attached)}): a hinge cannot stand for its modes, since '
+            "what they do to the attached frames is lost"
+        )
+    for hinge in scene.hinges:
+        if hinge.child == body and hinge.child_node not in ("origin", "root"):
+            raise ValueError(
+                f'body "{body}" is clamped at its origin but hung up at node "{hinge.child_node}" by hinge '
+                f'"{hinge.name}"; the comparison needs the clamp at the hinge'
+            )

@@ -1,0 +1,95 @@
+"""How many modes an appendage needs: the right sides of (149)-(151) as sums that converge to the left ones.
+
+Let the base turn away from the appendage, or the appendage from the base, by omega about the clamp: the left sides of
+(149)-(151) with the body undeformed. In the modes, normalised by (41) and complete once all are taken, that motion has
+the rates adot_n = s_n . [omega; 0] / m, its projections in the norm of kinetic energy, where s_n is a mode's momentum
+[Q_n + m alpha x A_n; m A_n] about the clamp. So
+
+    (149)   sum_n adot_n A_n  ->  omega x alpha
+    (150)   sum_n adot_n E_n  ->  omega x Phi - Phi x omega
+    (151)   sum_n adot_n Q_n  ->  Phi . omega
+
+and the same for a velocity of the clamp, with [0; v] instead. The sum of s_n s_n' / m over the modes is the effective
+inertia (6,6) that follows the base elastically; it tends to the rigid body's about the clamp. What is left over of it
+is fixed to the base in a model with that many modes, at whatever frequency the base moves.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from flexmb.frisch.appendage import Appendage
+from flexmb.frisch.equivalence import weighted_difference
+
+Array = NDArray[np.float64]
+UNIT = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Direction:
+    """Convergence for one motion of the base, by number of modes N = 0..n, lowest first.
+
+    `motion` (6,): unit [omega; velocity of the clamp], `name` of it; `inertia`: the rigid body's for it, kg m^2 about
+    the clamp or kg; `mode_shares` (n,): effective inertia of each mode as a part of that; `remainder` (n+1,): what is
+    left over; `relations` (3,n+1): mismatches of (149)-(151) in the norm of `equivalence`, as parts of the energy of
+    the rigid motion; empty (0,n+1) for motion along a direction, of which the relations do not speak.
+    """
+
+    name: str
+    motion: Array
+    inertia: float
+    mode_shares: Array
+    remainder: Array
+    relations: Array
+
+    @property
+    def worst(self) -> Array:
+        """The largest of remainder and relations (n+1,)."""
+        return np.max(np.vstack([self.remainder, self.relations]), axis=0)
+
+    def needed(self, accuracy: float) -> int | None:
+        """Fewest modes with which remainder and relations are and stay within `accuracy`; None if all are too few."""
+        within = np.logical_and.accumulate((self.worst <= accuracy)[::-1])[::-1]
+        return int(np.argmax(within)) if within[-1] else None
+
+    def taking_part(self, modes: int) -> int:
+        """How many of the first `modes` modes move this way at all, by more than a millionth of the inertia."""
+        return int(np.count_nonzero(self.mode_shares[:modes] > 1e-6))
+
+
+def directions(body: Appendage, axes: ArrayLike = UNIT) -> tuple[Direction, ...]:
+    """Turning about and moving along each of `axes` (k,3), left out where the body has no inertia against it."""
+    unit = [axis / np.linalg.norm(axis) for axis in np.asarray(axes, dtype=float)]
+    still = np.zeros(3)
+    motions = [(f"about {_named(axis)}", np.concatenate([axis, still])) for axis in unit]
+    motions += [(f"along {_named(axis)}", np.concatenate([still, axis])) for axis in unit]
+    floor = np.repeat([np.trace(body.rigid_inertia[part, part]) for part in (slice(0, 3), slice(3, 6))], len(unit))
+    inertias = [float(motion @ body.rigid_inertia @ motion) for _, motion in motions]
+    return tuple(
+        _direction(body, name, motion, inertia)
+        for (name, motion), inertia, size in zip(motions, inertias, floor, strict=True)
+        if inertia > 1e-12 * size
+    )
+
+
+def _direction(body: Appendage, name: str, motion: Array, inertia: float) -> Direction:
+    p, n = body.parameters, body.mode_count
+    rates = body.momenta @ motion / p.mass
+    shares = p.mass * rates**2 / inertia
+    remainder = 1.0 - np.concatenate([[0.0], np.cumsum(shares)])
+    relations = np.zeros((0, n + 1))
+    if np.any(motion[:3]):
+        partial = [np.where(np.arange(n) < N, rates, 0.0) for N in range(n + 1)]
+        relations = np.array([weighted_difference(p, motion, some) for some in partial]).T / np.sqrt(inertia)
+    return Direction(name, motion, inertia, shares, remainder, relations)
+
+
+def _named(axis: Array) -> str:
+    """x, y or z where it is one of these, else its components."""
+    for name, unit in zip("xyz", UNIT, strict=True):
+        if np.array_equal(np.abs(axis), unit):
+            return name
+    return "(" + ", ".join(f"{component:.3g}" for component in axis) + ")"
