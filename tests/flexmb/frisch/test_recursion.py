@@ -1,0 +1,133 @@
+"""Two native routes to the same motion: the nested-body equations, corrected, and the articulated-body recursion.
+
+They share scenes, hinges and node kinematics; the inertia of bodies, all sums over bodies, the elimination of loads and
+the solution are different algorithms (an import contract keeps them apart). The agreement is that of rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb import dynamics
+from flexmb.frisch.system import Motion, NestedSystem
+from tests import trees
+from tests.bounds import algebra, backward_error
+from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
+
+RECIPES = {
+    "rigid": trees.RIGID,
+    "ruthless": trees.RUTHLESS,
+    "linear": SMALL,
+    "levels mixed": replace(SMALL, levels=("linear", "ruthless", "rigid")),
+    "free-flying": replace(SMALL, grounded=False, prescribed=False, conservative=True),
+    "chain": replace(SMALL, branching=False, bodies=12),
+}
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both routes at the scene's own random state, and the bound of their difference."""
+
+    system: flexmb.System
+    nested: NestedSystem
+    state: flexmb.State
+    motion: Motion
+    M: np.ndarray
+    right: np.ndarray  # applied less bias, by the recursion
+    size: float  # of the generalised forces before they cancel
+    bound: float
+
+
+@pytest.fixture(scope="module", params=[(name, seed) for name in RECIPES for seed in (0, 1)], ids=str)
+def pair(request) -> Pair:
+    name, seed = request.param
+    system = flexmb.compile(random_scene(seed, RECIPES[name]))
+    nested, state = system.nested(), system.initial_state
+    status, motion = nested.motion(0.0, packed(state))
+    assert status == 0
+    M, bias = system.mass_matrix(state), system.bias(state)
+    loads = max(np.max(np.abs(load)) for load in system.hinge_loads(state).values())
+    size = float(np.max(np.abs(M) @ np.abs(motion.accelerations)) + np.max(np.abs(bias)) + loads)
+    points = max(len(link.model.mass) for link in system._links)
+    bound = algebra(system.nu, len(system.body_names), points)
+    return Pair(system, nested, state, motion, M, system.applied(state) - bias, size, bound)
+
+
+def test_mass_matrix_and_right_side(pair):
+    """(136), corrected: the congruence is the mass matrix of the recursion, and symmetric to the last bit."""
+    M, right = pair.nested.reduced(0.0, packed(pair.state))
+    assert np.max(np.abs(M - pair.M)) <= pair.bound * np.max(np.abs(pair.M))
+    assert np.array_equal(M, M.T)
+    assert np.max(np.abs(right - pair.right)) <= pair.bound * pair.size
+
+
+def test_accelerations(pair):
+    """(136), (144): backward error within n u of the recursion's equations."""
+    free = pair.system.constants.speed["prescribed"] < 0
+    error = backward_error(pair.M[free], pair.motion.accelerations, pair.right[free], np.array([pair.size]))
+    assert error <= pair.bound
+
+
+def test_hinge_loads(pair):
+    """(107), (108), (115): the suppressed rows and the last partition give the recursion's six load components."""
+    expected = pair.system.hinge_loads(pair.state, pair.motion.accelerations)
+    for found, load in zip(pair.motion.loads, expected.values(), strict=True):
+        assert np.max(np.abs(found - load)) <= pair.bound * pair.size
+
+
+def test_wheel_torques(pair):
+    """(82), (94), (102), (113): the whole torque on a wheel, bearing and motor, from the wheel's own momentum."""
+    system, wheels = pair.system, np.zeros((len(pair.system.constants.wheel), 6))
+    y, none = packed(pair.state), np.zeros(0, np.int64)
+    dynamics.observe_motion(
+        0.0, y, pair.motion.accelerations, none, none, system.constants, system.workspace(), np.zeros((0, 24)), wheels,
+        np.zeros(4), np.zeros(6),
+    )  # fmt: skip
+    assert np.max(np.abs(pair.motion.wheel_torques - wheels[:, :3]), initial=0.0) <= pair.bound * pair.size
+
+
+def test_drives(pair):
+    """(145): what prescribed motion takes, beyond springs and motors."""
+    moved = pair.motion.accelerations
+    tau = pair.system.inverse_dynamics(pair.state, moved) - pair.system.applied(pair.state)
+    fixed = pair.system.constants.speed["prescribed"] >= 0
+    assert np.max(np.abs(pair.motion.drives - tau)[fixed], initial=0.0) <= pair.bound * pair.size
+    assert not np.any(pair.motion.drives[~fixed])
+
+
+def test_it_is_not_blind():
+    """Negative control: one per cent more mass in one body is seen in matrix, accelerations and loads."""
+    scene = random_scene(0, SMALL)
+    other = flexmb.compile(scene)
+    heavier = np.array([1.01, *np.ones(len(other.body_names) - 1)])
+    other.constants.body["rigid"] *= heavier[:, None]
+    other.constants.mode["mfr"] *= heavier[:, None, None]
+    state = other.initial_state
+    nested = flexmb.compile(scene).nested()
+    _, motion = nested.motion(0.0, packed(state))
+    assert np.max(np.abs(nested.reduced(0.0, packed(state))[0] - other.mass_matrix(state))) > 1e-4
+    assert np.max(np.abs(motion.accelerations - other.accelerations(state))) > 1e-4
+    expected = other.hinge_loads(state, motion.accelerations)["h0"]
+    assert np.max(np.abs(motion.loads[0] - expected)) > 1e-4
+
+
+@pytest.mark.parametrize("seed", (30, 31))
+def test_full_is_approached_with_the_square_of_the_deformation(seed):
+    """Slope 2 +- 0.1 over four decades of eta and its rate."""
+    recipe = replace(trees.FULL, bodies=5, carriers=("modal", "beam", "floating", "rigid"), deformation=0.03)
+    full = flexmb.compile(random_scene(seed, recipe))
+    scales = 10.0 ** -np.arange(0.5, 5.0)
+    distance = [_distance(full, deformed(full, scale)) for scale in scales]
+    slopes = np.diff(np.log10(distance)) / np.diff(np.log10(scales))
+    assert np.all(np.abs(slopes - 2.0) <= 0.1), (distance, slopes)
+
+
+def _distance(full: flexmb.System, state: flexmb.State) -> float:
+    """Of the generalised forces that hold both accelerations: those are not spoilt by a near-singular matrix."""
+    difference = full.accelerations(state, "frisch") - full.accelerations(state)
+    M = full.mass_matrix(state)
+    return float(np.max(np.abs(M @ difference)) / np.max(np.abs(M) @ np.abs(full.accelerations(state))))
