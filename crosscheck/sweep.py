@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from crosscheck.engines.registry import COMPILED_LIKE
 from crosscheck.execute import execute
 from crosscheck.library import Case
 from crosscheck.plan import Job, plan
@@ -58,7 +59,7 @@ def sweep(
 
 def _engine(job: Job) -> str:
     """A worker stays with its engine: each loads its library, or compiles its kernels, once."""
-    return job.engine
+    return COMPILED_LIKE.get(job.engine, job.engine)
 
 
 def _done(known: Sequence[Record], job: Job) -> frozenset[tuple[str, str]]:

@@ -19,6 +19,8 @@ BUILT_IN = {
     "exudyn": "crosscheck.engines.exudyn:ExudynEngine",
     "exudyn-beam": "crosscheck.engines.exudyn:ExudynBeamEngine",
 }
+# Engines whose compiled code is another's: what that one leaves in caches on disk serves them too.
+COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}
 
 
 def engines() -> dict[str, Engine]:

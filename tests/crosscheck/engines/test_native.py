@@ -1,0 +1,119 @@
+"""The three native engines through the contract: where the routes must be equal, and what each says of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import flexmb
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.registry import engine
+from flexmb.scene.schema import Scene
+from tests import trees
+from tests.bounds import algebra
+from tests.flexmb.frisch.scenes import clamped
+
+RECURSION, FRISCH, PRINT = "native", "native-frisch", "native-frisch-as-printed"
+# first-order mass matrices lose definiteness where the deformation is not small
+LINEAR = replace(trees.LINEAR, bodies=6, deformation=0.03)
+CLAMPED = replace(LINEAR, carriers=("rigid", "modal", "beam"))
+SAME = {
+    "rigid": replace(trees.RIGID, bodies=6),
+    "ruthless": replace(trees.RUTHLESS, bodies=6),
+    "linear": LINEAR,
+    "free-flying": replace(LINEAR, grounded=False, prescribed=False),
+}
+
+
+def gaps(ours: Snapshot, theirs: Snapshot) -> dict[str, float]:
+    """Largest differences by kind, in units of the kind's largest value."""
+    kinds = {
+        "motion": [
+            (np.r_[a.position, a.velocity, a.acceleration], np.r_[b.position, b.velocity, b.acceleration])
+            for a, b in ((ours.markers[name], theirs.markers[name]) for name in ours.markers)
+        ],
+        "loads": [(ours.loads[name], theirs.loads[name]) for name in ours.loads],
+        "wheels": [(ours.wheel_loads[name], theirs.wheel_loads[name]) for name in ours.wheel_loads],
+        "drives": [(ours.drives[name], theirs.drives[name]) for name in ours.drives],
+        "energy": [(np.array(ours.energy[kind]), np.array(theirs.energy[kind])) for kind in ours.energy],
+        "momentum": [(ours.momentum, theirs.momentum)],
+    }
+    return {kind: _gap(pairs) for kind, pairs in kinds.items() if pairs}
+
+
+def _gap(pairs: list[tuple[np.ndarray, np.ndarray]]) -> float:
+    size = max(float(np.max(np.abs(a))) for a, _ in pairs)
+    return max(float(np.max(np.abs(a - b))) for a, b in pairs) / size
+
+
+def rounding(scene: Scene) -> float:
+    """Of two backward-stable solutions: their common backward error times the condition of the mass matrix."""
+    system = flexmb.compile(scene)
+    points = max(len(link.model.mass) for link in system._links)
+    condition = np.linalg.cond(system.mass_matrix(system.initial_state))
+    return algebra(system.nu, len(system.body_names), points) * float(condition)
+
+
+@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("recipe", SAME)
+def test_both_routes_are_equal_to_rounding(recipe, seed):
+    """Accelerations, all loads, drives: at every level that Frisch's equations represent exactly."""
+    scene = trees.random_scene(seed, SAME[recipe])
+    assert engine(FRISCH).supports(scene).kind == "exact"
+    found = gaps(engine(RECURSION).compile(scene).evaluate(), engine(FRISCH).compile(scene).evaluate())
+    bound = rounding(scene)
+    assert bound < 1e-6, "a scene that shows nothing"
+    assert max(found.values()) <= bound, found
+
+
+def test_runs_of_both_routes_agree_within_their_refinement():
+    scene = trees.random_scene(1, LINEAR)
+    run = Run(np.linspace(0.0, 0.2, 6))
+    models = [engine(name).compile(scene) for name in (RECURSION, FRISCH)]
+    efforts = (Effort("tolerance", rtol, "dop853") for rtol in (1e-7, 1e-10))
+    coarser, finest = ([model.simulate(run, effort) for model in models] for effort in efforts)
+    assert all(path.status == "finished" for path in finest), finest[1].message
+
+    def apart(kind: str, ours: Trajectory, theirs: Trajectory) -> float:
+        if kind == "markers":
+            return max(np.max(np.abs(ours.markers[m].position - theirs.markers[m].position)) for m in ours.markers)
+        return max(np.max(np.abs(ours.loads[hinge] - theirs.loads[hinge])) for hinge in ours.loads)
+
+    sizes = {"markers": 1.0, "loads": max(np.max(np.abs(load)) for load in finest[0].loads.values())}  # m; N and Nm
+    for kind, size in sizes.items():
+        doubt = max(apart(kind, rough, fine) for rough, fine in zip(coarser, finest, strict=True))
+        assert doubt < 1e-5 * size
+        assert apart(kind, *finest) <= doubt, kind
+    assert finest[0].work[-1] == pytest.approx(finest[1].work[-1], rel=1e-6)
+
+
+def test_each_engine_says_what_it_approximates():
+    rigid, linear = (trees.random_scene(0, recipe) for recipe in (SAME["rigid"], CLAMPED))
+    full = trees.random_scene(0, replace(CLAMPED, levels=("full",)))
+    for scene in (rigid, linear, full):
+        assert engine(RECURSION).supports(scene).kind == "exact"
+    assert [engine(FRISCH).supports(scene).kind for scene in (rigid, linear, full)] == ["exact", "exact", "surrogate"]
+    assert engine(PRINT).supports(rigid).kind == "exact"
+    assert "first order" in engine(FRISCH).supports(full).reason
+
+
+def test_the_print_refuses_modes_that_are_not_clamped_at_the_hinge():
+    scene = trees.random_scene(0, replace(LINEAR, carriers=("floating",)))
+    support = engine(PRINT).supports(scene)
+    assert support.kind == "no"
+    assert "clamped" in support.reason and '"b0"' in support.reason
+    assert engine(FRISCH).supports(scene).kind == "exact"
+
+
+def test_the_print_is_right_on_rigid_bodies_and_wrong_on_flexible_ones():
+    """The latter is the negative control of the former: one per cent is what these comparisons would see at once."""
+    rigid = trees.random_scene(3, SAME["rigid"])
+    found = gaps(engine(RECURSION).compile(rigid).evaluate(), engine(PRINT).compile(rigid).evaluate())
+    assert max(found.values()) <= rounding(rigid), found
+    flexible = clamped(trees.random_scene(3, CLAMPED))
+    support = engine(PRINT).supports(flexible)
+    assert support.kind == "surrogate" and "print" in support.reason
+    found = gaps(engine(RECURSION).compile(flexible).evaluate(), engine(PRINT).compile(flexible).evaluate())
+    assert found["motion"] > 1e-2
