@@ -30,6 +30,7 @@ class Partitions:
     X, I_c, F, Gamma, I_s, M1, A, M2   as in (111)
     eta                                right sides eta_1 .. eta_4 with external loads, without those of hinges
     S                                  (126) times (133), rows as above, a column for each speed
+    bias                               expanded accelerations at udot = 0: second terms of (127), (134)
     """
 
     X: Real
@@ -42,6 +43,7 @@ class Partitions:
     M2: Real
     eta: tuple[Real, Real, Real, Real]
     S: Real
+    bias: Real
 
     @property
     def matrix(self) -> Real:
@@ -53,6 +55,23 @@ class Partitions:
             [self.F.T, np.zeros((modes, wheels)), self.M1, self.A],
             [self.Gamma.T, np.zeros((last, wheels)), self.A.T, self.M2],
         ])
+
+
+class RelativeMotion(NamedTuple):
+    """Bodies and wheels relative to the bodies that carry them, World axes.
+
+    beta (N,3)   m   from the parent's hinge point to the body's (2)
+    alpha (N,3)  m   from the body's hinge point to its mass centre (47)
+    S (nx,nu)        expanded velocities S u (126): angular rates of the N bodies, of the W wheels, modal rates,
+                     rates of beta as the parent sees them
+    bias (nx,)       rates of the expanded velocities are S udot + bias (127): inertial rates of the bodies' angular
+                     rates, all others as the inboard body sees them
+    """
+
+    beta: Real
+    alpha: Real
+    S: Real
+    bias: Real
 
 
 class Motion(NamedTuple):
@@ -120,13 +139,10 @@ class NestedSystem:
 
     def partitions(self, t: float, y: Real) -> Partitions:
         """The named blocks of (111) at y."""
-        evaluation.assemble(t, y, self.constants, self._w)
+        motion = self.relative_motion(t, y)
         first, wheels, modes, last = self._rows()
+        rows = np.concatenate([first, wheels, modes, last])
         Z, eta = self._w.Z, self._w.eta
-        S = np.zeros((len(Z), len(self.constants.column)))
-        for j, column in enumerate(self.constants.column):
-            entries = slice(column["start"], column["stop"])
-            S[self.constants.entry_row[entries], j] = self._w.S[entries]
         return Partitions(
             X=Z[np.ix_(first, first)],
             I_c=Z[np.ix_(first, wheels)],
@@ -137,8 +153,19 @@ class NestedSystem:
             A=Z[np.ix_(modes, last)],
             M2=Z[np.ix_(last, last)],
             eta=(eta[first], eta[wheels], eta[modes], eta[last]),
-            S=S[np.concatenate([first, wheels, modes, last])],
+            S=motion.S[rows],
+            bias=motion.bias[rows],
         )
+
+    def relative_motion(self, t: float, y: Real) -> RelativeMotion:
+        """Motion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
+        w, c = self._w, self.constants
+        evaluation.assemble(t, y, c, w)
+        S = np.zeros((len(w.x), len(c.column)))
+        for j, column in enumerate(c.column):
+            entries = slice(column["start"], column["stop"])
+            S[c.entry_row[entries], j] = w.S[entries]
+        return RelativeMotion(w.nest["beta"].copy(), w.nest["alpha"].copy(), S, w.x.copy())
 
     def _rows(self) -> tuple[Real, Real, Real, Real]:
         """Expanded rows of the four partitions."""
