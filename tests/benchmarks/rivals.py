@@ -62,13 +62,13 @@ def rigid_chain(bodies: int) -> Scene:
     return scene.scene()
 
 
-def flexible_chain(bodies: int, modes: int, level: str) -> Scene:
-    """Serial chain of beams, clamped at their hinges, each hinged to the tip of the one before."""
+def flexible_chain(bodies: int, modes: int, level: str, node: str = "tip") -> Scene:
+    """Serial chain of beams, clamped at their hinges, each hinged to `node` of the one before."""
     scene = SceneBuilder(f"{bodies} beams of {modes} modes", gravity=(0.0, 0.0, -9.81))
     section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
     for k in range(bodies):
         scene.beam(f"b{k}", length=2.0, elements=12, section=section, modes=modes, level=level)
-        at = {} if k == 0 else {"parent_node": "tip"}
+        at = {} if k == 0 else {"parent_node": node}
         axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))[k % 2]
         scene.revolute(f"h{k}", "ground" if k == 0 else f"b{k - 1}", f"b{k}", axis=axis, angle=0.3, rate=0.2, **at)
     return scene.scene()
