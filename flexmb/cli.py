@@ -49,6 +49,9 @@ def simulate(
     atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units (dop853).")] = 1e-12,
     step: Annotated[float | None, typer.Option(help="Step in s (rk4).", show_default=False)] = None,
     samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
+    algorithm: Annotated[
+        str, typer.Option(help="`articulated` (recursion), `frisch` (nested bodies, 1975) or `frisch_as_printed`.")
+    ] = "articulated",
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
 ) -> None:
     """
@@ -59,6 +62,7 @@ def simulate(
         flexmb simulate boom.toml --t-end 60
         flexmb simulate boom.toml --t-end 60 --rtol 1e-12 --samples 1001 --out fine
         flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
+        flexmb simulate boom.toml --t-end 60 --algorithm frisch
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
@@ -71,7 +75,10 @@ def simulate(
         from flexmb.summary import summary
 
         with console.status(f"simulating {scene} (the first run after an update compiles)"):
-            trajectory = run(load_scene(scene), t_end, method, rtol=rtol, atol=atol, step=step, samples=samples)  # type: ignore[arg-type]
+            trajectory = run(
+                load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
+            )  # fmt: skip
         out.mkdir(parents=True, exist_ok=True)
         trajectory.to_csv(out / "trajectory.csv")
         written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
@@ -118,7 +125,7 @@ def equivalence(
         str | None, typer.Option(help="A hinge to be judged as well, m from the clamp: `0.4,0,0`.", show_default=False)
     ] = None,
     angle: Annotated[float, typer.Option(help="Hinge angle in rad for the displacement forms (47), (49).")] = 0.1,
-    picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("equivalence.png"),
+    picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/equivalence.png"),
 ) -> None:
     """
     Modes or a rigid body on a spring hinge? Compare both models of an appendage; print tables, write a picture.

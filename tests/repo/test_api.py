@@ -12,13 +12,14 @@ from tests.repo.project import ROOT
 FUNCTIONS = {
     "load_scene": ["path"],
     "compile": ["scene"],
-    "simulate": ["scene", "t_end", "method", "rtol", "atol"],
+    "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
 }
 SYSTEM = {
     "coordinate": ["name"],
     "speed": ["name"],
     "state": ["q", "u"],
     "accelerations": ["state", "algorithm"],
+    "partitions": ["state", "algorithm"],
     "mass_matrix": ["state"],
     "bias": ["state"],
     "inverse_dynamics": ["state"],
