@@ -12,7 +12,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.frisch.appendage import Appendage
+from flexmb.frisch.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence import Fit, best_hinge, fit_at, modal_effective_inertia
 from flexmb.frisch.mode_count import Direction, directions
 
@@ -131,7 +131,7 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]
 
 def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
     """Parts of the inertia about the hinge axes, and of the mass along the modes' velocity, beyond the fit's modes."""
-    modal, rigid = modal_effective_inertia(body, fit.modes), body.rigid_inertia
+    modal, rigid = modal_effective_inertia(body, fit.modes), inertia_about_origin(body.moving)
     turning = [(q @ modal[:3, :3] @ q) / (q @ rigid[:3, :3] @ q) for q in fit.hinge.axes]
     velocity = [body.parameters.A[mode] for mode in fit.modes]
     moving = [(v @ modal[3:, 3:] @ v) / (v @ rigid[3:, 3:] @ v) for v in velocity if np.any(v)]
@@ -140,7 +140,9 @@ def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
 
 def percent(value: float) -> str:
     """A part of one in percent with three digits; round-off is zero."""
-    return "0 %" if abs(value) < 1e-9 else f"{100.0 * value:.3g} %"
+    if abs(value) < 1e-9:
+        return "0 %"
+    return f"{100.0 * value:.3g} %" if abs(value) >= 1e-5 else "< 0.001 %"
 
 
 def _listed(modes: tuple[int, ...]) -> str:

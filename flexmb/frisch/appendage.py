@@ -21,6 +21,7 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 DEFAULT_MODES = 40
+_POINT_ARRAYS = ("mass", "position", "com_offset", "inertia", "translation", "rotation")
 
 
 @dataclass(frozen=True)
@@ -42,10 +43,17 @@ class Appendage:
     @cached_property
     def rigid_inertia(self) -> Array:
         """(6,6), order [angular; linear]: the undeformed body about its clamp."""
-        p = self.parameters
-        arm = p.mass * cross_matrix(p.alpha)
-        inertia = p.Phi + p.mass * inertia_of(np.outer(p.alpha, p.alpha))
-        return np.block([[inertia, arm], [arm.T, p.mass * np.eye(3)]])
+        return inertia_about_origin(self.parameters)
+
+    @cached_property
+    def moving(self) -> ModeParameters:
+        """Parameters of the points that some mode moves or turns: what sits in the clamp belongs to the base."""
+        model = self.model
+        size = np.sqrt(np.sum(model.position**2, axis=1).max())
+        shapes = np.maximum(np.abs(model.translation), size * np.abs(model.rotation)).max(axis=(1, 2))
+        moved = shapes > 1e-12 * shapes.max()
+        points = {name: getattr(model, name)[moved] for name in _POINT_ARRAYS}
+        return mode_parameters(replace(model, **points))
 
     @cached_property
     def momenta(self) -> Array:
@@ -53,6 +61,13 @@ class Appendage:
         p = self.parameters
         linear = p.mass * p.A
         return np.hstack([p.Q + np.cross(p.alpha, linear), linear])
+
+
+def inertia_about_origin(p: ModeParameters) -> Array:
+    """(6,6), order [angular; linear], of an undeformed body with these parameters about its origin."""
+    arm = p.mass * cross_matrix(p.alpha)
+    inertia = p.Phi + p.mass * inertia_of(np.outer(p.alpha, p.alpha))
+    return np.block([[inertia, arm], [arm.T, p.mass * np.eye(3)]])
 
 
 def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:

@@ -80,18 +80,28 @@ class Fit:
     effective_inertia: Array
 
 
-def rate_relations(body: Appendage, hinge: SpringHinge, rates: ArrayLike, hinge_rates: ArrayLike | None = None) -> (
-    tuple[Relation, ...]
-):
+def rate_relations(
+    body: Appendage, hinge: SpringHinge, rates: ArrayLike, hinge_rates: ArrayLike | None = None
+) -> tuple[Relation, Relation, Relation]:
     """(149)-(151) for modal rates (n,) and hinge rates (k,) rad/s, by default those that make the norm smallest."""
-    return _linear(body, hinge, rates, hinge_rates)
+    p, r = body.parameters, np.asarray(rates, dtype=float)
+    turn = best_rates(body, hinge.point, hinge.axes, r) if hinge_rates is None else np.asarray(hinge_rates, dtype=float)
+    omega = turn @ hinge.axes
+    rigid = np.cross(omega, p.alpha - hinge.point), _inertia_rate(p, omega), p.Phi @ omega
+    flexible = r @ p.A, np.einsum("n,nab->ab", r, p.E), r @ p.Q
+    velocity, inertia, momentum = _relative(p, _weighted(p, *(a - b for a, b in zip(rigid, flexible, strict=True))), r)
+    return (
+        Relation(149, "mass-centre velocity", rigid[0], flexible[0], velocity),
+        Relation(150, "inertia rate", rigid[1], flexible[1], inertia),
+        Relation(151, "angular momentum", rigid[2], flexible[2], momentum),
+    )
 
 
 def acceleration_relations(
     body: Appendage, hinge: SpringHinge, accelerations: ArrayLike, hinge_accelerations: ArrayLike | None = None
 ) -> tuple[Relation, ...]:
     """(160) and (159) for modal accelerations (n,) and hinge accelerations (k,) rad/s^2, by default the best ones."""
-    velocity, _, momentum = _linear(body, hinge, accelerations, hinge_accelerations)
+    velocity, _, momentum = rate_relations(body, hinge, accelerations, hinge_accelerations)
     return (
         replace(velocity, equation=160, quantity="mass-centre acceleration"),
         replace(momentum, equation=159, quantity="rate of angular momentum"),
@@ -126,13 +136,17 @@ def best_rates(body: Appendage, point: Array, axes: Array, rates: ArrayLike) -> 
 def turning_axis(body: Appendage, mode: int) -> Array:
     """Unit vector (3,) about which a mode turns the appendage: the omega that goes best with (150), (151).
 
+    With all mass in one point, which has no turn of its own, the omega about the clamp that goes best with (149).
     Raises ValueError for a mode that does not turn it, such as an axial one.
     """
     p = body.parameters
     rates = np.eye(body.mode_count)[mode]
-    flexible = _modal_side(p, rates)
-    omega = _least_squares(_hinge_columns(p, p.alpha, np.eye(3)), flexible)
-    turning = float(np.sqrt(omega @ p.Phi @ omega))
+    if _compact(p):
+        omega = np.cross(p.alpha, p.A[mode]) / (p.alpha @ p.alpha)
+        turning = np.linalg.norm(np.cross(omega, p.alpha)) * np.sqrt(p.mass)
+    else:
+        omega = _least_squares(_hinge_columns(p, p.alpha, np.eye(3)), _modal_side(p, rates))
+        turning = np.sqrt(omega @ p.Phi @ omega)
     if turning <= 1e-6 * np.sqrt(_scale(p, rates)):
         raise ValueError(
             f"{body.name}: mode {mode + 1} moves the appendage without turning it, so no hinge can stand for it; "
@@ -227,7 +241,7 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
     if modes is None:
         found: list[int] = []
         for axis in unit:
-            gain = [-np.inf if n in found else explained(body, axis, n) for n in range(body.mode_count)]
+            gain = [-np.inf if n in found else _explained(body, axis, n) for n in range(body.mode_count)]
             found.append(int(np.argmax(gain)))
         modes = tuple(found)
     if len(modes) != len(unit):
@@ -235,7 +249,7 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
     return unit, modes
 
 
-def explained(body: Appendage, axis: Array, mode: int) -> float:
+def _explained(body: Appendage, axis: Array, mode: int) -> float:
     """Part of the squared norm of a mode's (149)-(151) that a hinge about `axis` at the best point takes away."""
     whole = _modal_side(body.parameters, np.eye(body.mode_count)[mode])
     try:
@@ -249,9 +263,11 @@ def _nearest_point(body: Appendage, axis: Array, mode: int) -> Array:
     """Where a hinge about one axis makes the norm smallest, nearest to the clamp.
 
     (150) and (151) do not know the point: they fix the rate thetadot; then the point puts the part of (149) across the
-    axis right, thetadot q x (alpha - point) = A_n.
+    axis right, thetadot q x (alpha - point) = A_n. All mass in one point can turn about any; that is the clamp then.
     """
     p = body.parameters
+    if _compact(p):
+        return np.zeros(3)
     unit = np.eye(body.mode_count)[mode]
     rate = float(best_rates(body, p.alpha, axis[None], unit)[0])
     if abs(rate) * np.sqrt(axis @ p.Phi @ axis) <= 1e-6 * np.sqrt(_scale(p, unit)):
@@ -265,23 +281,6 @@ def _left(body: Appendage, point: Array, axes: Array, mode: int) -> Array:
     p, unit = body.parameters, np.eye(body.mode_count)[mode]
     columns, flexible = _hinge_columns(p, point, axes), _modal_side(p, unit)
     return (columns @ best_rates(body, point, axes, unit) - flexible) / np.sqrt(_scale(p, unit))
-
-
-def _linear(
-    body: Appendage, hinge: SpringHinge, rates: ArrayLike, hinge_rates: ArrayLike | None
-) -> tuple[Relation, Relation, Relation]:
-    """(149)-(151), linear in rates."""
-    p, r = body.parameters, np.asarray(rates, dtype=float)
-    turn = best_rates(body, hinge.point, hinge.axes, r) if hinge_rates is None else np.asarray(hinge_rates, dtype=float)
-    omega = turn @ hinge.axes
-    rigid = np.cross(omega, p.alpha - hinge.point), _inertia_rate(p, omega), p.Phi @ omega
-    flexible = r @ p.A, np.einsum("n,nab->ab", r, p.E), r @ p.Q
-    velocity, inertia, momentum = _relative(p, _weighted(p, *(a - b for a, b in zip(rigid, flexible, strict=True))), r)
-    return (
-        Relation(149, "mass-centre velocity", rigid[0], flexible[0], velocity),
-        Relation(150, "inertia rate", rigid[1], flexible[1], inertia),
-        Relation(151, "angular momentum", rigid[2], flexible[2], momentum),
-    )
 
 
 def _inertia_rate(p: ModeParameters, omega: Array) -> Array:
@@ -305,7 +304,7 @@ def _weighted(p: ModeParameters, velocity: Array, inertia_rate: Array, momentum:
     """Velocity, inertia rate and angular momentum in the units of the norm, square root of energy, (15,)."""
     moments, principal = np.linalg.eigh(p.Phi)
     size = float(moments.sum())
-    if size <= 0.0:  # all mass in one point
+    if _compact(p):
         return np.concatenate([np.sqrt(p.mass) * velocity, np.zeros(12)])
     solid = moments > _ROUND_OFF * size  # nothing turns about an axis without inertia
     own = np.where(solid, principal.T @ momentum / np.sqrt(np.where(solid, moments, 1.0)), 0.0)
@@ -327,6 +326,11 @@ def _relative(p: ModeParameters, weighted: Array, rates: Array) -> tuple[float, 
     size = np.sqrt(_scale(p, rates))
     velocity, inertia, momentum = _parts(weighted) / size if size > 0.0 else np.zeros(3)
     return float(velocity), float(inertia), float(momentum)
+
+
+def _compact(p: ModeParameters) -> bool:
+    """Whether all mass is in one point away from the clamp: it has no inertia of its own, (150) and (151) are empty."""
+    return float(np.trace(p.Phi)) <= _ROUND_OFF * p.mass * float(p.alpha @ p.alpha)
 
 
 def _least_squares(columns: Array, side: Array) -> Array:

@@ -81,7 +81,7 @@ def _mismatches(result: Equivalence, axes: Axes) -> None:
 
 
 def _short(value: float) -> str:
-    return "0" if value < _FLOOR else f"{100.0 * value:.2g} %"
+    return "~0" if value < _FLOOR else f"{100.0 * value:.2g} %"
 
 
 def _convergence(result: Equivalence, axes: Axes) -> None:

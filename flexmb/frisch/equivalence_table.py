@@ -15,7 +15,7 @@ from flexmb.frisch.mode_count import Direction
 Array = NDArray[np.float64]
 
 _UNITS = {149: "m/s", 150: "kg m^2/s", 151: "kg m^2/s", 47: "m", 49: "kg m^2"}
-_SHOWN_MODES = 6
+_SHOWN_MODES = 4
 _COLOURS = {"rigid": "cyan", "flexible": "magenta", "either": "green"}
 
 
@@ -46,10 +46,10 @@ def _mismatches(result: Equivalence, i: int, angle: float) -> Table:
     frequency = body.frequencies[mode] / (2.0 * np.pi)
     table = _table(
         f"\nMismatch with mode {mode + 1}, {frequency:.4g} Hz",
-        "Part of the root-mean-square velocity (displacement) of the appendage. Accelerations in a vibration, (160), "
-        "(159), mismatch as (149), (151).",
+        "Parts of the root-mean-square velocity (displacement) of the appendage; modes: size of their side while the "
+        "best hinge turns at 1 rad/s. In a vibration accelerations, (160), (159), mismatch as (149), (151).",
     )
-    for name in ("equation", "quantity", "modes, best hinge at 1 rad/s", *result.fits):
+    for name in ("equation", "quantity", "modes", *result.fits):
         table.add_column(name, justify="left" if name == "quantity" else "right")
     fits = list(result.fits.values())
     for relations in zip(*(fit.relations[i] for fit in fits), strict=True):
@@ -108,33 +108,30 @@ def _modes(result: Equivalence) -> Table:
     shown = min(_SHOWN_MODES, result.appendage.mode_count)
     table = _table(
         f"\nModes needed for {percent(result.accuracy)}",
-        "Of the rigid body's inertia about the clamp, or mass: what each mode carries away from the base. Turning "
-        "needs (149)-(151) within the accuracy as well.",
+        "Parts of the rigid body's inertia about the clamp, or mass, that modes 1, 2, ... and all of them carry away "
+        "from the base. Turning needs (149)-(151) within the accuracy as well. Acting: modes that move so at all.",
     )
-    table.add_column("base moves")
-    table.add_column("inertia", justify="right")
-    table.add_column("modes needed", justify="right")
-    for n in range(shown):
-        table.add_column(f"mode {n + 1}", justify="right")
-    table.add_column("all", justify="right")
+    for name in ("base moves", "inertia", "needed", "acting", *(str(n + 1) for n in range(shown)), "all"):
+        table.add_column(name, justify="left" if name == "base moves" else "right", no_wrap=True)
     for direction in result.directions:
         unit = "kg m^2" if direction.name.startswith("about") else "kg"
         shares = [percent(share) if share > 1e-6 else "-" for share in direction.mode_shares[:shown]]
-        total = 1.0 - direction.remainder[-1]
+        total = percent(max(1.0 - direction.remainder[-1], 0.0))
         inertia = f"{direction.inertia:.4g} {unit}"
-        table.add_row(direction.name, inertia, _needed(direction, result.accuracy), *shares, percent(max(total, 0.0)))
+        table.add_row(direction.name, inertia, *_needed(direction, result.accuracy), *shares, total)
     return table
 
 
-def _needed(direction: Direction, accuracy: float) -> Text:
+def _needed(direction: Direction, accuracy: float) -> tuple[Text, str]:
+    """Modes needed, and how many of them take part."""
     every = len(direction.mode_shares)
+    acting = direction.taking_part(every)
     needed = direction.needed(accuracy)
     if needed is not None:
-        part = direction.taking_part(needed)
-        return Text(f"{needed}" if part == needed else f"{needed} ({part} move this way)")
-    if direction.taking_part(every) == 0:
-        return Text("no mode moves this way", style="dim")
-    return Text(f"more than {every}: {percent(direction.worst[-1])} left", style="yellow")
+        return Text(str(needed)), str(direction.taking_part(needed))
+    if acting == 0:
+        return Text("-", style="dim"), "0"
+    return Text(f"more than {every}", style="yellow"), str(acting)
 
 
 def _verdicts(result: Equivalence) -> Table:

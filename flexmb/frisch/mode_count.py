@@ -11,7 +11,8 @@ the rates adot_n = s_n . [omega; 0] / m, its projections in the norm of kinetic 
 
 and the same for a velocity of the clamp, with [0; v] instead. The sum of s_n s_n' / m over the modes is the effective
 inertia (6,6) that follows the base elastically; it tends to the rigid body's about the clamp. What is left over of it
-is fixed to the base in a model with that many modes, at whatever frequency the base moves.
+is fixed to the base in a model with that many modes, at whatever frequency the base moves. What sits in the clamp
+itself, so that no mode moves it, is fixed there anyway and not counted.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.frisch.appendage import Appendage
+from flexmb.frisch.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence import weighted_difference
 
 Array = NDArray[np.float64]
@@ -66,8 +67,9 @@ def directions(body: Appendage, axes: ArrayLike = UNIT) -> tuple[Direction, ...]
     still = np.zeros(3)
     motions = [(f"about {_named(axis)}", np.concatenate([axis, still])) for axis in unit]
     motions += [(f"along {_named(axis)}", np.concatenate([still, axis])) for axis in unit]
-    floor = np.repeat([np.trace(body.rigid_inertia[part, part]) for part in (slice(0, 3), slice(3, 6))], len(unit))
-    inertias = [float(motion @ body.rigid_inertia @ motion) for _, motion in motions]
+    whole = inertia_about_origin(body.moving)
+    floor = np.repeat([np.trace(whole[part, part]) for part in (slice(0, 3), slice(3, 6))], len(unit))
+    inertias = [float(motion @ whole @ motion) for _, motion in motions]
     return tuple(
         _direction(body, name, motion, inertia)
         for (name, motion), inertia, size in zip(motions, inertias, floor, strict=True)
@@ -76,9 +78,10 @@ def directions(body: Appendage, axes: ArrayLike = UNIT) -> tuple[Direction, ...]
 
 
 def _direction(body: Appendage, name: str, motion: Array, inertia: float) -> Direction:
-    p, n = body.parameters, body.mode_count
-    rates = body.momenta @ motion / p.mass
-    shares = p.mass * rates**2 / inertia
+    p, n = body.moving, body.mode_count
+    mass = body.parameters.mass  # of the normalisation
+    rates = body.momenta @ motion / mass
+    shares = mass * rates**2 / inertia
     remainder = 1.0 - np.concatenate([[0.0], np.cumsum(shares)])
     relations = np.zeros((0, n + 1))
     if np.any(motion[:3]):

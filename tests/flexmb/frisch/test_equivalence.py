@@ -23,6 +23,7 @@ from flexmb.frisch.equivalence import (
 from flexmb.frisch.mode_count import directions
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.scene.bodies import TipMass
 from tests.bounds import gamma, observed_order, relative
 from tests.flexmb.modal.beam_references import beam, clamped_free_roots
 
@@ -124,6 +125,23 @@ def test_rigid_body_on_a_spring_is_found(seed):
         assert relative(relation.rigid, relation.flexible) <= 100.0 * rounding, relation.equation
     again = fit_at(body, point, [axis])
     assert again.mismatch <= 10.0 * rounding
+
+
+def test_point_mass_on_a_boom_turns_about_the_clamp():
+    """(149) alone: a point has no inertia of its own, so the hinge may be anywhere, and is at the clamp."""
+    still = np.zeros((3, 1))
+    shape = np.array([0.0, 0.3, 0.4])
+    boom = FlexibleModel(
+        mass=np.array([2.0]), position=np.array([[4.0, 0.0, 0.0]]), com_offset=np.zeros((1, 3)),
+        inertia=np.zeros((1, 3, 3)), translation=shape.reshape(1, 3, 1), rotation=np.zeros((1, 3, 1)),
+        stiffness=np.array([[3.0]]), damping=np.zeros((1, 1)),
+        nodes={"origin": ModalNode(np.zeros(3), np.eye(3), still, still)}, clamped=True,
+    )  # fmt: skip
+    fit = best_hinge(appendage(boom))
+    assert np.array_equal(fit.hinge.point, np.zeros(3))
+    assert relative(abs(fit.hinge.axes[0]), [0.0, 0.8, 0.6]) <= gamma(20)
+    assert fit.mismatch <= gamma(100)
+    assert relative(fit.hinge.stiffness, [3.0 * 4.0**2 / 0.5**2]) <= gamma(100)  # the spring's energy is the mode's
 
 
 def test_displacements_of_a_rigid_body_on_a_spring_differ_at_second_order():
@@ -288,6 +306,15 @@ def test_modes_needed(accuracy, turning, moving):
     assert found["about y"].needed(accuracy) is None
     assert found["about y"].taking_part(12) == 0
     assert found["along y"].needed(0.01) is None
+
+
+def test_what_sits_in_the_clamp_is_not_counted():
+    """(149)-(151): no mode moves it, so no number of modes could carry it away from the base."""
+    lump = TipMass(x_m=0.0, mass_kg=5.0, inertia_kg_m2=((0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)))
+    heavy = {d.name: d for d in directions(cantilever(6, tip_masses=(lump,)))}
+    for d in directions(cantilever(6)):
+        assert heavy[d.name].inertia == pytest.approx(d.inertia, rel=1e-12)
+        assert heavy[d.name].worst == pytest.approx(d.worst, abs=1e-12)
 
 
 def test_modal_effective_inertia_of_all_modes_tends_to_the_rigid_body():

@@ -64,7 +64,7 @@ def printed_sums(model: FlexibleModel) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("body", BODIES)
 def test_printed_parameters_are_the_printed_sums(body):
-    """(7), (8), (17), (41), (48), (50)-(52), (54)-(56), (67), (68), (70), (72)."""
+    """(7), (8), (15), (17), (41), (48), (50)-(52), (54)-(56), (67), (68), (70), (72)."""
     p = mode_parameters(body, as_printed=True)
     for name, value in printed_sums(body).items():
         # A sum over the elements of products of at most ten numbers, twice; J of all orders is of order one here.
@@ -88,7 +88,7 @@ def origin(p: ModeParameters, n: int) -> dict[str, np.ndarray]:
 
 @pytest.mark.parametrize("body", BODIES)
 def test_corrected_parameters_are_derivatives_of_the_kinetic_energy(body):
-    """(47)-(49), (53), (55), (56) and their slopes: modal mass, coupling and inertia to first order."""
+    """(47)-(49), (53), (55), (56), (171)-(173) and their slopes: modal mass, coupling and inertia to first order."""
     p, n = mode_parameters(body), body.mode_count
     M = exact.mass_matrix(body, np.zeros(n))
     angular, linear = slice(n, n + 3), slice(n + 3, n + 6)
