@@ -14,12 +14,14 @@ from flexmb.dense.jets import Frame, Jet, constant
 from flexmb.dense.kinematics import Motion, member_frames, on_body, point_frames
 from flexmb.dense.tree import Member, Tree
 
+WORLD = Frame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
+
 
 def hinge_point(member: Member) -> Frame:
     """The hinge point seen from the frame of the body's data, (1,1,...)."""
     node = member.outboard.node
     if np.any(node.translation) or np.any(node.rotation_modes):
-        return Frame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
+        return WORLD
     return on_body(member.outboard, constant(np.zeros((1, 1, len(member.model.stiffness)))))
 
 
@@ -70,10 +72,9 @@ def expanded(tree: Tree, motion: Motion) -> Expanded:
     """All contiguous bodies and wheels, from second-order jets of their frames."""
     count = len(motion.u)
     frames = hinge_frames(tree, motion)
-    world = Frame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
     bodies, angular_rates = [], []
     for k, member in enumerate(tree.members):
-        inboard = frames[member.parent] if member.parent >= 0 else world
+        inboard = frames[member.parent] if member.parent >= 0 else WORLD
         seen = seen_from(inboard, frames[k], count)
         omega = np.broadcast_to(inboard.angular_velocity(), (count, 1, 3))[:, 0]
         bodies.append(seen)
