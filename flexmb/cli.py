@@ -142,10 +142,10 @@ def equivalence(
     **Exit code**: 0 compared, 2 the scene, the body or an option is wrong.
     """
     with _no_traceback():
-        from flexmb.frisch.advice import equivalence as compare
-        from flexmb.frisch.appendage import appendage_of
-        from flexmb.frisch.equivalence_plot import write_equivalence_plot
-        from flexmb.frisch.equivalence_table import equivalence_tables
+        from flexmb.frisch.equivalence.advice import equivalence as compare
+        from flexmb.frisch.equivalence.appendage import appendage_of
+        from flexmb.frisch.equivalence.picture import write_equivalence_plot
+        from flexmb.frisch.equivalence.table import equivalence_tables
 
         loaded = load_scene(scene)
         check_scene(loaded)

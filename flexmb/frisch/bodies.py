@@ -98,7 +98,7 @@ def _modal_row(c, w, k, n, R, omega, moved):
 
 @helper
 def wheel_terms(c, w, k, i):
-    """Wheel i of body k: tensor I_W, bias of its relative angular acceleration (131), (134), momentum rate (94)."""
+    """Wheel i of body k: I_W, bias of its relative rate (122), (131), (134), rate (94), (105) of its momentum (102)."""
     wheel, port, omega = w.wheel[i], w.port[c.wheel[i].port], vec3(w.nest[k].omega, 0)
     axis, spin = times(mat3(port.R, 0), vec3(c.wheel[i].axis, 0)), w.u[c.wheel[i].u_index]
     axial, transverse = c.wheel[i].axial, c.wheel[i].transverse
@@ -121,7 +121,7 @@ def wheel_terms(c, w, k, i):
     at = c.column[c.wheel[i].u_index].start
     store3(w.S, at, axis)  # partition h of (133)
     if c.wheel_entry[i].entry >= 0:
-        for n in range(c.body[k].modes):  # partition phiR_W of (126)
+        for n in range(c.body[k].modes):  # partition phiR_W (121) of (126)
             start = c.column[c.body[k].etad_index + n].start + c.wheel_entry[i].entry
             store3(w.S, start, vec3(w.port_mode[c.wheel[i].port, n].W, 0))
     store6(w.nest[k].inertia, 0, sym_add(sym6(w.nest[k].inertia, 0), inertia))

@@ -11,7 +11,7 @@ from flexmb.spatial.vector import cross, store3, sub, vec3
 
 @helper
 def constraint_loads(c, w):
-    """Total load (6,) across every hinge about its outboard hinge point, and torque of every wheel, World axes."""
+    """Load (6,) across every hinge about its outboard hinge point (112), (115), torque of wheels (113), World axes."""
     expanded_accelerations(c, w)
     bodies = c.body.shape[0]
     hinges = w.y.shape[0] - 3 * bodies

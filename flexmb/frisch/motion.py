@@ -44,7 +44,7 @@ def relative_motion(c, w):
 
 @helper
 def _port_in_body(c, w, k, i):
-    """Pose and relative motion of port i of body k, body axes: (2), (43), (44), (118), (124) and their derivatives."""
+    """Pose and motion of port i of body k, body axes: (2), (43), (44), (118), (121), (124) and their derivatives."""
     nm = c.body[k].modes
     x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
     r, R, w_rel, v_rel, alpha, a = field_motion(x, p, c.port_mode[i], w.mode[k], nm, w.port_mode[i])
@@ -85,7 +85,7 @@ def _port_in_world(c, w, k, i):
 
 @helper
 def _across_hinge(c, w, k):
-    """Body k relative to its parent: rates (116), (123), derivatives (119), (125) at udot = 0, and inertial motion."""
+    """Body k relative to its parent: rates (116), (117), (123), at udot = 0 (119), (125); its motion in World."""
     zero = (0.0, 0.0, 0.0)
     p, i, o = c.body[k].parent, c.body[k].inboard_port, c.body[k].outboard_port
     R_parent, omega = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), zero
@@ -142,7 +142,7 @@ def _across_hinge(c, w, k):
 
 @helper
 def _hinge_columns(c, w, k, R):
-    """Columns q of (133): the free coordinate vectors of hinge k, rotation and translation of O."""
+    """Columns q of (133): the free coordinate vectors of hinge k, rotation (129) and translation (132) of O."""
     H = w.nest[k].hinge_map
     for n in range(c.body[k].nv):
         at = c.column[c.body[k].u_index + n].start

@@ -41,7 +41,7 @@ def _join_nest(w, k, p):
 
 @helper
 def _right_sides(c, w):
-    """eta_1 .. eta_4 of (111) in the order of the expanded velocities."""
+    """eta_1 .. eta_4 of (111), right sides of (112)-(115), in the order of the expanded velocities."""
     bodies, wheels = c.body.shape[0], c.wheel.shape[0]
     hinges = w.eta.shape[0] - 3 * bodies
     for k in range(bodies):

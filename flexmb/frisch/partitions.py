@@ -11,7 +11,7 @@ from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, sym6, sym_f
 
 @helper
 def coefficient_matrix(c, w):
-    """Z of (111) from the nest sums, both triangles."""
+    """Z of (111), left sides of (112)-(115), from the nest sums, both triangles."""
     wheels = 3 * c.body.shape[0]
     for k in range(c.body.shape[0]):
         i = k

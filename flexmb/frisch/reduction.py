@@ -18,7 +18,7 @@ SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left
 
 @helper
 def reduce(c, w):
-    """M and right side of the scalar equations (136), (138), (141) in the speeds."""
+    """M and right side of the scalar equations (136), (138), (141) in the speeds; constraint loads drop out (135)."""
     _bias(c, w)
     _times(w, w.x, w.y)
     _product(c, w)
@@ -42,7 +42,7 @@ def reduce(c, w):
 
 @helper
 def _product(c, w):
-    """Z S, expanded rows by speeds; a few columns at a time are turned into rows, a cache line of each."""
+    """Z S of (128), expanded rows by speeds; a few columns at a time are turned into rows, a cache line of each."""
     nu, buffer = w.M.shape[0], w.columns
     for j in range(0, nu, buffer.shape[0]):
         count = min(nu - j, buffer.shape[0])
@@ -77,7 +77,7 @@ def _combine(c, w, start, stop, X, first, y):
 
 @helper
 def solve(c, w):
-    """Accelerations of the free speeds (144), given those of the predefined ones; a status code."""
+    """Free accelerations (144) of (137) reordered by w.free (142), given the predefined ones; a status code."""
     nu = w.u.shape[0]
     free = nu
     one_sided = c.printed[ONE_SIDED] == 1

@@ -8,7 +8,7 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from flexmb.cli import app
-from flexmb.frisch.appendage import appendage, appendage_of, with_modes
+from flexmb.frisch.equivalence.appendage import appendage, appendage_of, with_modes
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene import schema as s
 from flexmb.scene.shapes import beam_section

@@ -9,9 +9,10 @@ import pytest
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from flexmb.frisch.advice import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
-from flexmb.frisch.appendage import Appendage, appendage
-from flexmb.frisch.equivalence import (
+from flexmb.frisch.equivalence.advice import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
+from flexmb.frisch.equivalence.appendage import Appendage, appendage
+from flexmb.frisch.equivalence.mode_count import directions
+from flexmb.frisch.equivalence.relations import (
     acceleration_relations,
     best_hinge,
     displacement_relations,
@@ -20,7 +21,6 @@ from flexmb.frisch.equivalence import (
     rate_relations,
     turning_axis,
 )
-from flexmb.frisch.mode_count import directions
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.model import FlexibleModel, ModalNode
 from flexmb.scene.bodies import TipMass

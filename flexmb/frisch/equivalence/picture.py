@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
-from flexmb.frisch.advice import Equivalence
+from flexmb.frisch.equivalence.advice import Equivalence
 
 Array = NDArray[np.float64]
 

@@ -8,9 +8,9 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from flexmb.frisch.advice import BEST, Equivalence, percent
-from flexmb.frisch.equivalence import Fit, Relation, displacement_relations, modal_effective_inertia
-from flexmb.frisch.mode_count import Direction
+from flexmb.frisch.equivalence.advice import BEST, Equivalence, percent
+from flexmb.frisch.equivalence.mode_count import Direction
+from flexmb.frisch.equivalence.relations import Fit, Relation, displacement_relations, modal_effective_inertia
 
 Array = NDArray[np.float64]
 

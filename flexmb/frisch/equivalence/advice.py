@@ -12,9 +12,9 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.frisch.appendage import Appendage, inertia_about_origin
-from flexmb.frisch.equivalence import Fit, best_hinge, fit_at, modal_effective_inertia
-from flexmb.frisch.mode_count import Direction, directions
+from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
+from flexmb.frisch.equivalence.mode_count import Direction, directions
+from flexmb.frisch.equivalence.relations import Fit, best_hinge, fit_at, modal_effective_inertia
 
 Array = NDArray[np.float64]
 

@@ -22,8 +22,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.frisch.appendage import Appendage, inertia_about_origin
-from flexmb.frisch.equivalence import weighted_difference
+from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
+from flexmb.frisch.equivalence.relations import weighted_difference
 
 Array = NDArray[np.float64]
 UNIT = np.eye(3)

@@ -27,8 +27,8 @@ from scipy.linalg import eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from flexmb.frisch.appendage import Appendage
 from flexmb.frisch.elements import inertia_of
+from flexmb.frisch.equivalence.appendage import Appendage
 from flexmb.frisch.parameters import ModeParameters
 from flexmb.modal.cross import cross_matrix
 
