@@ -229,18 +229,24 @@ def acceleration_sweep(c, w):
 @helper
 def inboard_acceleration(c, w, k):
     """Acceleration of O as a point of the parent, without bias terms, minus gravity, in body axes: Phi' alpha_m."""
+    return carried_acceleration(c, w, w, k)
+
+
+@helper
+def carried_acceleration(c, w, x, k):
+    """Phi' alpha_m for the accelerations that x holds: the workspace w itself, or a response to forces."""
     p = c.body[k].parent
     R = mat3(w.body[k].rotation, 0)
     if p < 0:
-        return (0.0, 0.0, 0.0), times_t(R, vec3(w.ground, 0))
-    alpha = vec3(w.body[p].accel, 0)
-    a = vec3(w.body[p].accel, 3)
+        return (0.0, 0.0, 0.0), times_t(R, vec3(x.ground, 0))
+    alpha = vec3(x.body[p].accel, 0)
+    a = vec3(x.body[p].accel, 3)
     i = c.body[k].inboard_port
     if i >= 0:
         a = add(a, cross(alpha, vec3(w.port[i].r, 0)))
         for n in range(c.body[p].modes):
-            alpha = add(alpha, scale(w.mode[p, n].etadd, vec3(w.port_mode[i, n].W, 0)))
-            a = add(a, scale(w.mode[p, n].etadd, vec3(w.port_mode[i, n].L, 0)))
+            alpha = add(alpha, scale(x.mode[p, n].etadd, vec3(w.port_mode[i, n].W, 0)))
+            a = add(a, scale(x.mode[p, n].etadd, vec3(w.port_mode[i, n].L, 0)))
     return times_t(R, alpha), times_t(R, add(a, cross(alpha, vec3(w.body[k].arm, 0))))
 
 
@@ -249,15 +255,21 @@ def store_body_acceleration(c, w, k, alpha, a):
     """Keep the acceleration of O (without deformation part) and go on to the body origin."""
     store3(w.body[k].accel_hinge, 0, alpha)
     store3(w.body[k].accel_hinge, 3, a)
+    store_origin_acceleration(c, w, w, k, alpha, a)
+
+
+@helper
+def store_origin_acceleration(c, w, x, k, alpha, a):
+    """From the acceleration of O, without deformation part, to that of the body origin, kept in x."""
     i = c.body[k].outboard_port
     if i >= 0:
         r = vec3(w.port[i].r, 0)
         for n in range(c.body[k].modes):
-            alpha = sub(alpha, scale(w.mode[k, n].etadd, vec3(w.port_mode[i, n].W, 0)))
-            a = sub(a, scale(w.mode[k, n].etadd, vec3(w.port_mode[i, n].L, 0)))
+            alpha = sub(alpha, scale(x.mode[k, n].etadd, vec3(w.port_mode[i, n].W, 0)))
+            a = sub(a, scale(x.mode[k, n].etadd, vec3(w.port_mode[i, n].L, 0)))
         a = sub(a, cross(alpha, r))
-    store3(w.body[k].accel, 0, alpha)
-    store3(w.body[k].accel, 3, a)
+    store3(x.body[k].accel, 0, alpha)
+    store3(x.body[k].accel, 3, a)
 
 
 @helper

@@ -56,12 +56,23 @@ def forward_dynamics(c, w):
         elastic_forces(c, w, k)
         node_loads(c, w, k)
         wheel_forces(c, w, k)
+    if not inward(c, w):
+        return NOT_POSITIVE_DEFINITE
+    _outward(c, w)
+    return OK
+
+
+@helper
+def inward(c, w):
+    """The inward half of (63), (64); False where a D is not positive definite, w.fault names the body.
+
+    What it leaves of M_m are the factors that `flexmb.jain.innovations` solves with.
+    """
     for k in range(c.body.shape[0] - 1, -1, -1):
         if not (_eliminate_modes(c, w, k) and _eliminate_hinge(c, w, k)):
             w.fault[0] = k
-            return NOT_POSITIVE_DEFINITE
-    _outward(c, w)
-    return OK
+            return False
+    return True
 
 
 @helper
@@ -82,7 +93,7 @@ def _eliminate_modes(c, w, k):
     """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
     nm = c.body[k].modes
     if c.body[k].outboard_port >= 0:
-        _refer_to_hinge(c, w, k)
+        refer_to_hinge(c, w, k)
     p = load_inertia(w.body[k].inertia, 0)
     store_inertia(w.body[k].hinge_inertia, 0, p)
     for i in range(6):
@@ -128,7 +139,7 @@ def cholesky(a, n):
 
 
 @helper
-def _refer_to_hinge(c, w, k):
+def refer_to_hinge(c, w, k):
     """Refer P and z from the body origin to O on the deforming node d: the congruence with H_f of (13), (17).
 
     With V_body = X V_O - B etadot, B = X [W; L], X the shift from O to the origin: P_ff - B'P_rf - P_fr B + B'P_rr B,
@@ -193,6 +204,7 @@ def _eliminate_hinge(c, w, k):
         epsilon = w.speed[j].applied - (tau[2] if kind == REVOLUTE else f[2])
         s = 1.0 / d
         w.body[k].free_count = SINGLE
+        w.body[k].hinge_factor[0, 0] = d
         w.body[k].hinge_residual[0] = epsilon * s
         store3(w.body[k].hinge_gain[0], 0, scale(s, u_angular))
         store3(w.body[k].hinge_gain[0], 3, scale(s, u_linear))
@@ -249,12 +261,16 @@ def _eliminate_several(c, w, k, p, tau, f):
 
 @helper
 def _to_parent(c, w, k, p, tau, f):
-    """Gamma = P_R^+ in parent axes at the parent's reference; P += A Gamma A', z += A z_R^+ with A = [Pi'; phi]."""
+    """P_R^+ and z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+    inertia_to_parent(c, w, k, p)
+    force_to_parent(c, w, w, k, tau, f)
+
+
+@helper
+def inertia_to_parent(c, w, k, p):
+    """Gamma = P_R^+ in parent axes at the parent's reference; P += A Gamma A' with A = [Pi'; phi]."""
     parent = c.body[k].parent
-    R = mat3(w.body[k].rotation, 0)
-    arm = vec3(w.body[k].arm, 0)
-    gamma = shift_inertia(rotate_inertia(R, p), arm)
-    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    gamma = shift_inertia(rotate_inertia(mat3(w.body[k].rotation, 0), p), vec3(w.body[k].arm, 0))
     i = c.body[k].inboard_port
     if i >= 0:
         r = vec3(w.port[i].r, 0)
@@ -267,12 +283,23 @@ def _to_parent(c, w, k, p, tau, f):
             tau_n, f_n = shift_force(tau_n, f_n, r)
             add3(w.mode[parent, n].pfr, 0, tau_n)
             add3(w.mode[parent, n].pfr, 3, f_n)
-            w.mode[parent, n].zf += dot(angular, tau) + dot(linear, f)
         gamma = shift_inertia(gamma, r)
-        tau, f = shift_force(tau, f, r)
     add_inertia(w.body[parent].inertia, 0, gamma)
-    add3(w.body[parent].force, 0, tau)
-    add3(w.body[parent].force, 3, f)
+
+
+@helper
+def force_to_parent(c, w, z, k, tau, f):
+    """A [tau; f] added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+    parent = c.body[k].parent
+    R = mat3(w.body[k].rotation, 0)
+    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
+    i = c.body[k].inboard_port
+    if i >= 0:
+        for n in range(c.body[parent].modes):
+            z.mode[parent, n].zf += dot(vec3(w.port_mode[i, n].W, 0), tau) + dot(vec3(w.port_mode[i, n].L, 0), f)
+        tau, f = shift_force(tau, f, vec3(w.port[i].r, 0))
+    add3(z.body[parent].force, 0, tau)
+    add3(z.body[parent].force, 3, f)
 
 
 @helper
