@@ -109,8 +109,9 @@ def particles(e: Elements, alpha: Array) -> Particles:
 
 
 def mass_centre(e: Elements) -> Array:
-    """alpha (3,), (8)."""
-    return e.mass @ e.x / e.mass.sum()
+    """alpha (3,), (8); the origin for a body without mass, such as the ring of a gimbal."""
+    mass = e.mass.sum()
+    return e.mass @ e.x / mass if mass > 0.0 else np.zeros(3)
 
 
 def rotary(e: Elements) -> Rotary:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.arrays import Constants, Real
+from flexmb.arrays import Constants, Index, Real
 from flexmb.assemble import assemble
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
@@ -91,7 +91,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     """
     chain = links(scene)
     numbering = Numbering(chain, wheels_by_body(scene))
-    constants, _ = assemble(scene, chain, numbering, null_partitions)
+    constants, _, _ = assemble(scene, chain, numbering, null_partitions)
     return NestedSystem(constants, chain, numbering.nq, errata, null_partitions)
 
 
@@ -167,7 +167,7 @@ class NestedSystem:
             S[c.entry_row[entries], j] = w.S[entries]
         return RelativeMotion(w.nest["beta"].copy(), w.nest["alpha"].copy(), S, w.x.copy())
 
-    def _rows(self) -> tuple[Real, Real, Real, Real]:
+    def _rows(self) -> tuple[Index, Index, Index, Index]:
         """Expanded rows of the four partitions."""
         c, w = self.constants, self._w
         bodies, nx = len(c.body), len(w.x)

@@ -99,6 +99,19 @@ def test_drives(pair):
     assert not np.any(pair.motion.drives[~fixed])
 
 
+def test_ring_of_a_gimbal_without_mass():
+    """(8): a body without mass has no mass centre, and needs none."""
+    scene = flexmb.SceneBuilder("ring", gravity=(0.0, 0.0, -9.8)).rigid_body("ring", mass=0.0, inertia=(0.0, 0.0, 0.0))
+    scene.rigid_body("rotor", mass=1.0, com=(0.1, 0.2, 0.3), inertia=(1.0, 1.2, 1.4))
+    scene.revolute("outer", "ground", "ring", axis=(1.0, 0.0, 0.0), rate=0.3)
+    scene.revolute("inner", "ring", "rotor", axis=(0.0, 1.0, 0.0), rate=-0.5)
+    system = flexmb.compile(scene.scene())
+    state = system.initial_state
+    for algorithm in ("frisch", "frisch_as_printed"):
+        difference = system.accelerations(state, algorithm) - system.accelerations(state)
+        assert np.max(np.abs(system.mass_matrix(state) @ difference)) <= algebra(2, 2) * 10.0
+
+
 def test_it_is_not_blind():
     """Negative control: one per cent more mass in one body is seen in matrix, accelerations and loads."""
     scene = random_scene(0, SMALL)
