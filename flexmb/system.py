@@ -22,6 +22,7 @@ from flexmb.arrays import Constants, Real, Workspace
 from flexmb.assemble import assemble
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.frisch.system import NestedSystem, Partitions
+from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.links import Link, links
 from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene import schema as s
@@ -87,13 +88,14 @@ class System:
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
-        self.constants, self._markers = assemble(scene, self._links, self._numbering)
+        self.constants, self._markers, self._closure_ports = assemble(scene, self._links, self._numbering)
         self.nq, self.nu = self._numbering.nq, self._numbering.nu
         self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
         self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
         self._w = self.workspace()
         self.rhs, self.project = dynamics.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
+        self._operators: SpatialOperators | None = None
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -149,7 +151,13 @@ class System:
 
     def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
         """The partitioned equations of motion, Frisch (111), by the names of the paper."""
-        return self.nested(algorithm).partitions(state.t, _pack(state))
+        return self.nested(algorithm).partitions(state.t, pack(state))
+
+    def operators(self, state: State) -> Operators:
+        """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
+        if self._operators is None:
+            self._operators = SpatialOperators(self.scene)
+        return self._operators.at(state.t, state.q, state.u)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
@@ -163,10 +171,10 @@ class System:
             raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
         if algorithm in ERRATA:
             nested = self.nested(algorithm)
-            status, rates = nested.accelerations(state.t, _pack(state))
+            status, rates = nested.accelerations(state.t, pack(state))
             self._check(status, nested.fault)
             return rates
-        self._check(dynamics.accelerations(state.t, _pack(state), self.constants, self._w))
+        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
         if algorithm == "composite":
             return self._composite(state, self._w.speed["acceleration"].copy(), self._w.speed["applied"].copy())
         return self._w.speed["acceleration"].copy()
@@ -182,7 +190,7 @@ class System:
     def mass_matrix(self, state: State) -> Real:
         """M (nu,nu)."""
         M = np.zeros((self.nu, self.nu))
-        dynamics.mass_matrix(state.t, _pack(state), self.constants, self._w, M)
+        dynamics.mass_matrix(state.t, pack(state), self.constants, self._w, M)
         return M
 
     def bias(self, state: State) -> Real:
@@ -197,12 +205,12 @@ class System:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
         tau, loads = np.zeros(self.nu), np.zeros((len(self._links), 6))
         rates = np.asarray(accelerations, float)
-        dynamics.inverse_dynamics(state.t, _pack(state), rates, self.constants, self._w, tau, loads)
+        dynamics.inverse_dynamics(state.t, pack(state), rates, self.constants, self._w, tau, loads)
         return tau, loads
 
     def applied(self, state: State) -> Real:
         """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
-        self._check(dynamics.accelerations(state.t, _pack(state), self.constants, self._w))
+        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
         return self._w.speed["applied"].copy()
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
@@ -296,17 +304,30 @@ class System:
     def _check(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
-            body = self.body_names[int(self._w.fault[0]) if fault is None else fault]
-            raise DynamicsError(Status(status).advice.format(body=f'"{body}"'))
+            place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
+            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """What a failure's number stands for: a body."""
+        return self.body_names[fault]
 
 
 def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as flexmb.compile)
     """Check a scene and turn it into arrays.
 
     Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
-    supported yet (loop closures, SID files, level "stiffened").
+    supported yet (SID files, level "stiffened").
     """
     check_scene(scene)
+    return assembled(scene)
+
+
+def assembled(scene: s.Scene) -> System:
+    """The system of a scene that was checked before."""
+    if scene.closures:
+        from flexmb.closed_system import ClosedSystem  # a tree needs none of it
+
+        return ClosedSystem(scene)
     return System(scene)
 
 
@@ -316,7 +337,7 @@ def _find(places: dict[str, slice], name: str) -> slice:
     return places[name]
 
 
-def _pack(state: State) -> Real:
+def pack(state: State) -> Real:
     """y = [q, u, work]."""
     return np.concatenate([state.q, state.u, [0.0]])
 

@@ -105,7 +105,7 @@ class Tree:
 
 def build(scene: s.Scene, folder: Path | None = None) -> Tree:
     """The tree of a scene; `.npz` files are looked up in `folder`."""
-    models = {GROUND: _rigid(0.0, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})}
+    models = {GROUND: rigid_model(0.0, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})}
     models |= {body.name: _model(body, folder) for body in scene.bodies}
     tree = Tree([], [], [], {}, 0, 0)
     for body, hinge in ordered(scene):
@@ -117,7 +117,7 @@ def build(scene: s.Scene, folder: Path | None = None) -> Tree:
             if wheel.body == body.name:
                 tree = _append_wheel(tree, wheel, _seat(models[body.name], wheel.node, wheel.offset_m))
     for mass in scene.point_masses:
-        point = _rigid(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})
+        point = rigid_model(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})
         inboard, outboard = _seat(models[mass.body], mass.node, mass.offset_m), _seat(point, "origin")
         tree = _append(tree, mass.name, mass.body, mass, inboard, outboard, point, "rigid")
     sites = {f"load:{x.name}": (tree.index(x.body), _seat(models[x.body], x.node)) for x in scene.loads}
@@ -179,14 +179,14 @@ def _matrix(quaternion: ArrayLike) -> Array:
 def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
     if isinstance(body, s.RigidBody):
         frames = {name: (frame.position, frame.quaternion) for name, frame in rest_frames(body).items()}
-        return _rigid(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
+        return rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
     if isinstance(body, s.SidBody) or body.level not in LEVELS:
         raise NotImplementedError(f'body "{body.name}": the dense route knows levels {", ".join(LEVELS)}')
     model = flexible_model(body, folder)
     return _stiff(model) if body.level == "rigid" else model
 
 
-def _rigid(
+def rigid_model(
     mass: float, com: Array, inertia: Array, frames: Mapping[str, tuple[Vector, Quaternion]]
 ) -> FlexibleModel:
     """A body without modes: one point at its centre of mass."""

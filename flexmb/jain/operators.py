@@ -1,0 +1,293 @@
+"""Spatial operators as dense arrays, to be read beside Jain & Rodriguez, sections II to V.
+
+    operators = system.operators(state)
+    operators.H @ operators.Phi @ operators.M_m @ operators.Phi.T @ operators.H.T  # the mass matrix (43)
+
+Names are the paper's; of its script letters E is `E_Phi`, H is `H`; its star is the transpose. Departures: bodies are
+numbered base to tip, so that what is block lower triangular in the print is upper triangular here; generalised speeds
+stand in the order of u, in which a hinge's speeds precede its body's modes; wheels are bodies, after all others.
+
+All of it is of order n^3, to be looked at and to check the recursions: a third route, with the kinematics of
+`flexmb.dense` and the equations of the operators.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag, cho_factor, cho_solve
+
+from flexmb.dense.profiles import profile
+from flexmb.dense.system import DenseSystem, Snapshot
+from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
+from flexmb.scene import schema as s
+
+Array = NDArray[np.float64]
+Index = NDArray[np.int64]
+
+
+@dataclass(frozen=True, eq=False)
+class Operators:
+    """The operators of one tree at one state; SI, World axes, accelerations are inertial rates of V_m.
+
+    n speeds; nbar = sum of m_k + 6 over all bodies. Body k has `columns[k]` of nbar, [modes; angular; linear], the
+    last six about its frame's origin, and `rows[k]` of n, [etad; beta].
+
+    E_Phi (nbar,nbar)   Phi(parent, k) at the blocks (parent, k) (12), (18)
+    H (n,nbar)          modal joint map, script-H of (13), (17)
+    M_m (nbar,nbar)     modal mass matrices (23)
+    a_m, b_m (nbar,)    Coriolis and centrifugal accelerations (25); gyroscopic forces (37), less all external forces,
+                        gravity among them, plus modal damping
+    K_m (nbar,nbar)     modal stiffness (38), to act on `deformation` (nbar,) = [eta; 0] of every body
+    chi (n,)            generalised speeds (4), with etad = 0 at level ruthless
+    """
+
+    bodies: tuple[str, ...]
+    parent: tuple[int, ...]
+    columns: tuple[slice, ...]
+    rows: tuple[Index, ...]
+    E_Phi: Array
+    H: Array
+    M_m: Array
+    a_m: Array
+    b_m: Array
+    K_m: Array
+    deformation: Array
+    chi: Array
+
+    # Newton-Euler operators, section II
+
+    @cached_property
+    def Phi(self) -> Array:
+        """(1 - E_Phi)^-1 (nbar,nbar) (19)."""
+        return self._resolvent(self.E_Phi)
+
+    @cached_property
+    def V_m(self) -> Array:
+        """Modal spatial velocities (nbar,) (20)."""
+        return self.Phi.T @ (self.H.T @ self.chi)
+
+    def alpha_m(self, chi_dot: Array) -> Array:
+        """Modal spatial accelerations (nbar,) (26)."""
+        return self.Phi.T @ (self.H.T @ chi_dot + self.a_m)
+
+    def f_m(self, chi_dot: Array) -> Array:
+        """Modal spatial forces (nbar,) between each body and its parent (40)."""
+        return self.Phi @ (self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation)
+
+    def inverse_dynamics(self, chi_dot: Array) -> Array:
+        """T (n,) (41)."""
+        return self.H @ self.f_m(chi_dot)
+
+    @cached_property
+    def M(self) -> Array:
+        """Mass matrix (n,n), Newton-Euler factorisation (43)."""
+        H_Phi = self.H @ self.Phi
+        return H_Phi @ self.M_m @ H_Phi.T
+
+    @cached_property
+    def C(self) -> Array:
+        """Coriolis, centrifugal and elastic forces (n,) in M chi_dot + C = T (43)."""
+        forces = self.M_m @ (self.Phi.T @ self.a_m) + self.b_m + self.K_m @ self.deformation
+        return self.H @ (self.Phi @ forces)
+
+    # Composite bodies, section IV
+
+    @cached_property
+    def R(self) -> Array:
+        """Composite-body inertias (nbar,nbar), block diagonal (47)."""
+        R = self.M_m.copy()
+        for k in reversed(range(len(self.parent))):
+            self._add_to_parent(R, k, R[self.columns[k], self.columns[k]])
+        return R
+
+    # Articulated bodies, section V
+
+    @cached_property
+    def _articulated(self) -> tuple[Array, Array, Array]:
+        """P (nbar,nbar), D^-1 (n,n) and G (nbar,n) by the recursion (51), tips to base."""
+        P, G, D_inverse = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
+        for k in reversed(range(len(self.parent))):
+            rows, columns = self.rows[k], self.columns[k]
+            H, P_k = self.H[rows, columns], P[columns, columns]
+            factor = cho_factor(H @ P_k @ H.T)
+            D_inverse[np.ix_(rows, rows)] = cho_solve(factor, np.eye(len(rows)))
+            G_k = cho_solve(factor, H @ P_k).T
+            G[columns, rows] = G_k
+            tau_bar = np.eye(len(P_k)) - G_k @ H
+            self._add_to_parent(P, k, tau_bar @ P_k)
+        return P, D_inverse, G
+
+    @property
+    def P(self) -> Array:
+        """Articulated-body inertias (nbar,nbar), block diagonal (51). LinAlgError where a D(k) is not definite."""
+        return self._articulated[0]
+
+    @cached_property
+    def D(self) -> Array:
+        """H P H' (n,n), block diagonal (52)."""
+        return self.H @ self.P @ self.H.T
+
+    @property
+    def D_inverse(self) -> Array:
+        """(n,n), block diagonal."""
+        return self._articulated[1]
+
+    @property
+    def G(self) -> Array:
+        """P H' D^-1 (nbar,n), block diagonal (52)."""
+        return self._articulated[2]
+
+    @cached_property
+    def K(self) -> Array:
+        """E_Phi G (nbar,n) (52)."""
+        return self.E_Phi @ self.G
+
+    @cached_property
+    def tau_bar(self) -> Array:
+        """1 - G H (nbar,nbar), block diagonal (52)."""
+        return np.eye(len(self.P)) - self.G @ self.H
+
+    @cached_property
+    def E_Psi(self) -> Array:
+        """E_Phi tau_bar (nbar,nbar) (52)."""
+        return self.E_Phi @ self.tau_bar
+
+    @cached_property
+    def Psi(self) -> Array:
+        """(1 - E_Psi)^-1 (nbar,nbar) (53)."""
+        return self._resolvent(self.E_Psi)
+
+    @cached_property
+    def innovations(self) -> Array:
+        """1 + H Phi K (n,n), unit triangular by blocks: M = (1 + H Phi K) D (1 + H Phi K)' (54)."""
+        return np.eye(len(self.H)) + self.H @ self.Phi @ self.K
+
+    @cached_property
+    def innovations_inverse(self) -> Array:
+        """1 - H Psi K (n,n), the inverse of `innovations` (55)."""
+        return np.eye(len(self.H)) - self.H @ self.Psi @ self.K
+
+    @property
+    def M_inverse(self) -> Array:
+        """(1 - H Psi K)' D^-1 (1 - H Psi K) (n,n) (56)."""
+        return self.innovations_inverse.T @ self.D_inverse @ self.innovations_inverse
+
+    @property
+    def log_determinant(self) -> float:
+        """log det M = log det D: the factors beside D (54) are unit triangular."""
+        return sum(float(np.linalg.slogdet(self.D[np.ix_(rows, rows)])[1]) for rows in self.rows)
+
+    def accelerations(self, T: Array) -> Array:
+        """chi_dot (n,) for generalised forces T (n,), all of them free: Lemma 5 (57)."""
+        forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
+        innovation = T - self.H @ (self.Psi @ forces)
+        chi_dot = self.innovations_inverse.T @ (self.D_inverse @ innovation)
+        return chi_dot - self.K.T @ (self.Psi.T @ self.a_m)
+
+    def driven(self, prescribed: NDArray[np.bool_], rates: Array) -> Operators:
+        """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.
+
+        The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds.
+        """
+        place = np.cumsum(~prescribed) - 1
+        return replace(
+            self,
+            rows=tuple(place[rows[~prescribed[rows]]] for rows in self.rows),
+            H=self.H[~prescribed],
+            chi=self.chi[~prescribed],
+            a_m=self.a_m + self.H[prescribed].T @ rates[prescribed],
+        )
+
+    def _resolvent(self, E: Array) -> Array:
+        """(1 - E)^-1 = 1 + E + E^2 + ... of a nilpotent E with one block in each body's columns, that of its parent."""
+        found = np.eye(len(E))
+        for p, columns in zip(self.parent, self.columns, strict=True):
+            if p >= 0:
+                found[:, columns] += found[:, self.columns[p]] @ E[self.columns[p], columns]
+        return found
+
+    def _add_to_parent(self, inertia: Array, k: int, own: Array) -> None:
+        """Add Phi(p, k) own Phi'(p, k) to the parent's block, in place."""
+        if self.parent[k] >= 0:
+            p = self.columns[self.parent[k]]
+            Phi = self.E_Phi[p, self.columns[k]]
+            inertia[p, p] += Phi @ own @ Phi.T
+
+
+class SpatialOperators:
+    """The operators of one scene, at any state; trees of rigid and flexible bodies, point masses and wheels."""
+
+    def __init__(self, scene: s.Scene) -> None:
+        self._dense = DenseSystem(scene)
+        self._bodies = with_wheels(self._dense.tree)
+
+    def configuration(self, t: float, q: Array, u: Array) -> Configuration:
+        """All bodies as inertia sees them: prescribed coordinates on their functions, ruthless bodies undeformed."""
+        return Configuration(self._bodies, *undeformed(self._bodies, *self._dense.on_profile(q, u, t)))
+
+    def at(self, t: float, q: Array, u: Array) -> Operators:
+        """The operators at time t, coordinates q (nq,) and speeds u (nu,), all speeds free."""
+        now, members = self.configuration(t, q, u), self._bodies.members
+        modes = [member.model.mode_count for member in members]
+        ends = np.cumsum([0, *(m + 6 for m in modes)])
+        columns = tuple(slice(int(a), int(b)) for a, b in zip(ends[:-1], ends[1:], strict=True))
+        place = np.arange(self._bodies.nu)
+        rows = tuple(np.concatenate([place[member.u_modes], place[member.u_hinge]]) for member in members)
+        E_Phi, H = np.zeros((ends[-1], ends[-1]), complex), np.zeros((self._bodies.nu, ends[-1]), complex)
+        for k, member in enumerate(members):
+            H[rows[k], columns[k]] = now.joint_map(k)
+            if member.parent >= 0:
+                E_Phi[columns[member.parent], columns[k]] = now.interbody(k)
+        none, nbar = np.zeros(ends[-1]), np.zeros((ends[-1], ends[-1]))
+        kinematics = Operators(
+            tuple(member.name for member in members), tuple(member.parent for member in members), columns, rows,
+            value(E_Phi), value(H), nbar, none, none, nbar, none, now.u,
+        )  # fmt: skip
+        V_m = kinematics.V_m
+        M_m, b_m = self._inertia(now, columns, V_m)
+        deformation, damping = none.copy(), none.copy()
+        for m, member, at in zip(modes, members, columns, strict=True):
+            deformation[at][:m] = q[member.q_modes]
+            damping[at][:m] = member.model.damping @ u[member.u_modes]
+        return replace(
+            kinematics,
+            M_m=M_m,
+            a_m=rate(E_Phi).T @ V_m + rate(H).T @ now.u,
+            b_m=b_m + damping - self._external(now, t, columns, M_m),
+            K_m=block_diag(*(block_diag(member.model.stiffness, np.zeros((6, 6))) for member in members)),
+            deformation=deformation,
+        )
+
+    def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Array) -> tuple[Array, Array]:
+        """M_m (nbar,nbar) and b_m (nbar,); level linear cut off after the first order, in its own body's frame."""
+        M_m, b_m = np.zeros((len(V_m), len(V_m))), np.zeros(len(V_m))
+        tree = self._dense.tree
+        linear = Snapshot(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}
+        for k, at in enumerate(columns):
+            if k in linear:
+                to_world = block_diag(np.eye(at.stop - at.start - 6), linear[k].rotation, linear[k].rotation)
+                M_m[at, at], b_m[at] = to_world @ linear[k].M @ to_world.T, to_world @ linear[k].bias
+            else:
+                body = now.nodal_body(k)
+                M_m[at, at], b_m[at] = body.M_m, body.b_m(V_m[at])
+        return M_m, b_m
+
+    def _external(self, now: Configuration, t: float, columns: tuple[slice, ...], M_m: Array) -> Array:
+        """Modal forces (nbar,) of gravity and of loads at nodes."""
+        fall = np.zeros(len(M_m))
+        for at in columns:
+            fall[at][-3:] = self._dense.scene.gravity_m_s2
+        found = M_m @ fall
+        for load in self._dense.scene.loads:
+            k, seat = self._bodies.sites[f"load:{load.name}"]
+            direction = np.array(load.direction)
+            if load.frame == "node":
+                direction = value(now.seat(k, seat)[1]) @ direction
+            F = np.zeros(6)
+            F[slice(0, 3) if load.type == "torque" else slice(3, 6)] = profile(load.function, t).value * direction
+            found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
+        return found
