@@ -1,0 +1,113 @@
+"""Section VII against its own statements, against algorithms that can be counted, and against our kernels."""
+
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb import dynamics
+from flexmb.counting import Operations, count
+from flexmb.jain import cost
+from tests.benchmarks.rivals import flexible_chain, rigid_chain
+
+
+@pytest.mark.parametrize("n", range(21))
+def test_polynomials_are_numbers_of_operations(n):
+    """All are whole numbers up to the 20 modes of figure 2."""
+    for polynomial in (cost.composite_inertia, cost.bias, cost.articulated_inertia,
+                       cost.articulated_inertia_by_identity, cost.inward_sweep, cost.outward_sweep):  # fmt: skip
+        assert polynomial(n).total > 0
+    assert cost.mass_matrix_row(2, n) == 2 * cost.mass_matrix_row(1, n)
+
+
+def test_the_scan_of_composite_inertia_is_no_number_of_operations():
+    """n^2 + 97/2 n + 116 additions are not whole for odd n: why they are read as n^2/2 + 97/2 n + 116."""
+    with pytest.raises(ValueError, match="no number of operations"):
+        cost._whole(1, "116 97/2 1")
+
+
+def test_statements_of_the_paper():
+    """Explicit inversion is cheaper for up to 7 modes; factors over 3 and 7 with 5 and 10 modes on 10 bodies."""
+    explicit, identity = cost.articulated_inertia, cost.articulated_inertia_by_identity
+    cheaper = [n for n in range(21) if explicit(n).total <= identity(n).total]
+    assert cheaper == list(range(cost.EXPLICIT_UP_TO + 1))
+    ratio = {n: cost.composite([n] * 10).total / cost.articulated([n] * 10).total for n in (5, 10)}
+    assert 3.0 < ratio[5] < 4.0
+    assert 7.0 < ratio[10] < 8.0
+
+
+class LinearEquations:
+    """L D L' and both substitutions, in place: L above the diagonal, L D on and below it."""
+
+    @staticmethod
+    def py_func(matrix, right):
+        n = right.shape[0]
+        for j in range(n):
+            for m in range(j, n):
+                for i in range(j):
+                    matrix[m, j] -= matrix[m, i] * matrix[i, j]
+            for m in range(j + 1, n):
+                matrix[j, m] = matrix[m, j] / matrix[j, j]
+        for j in range(n):
+            for i in range(j):
+                right[j] -= matrix[i, j] * right[i]
+        for j in range(n):
+            right[j] = right[j] / matrix[j, j]
+        for j in range(n - 1, -1, -1):
+            for i in range(j + 1, n):
+                right[j] -= matrix[j, i] * right[i]
+
+
+@pytest.mark.parametrize("n", [1, 2, 3, 5, 8])
+def test_linear_equations_are_an_ldl_factorisation(n):
+    """To the last operation, with divisions as multiplications."""
+    root, right = np.random.default_rng(n).normal(size=(n, n)), np.ones(n)
+    matrix = root @ root.T + n * np.eye(n)
+    counted = count(LinearEquations, matrix, right)
+    np.testing.assert_allclose(matrix @ counted.arguments[1].astype(float), right, rtol=0.0, atol=1e-12)
+    found, printed = counted.operations, cost.linear_equations(n)
+    assert found.multiplications + found.divisions == printed.multiplications
+    assert found.additions == printed.additions
+
+
+def executed(scene, kernel=dynamics.accelerations) -> Operations:
+    """Operations of one evaluation of the accelerations at the initial state."""
+    system = flexmb.compile(scene)
+    state = system.initial_state
+    y = np.concatenate([state.q, state.u, [0.0]])
+    return count(kernel, 0.0, y, system.constants, system.workspace()).operations
+
+
+def degree(counts: list[int]) -> int:
+    """Of the polynomial through counts at equal distances; ValueError where they do not show its end."""
+    differences, found = np.array(counts), 0
+    while np.any(differences[1:] != differences[:-1]):
+        differences, found = np.diff(differences), found + 1
+        if len(differences) < 3:
+            raise ValueError(f"no polynomial of a degree below {found + 1} goes through {counts}")
+    return found
+
+
+def test_degree():
+    for n in range(4):
+        assert degree([7 * k**n + k for k in range(8)]) == max(n, 1)
+    with pytest.raises(ValueError, match="no polynomial"):
+        degree([2**n for n in range(8)])
+
+
+@pytest.mark.parametrize("level", ["rigid", "ruthless", "full"])
+def test_articulated_bodies_cost_the_same_each(level):
+    """Exactly linear in N once there is an inner body: second differences vanish in every kind of operation."""
+    counts = [executed(rigid_chain(n) if level == "rigid" else flexible_chain(n, 3, level)) for n in range(2, 7)]
+    steps = [b - a for a, b in zip(counts[:-1], counts[1:], strict=True)]
+    assert len(set(steps)) == 1
+    assert steps[0].total > 0
+
+
+@pytest.mark.parametrize("level", ["ruthless", "full"])
+def test_explicit_elimination_is_cubic_in_modes(level):
+    """A factorisation of D_f: a cubic, its leading term n^3 / 6 multiplications and as many additions."""
+    counts = [executed(flexible_chain(3, n, level)) for n in range(1, 8)]
+    for kind in ("multiplications", "additions"):
+        numbers = [getattr(c, kind) for c in counts]
+        assert degree(numbers) == 3
+        assert set(np.diff(numbers, 3)) == {3}  # three bodies, 3! / 6 each
