@@ -56,6 +56,6 @@ def reduced(nested: NestedSystem, state: flexmb.State) -> tuple[np.ndarray, np.n
     return nested.reduced(state.t, packed(state))
 
 
-def expanded(nested: NestedSystem, rows: Partitions, accelerations: np.ndarray) -> np.ndarray:
-    """Expanded accelerations in the order of `rows`, which were made last: S udot plus what is left at udot = 0."""
-    return rows.S @ accelerations + nested._w.x[np.concatenate(nested._rows())]
+def expanded(rows: Partitions, accelerations: np.ndarray) -> np.ndarray:
+    """Expanded accelerations in the order of `rows`: S udot plus what is left at udot = 0."""
+    return rows.S @ accelerations + rows.bias

@@ -123,7 +123,7 @@ def test_modal_rows_of_the_print_lack_the_loads_of_outboard_hinges(seed):
     y = packed(state)
     _, motion = nested.motion(0.0, y)
     rows = nested.partitions(0.0, y)
-    x = expanded(nested, rows, motion.accelerations)
+    x = expanded(rows, motion.accelerations)
     residual = rows.matrix @ x - np.concatenate(rows.eta)
     first, wheels, modes = len(rows.X), len(rows.I_s), len(rows.M1)
     modal = slice(first + wheels, first + wheels + modes)
