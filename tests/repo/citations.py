@@ -1,9 +1,10 @@
 """Citations of numbered equations, read from the docstrings and comments of functions and classes.
 
-A citation is a number or a range in parentheses: "(107)", "(98), (99)", "(129)-(134)". In a paper's own folders every
-one counts that does not stand behind the name of another paper; elsewhere those that stand behind its name, as in
-"Frisch (48)" and "Frisch's (47), (49)". What stands in a module, outside its functions and classes, is read for numbers
-that do not exist, but cites nothing: an equation belongs to the function that does it.
+A citation is a number or a range in parentheses: "(107)", "(98), (99)", "(129)-(134)", and "(A4)" for a paper whose
+appendices number theirs so. In a paper's own folders every one counts that does not stand behind the name of another
+paper; elsewhere those that stand behind its name, as in "Frisch (48)" and "Frisch's (47), (49)". What stands in a
+module, outside its functions and classes, is read for numbers that do not exist, but cites nothing: an equation belongs
+to the function that does it.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ import tokenize
 from dataclasses import dataclass
 from pathlib import Path
 
-_NUMBER = r"\(\d{1,3}\)"
+_NUMBER = r"\([A-Z]?\d{1,3}\)"
 _ITEM = rf"{_NUMBER}(?:(?:\s*[-\u2013]\s*|\s+to\s+){_NUMBER})?"  # a number or a range
 _LIST = rf"{_ITEM}(?:(?:,?\s+and\s+|[,;]\s*){_ITEM})*"
 _FREE_ITEM = re.compile(rf"(?<![\w\])]){_ITEM}")  # not the argument of a function
@@ -23,11 +24,15 @@ _FREE_ITEM = re.compile(rf"(?<![\w\])]){_ITEM}")  # not the argument of a functi
 
 @dataclass(frozen=True)
 class Sources:
-    """How a paper is cited: bare numbers in `folders`, behind `names` elsewhere, behind `other_names` nowhere."""
+    """How a paper is cited: bare numbers in `folders`, behind `names` elsewhere, behind `other_names` nowhere.
+
+    `letters` are those of appendices whose equations are numbered; a number with another letter is no citation.
+    """
 
     folders: tuple[str, ...]
     names: tuple[str, ...]
     other_names: tuple[str, ...]
+    letters: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, order=True)
@@ -44,18 +49,22 @@ class Place:
         return Path(self.path).name.startswith("test_") and function.startswith("test_")
 
 
-def numbers(text: str, sources: Sources, in_folder: bool) -> dict[int, bool]:
+def numbers(text: str, sources: Sources, in_folder: bool) -> dict[str, bool]:
     """Equation numbers that a text cites, and whether each is named by itself, not only in a range."""
     if in_folder:
         passages = [_behind(sources.other_names).sub("", text)]
     else:
         passages = [match[0] for match in _behind(sources.names).finditer(text)]
-    found: dict[int, bool] = {}
+    found: dict[str, bool] = {}
     for passage in passages:
         for item in _FREE_ITEM.findall(passage):
-            ends = [int(number) for number in re.findall(r"\d+", item)]
-            for n in range(ends[0], ends[-1] + 1):
-                found[n] = len(ends) == 1 or found.get(n, False)
+            ends = re.findall(r"([A-Z]?)(\d+)", item)
+            letter = ends[0][0]
+            if letter and letter not in sources.letters:
+                continue
+            for n in range(int(ends[0][1]), int(ends[-1][1]) + 1):
+                label = f"{letter}{n}"
+                found[label] = len(ends) == 1 or found.get(label, False)
     return found
 
 
@@ -88,9 +97,9 @@ def texts(source: str) -> dict[str, str]:
     return {name: "\n".join(parts) for name, parts in found.items()}
 
 
-def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[Place, dict[int, bool]]:
+def citations(root: Path, sources: Sources, packages: tuple[str, ...]) -> dict[Place, dict[str, bool]]:
     """What every function, class and module below root/packages cites; those that cite nothing are left out."""
-    cited: dict[Place, dict[int, bool]] = {}
+    cited: dict[Place, dict[str, bool]] = {}
     for package in packages:
         for path in sorted((root / package).rglob("*.py")):
             relative = path.relative_to(root).as_posix()

@@ -11,7 +11,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from tests.repo.citations import Place, Sources, citations
@@ -22,10 +22,10 @@ CODE = ("flexmb", "crosscheck")
 TESTS = ("tests/flexmb", "tests/crosscheck", "tests/cases")
 INTRODUCTION = """# Equations
 
-Every numbered equation of the paper, the functions that implement or use it and the tests that hold it, or why none is
-needed. This page is generated: `python -m tests.repo.equations` reads `docs/equations/*.toml` and the equation numbers
-that docstrings and comments of functions, classes and tests cite. What the print gets wrong is in [errata](errata.md),
-symbols and frames are in [notation](notation.md).
+Every numbered equation of the papers, the functions that implement or use it and the tests that hold it, or why none
+is needed. This page is generated: `python -m tests.repo.equations` reads `docs/equations/*.toml` and the equation
+numbers that docstrings and comments of functions, classes and tests cite. What the prints get wrong is in
+[errata](errata.md), symbols and frames are in [notation](notation.md).
 """
 TABLE_HEAD = "| | states | implemented or used in | held by |\n|---|---|---|---|\n"
 
@@ -34,7 +34,7 @@ TABLE_HEAD = "| | states | implemented or used in | held by |\n|---|---|---|---|
 class Equation:
     """One numbered equation; `none` says why no function is needed."""
 
-    number: int
+    number: str
     section: str
     states: str
     none: str
@@ -47,9 +47,21 @@ class Paper:
     title: str
     reference: str
     sources: Sources
-    errata: str  # page of errata, relative to docs/, its headings name equations
+    errata: str  # page of errata, relative to docs/
     last: int
     equations: tuple[Equation, ...]
+    appendices: dict[str, int] = field(default_factory=dict)  # last equation of appendices with lettered numbers
+
+    @property
+    def numbers(self) -> list[str]:
+        """All its equations: (1) to (`last`), then those of the appendices."""
+        lettered = (f"{letter}{n}" for letter, last in self.appendices.items() for n in range(1, last + 1))
+        return [*map(str, range(1, self.last + 1)), *lettered]
+
+    @property
+    def anchor(self) -> str:
+        """Where the page has it: the paper's first name."""
+        return anchor(self.sources.names[0])
 
 
 def load_paper(path: Path) -> Paper:
@@ -58,9 +70,10 @@ def load_paper(path: Path) -> Paper:
     equations = []
     for section in data.pop("section"):
         for entry in section["equation"]:
-            equation = Equation(section=section["title"], **({"none": ""} | entry))
-            equations.append(equation)
-    sources = Sources(*(tuple(data.pop(key)) for key in ("folders", "names", "other_names")))
+            number = str(entry.pop("number"))
+            equations.append(Equation(number=number, section=section["title"], **({"none": ""} | entry)))
+    named = (tuple(data.pop(key)) for key in ("folders", "names", "other_names"))
+    sources = Sources(*named, letters=tuple(data.get("appendices", {})))
     return Paper(sources=sources, equations=tuple(equations), **data)
 
 
@@ -69,9 +82,9 @@ class Index:
     """Where a paper's equations are cited."""
 
     paper: Paper
-    code: dict[int, list[Place]]
-    tests: dict[int, list[Place]]
-    unknown: list[tuple[Place, int]]  # citations of numbers that the paper does not have
+    code: dict[str, list[Place]]
+    tests: dict[str, list[Place]]
+    unknown: list[tuple[Place, str]]  # citations of numbers that the paper does not have
 
     @classmethod
     def of(cls, paper: Paper, root: Path = ROOT) -> Index:
@@ -92,9 +105,9 @@ class Index:
     def faults(self) -> list[str]:
         """What is wrong: numbers that do not exist, equations without code or reason, or with both, or without test."""
         faults = [f"{place.path} {place.name}: cites ({n}), which does not exist" for place, n in self.unknown]
-        expected = range(1, self.paper.last + 1)
-        if [equation.number for equation in self.paper.equations] != list(expected):
-            faults.append(f"the data file does not list (1) to ({self.paper.last}) once each and in order")
+        expected = self.paper.numbers
+        if [equation.number for equation in self.paper.equations] != expected:
+            faults.append(f"the data file does not list (1) to ({expected[-1]}) once each and in order")
         for equation in self.paper.equations:
             n, code, tests = equation.number, self.code.get(equation.number), self.tests.get(equation.number)
             if not code and not equation.none:
@@ -109,9 +122,9 @@ class Index:
         return faults
 
 
-def numbers_in(text: str) -> list[int]:
+def numbers_in(text: str) -> list[str]:
     """Numbers in parentheses."""
-    return [int(number) for number in re.findall(r"\((\d+)\)", text)]
+    return re.findall(r"\(([A-Z]?\d+)\)", text)
 
 
 def page(indices: list[Index], root: Path = ROOT) -> str:
@@ -120,7 +133,7 @@ def page(indices: list[Index], root: Path = ROOT) -> str:
     for index in indices:
         errata = _errata(index.paper, root)
         reasons = sum(1 for equation in index.paper.equations if equation.none)
-        count = index.paper.last
+        count = len(index.paper.equations)
         tally = f"{count} equations: {count - reasons} implemented, {reasons} need no function."
         parts.append(f"## {index.paper.title}\n\n{index.paper.reference}\n\n{tally}\n")
         for section in dict.fromkeys(equation.section for equation in index.paper.equations):
@@ -129,8 +142,8 @@ def page(indices: list[Index], root: Path = ROOT) -> str:
     return "\n".join(parts)
 
 
-def _row(index: Index, equation: Equation, errata: dict[int, str]) -> str:
-    number = f'<a id="eq-{equation.number}"></a>({equation.number})'
+def _row(index: Index, equation: Equation, errata: dict[str, str]) -> str:
+    number = f'<a id="{index.paper.anchor}-{equation.number.lower()}"></a>({equation.number})'
     if equation.number in errata:
         number += f" [erratum]({errata[equation.number]})"
     code = _links(index.code.get(equation.number, []), _dotted)
@@ -148,14 +161,25 @@ def _links(places: list[Place], label: Callable[[Place], str]) -> str:
     return "<br>".join(f"[`{label(place)}`](../{place.path})" for place in places)
 
 
-def _errata(paper: Paper, root: Path) -> dict[int, str]:
-    """Link to the first heading of the errata page that names an equation."""
-    source = root / "docs" / paper.errata
-    links: dict[int, str] = {}
-    for heading in re.findall(r"^#+ (.*)$", source.read_text(encoding="utf-8"), flags=re.MULTILINE):
+def _errata(paper: Paper, root: Path) -> dict[str, str]:
+    """Link to the first heading in a paper's part of the errata page that names an equation."""
+    links: dict[str, str] = {}
+    for heading in headings(errata_of(paper, root)):
         for number in numbers_in(heading):
             links.setdefault(number, f"{paper.errata}#{anchor(heading)}")
     return links
+
+
+def errata_of(paper: Paper, root: Path = ROOT) -> str:
+    """A paper's part of the errata page: from the heading of first rank that ends with its title to the next such."""
+    text = (root / "docs" / paper.errata).read_text(encoding="utf-8")
+    (part,) = (part for part in re.split(r"^# ", text, flags=re.MULTILINE) if part.split("\n")[0].endswith(paper.title))
+    return f"# {part}"
+
+
+def headings(text: str) -> list[str]:
+    """Headings of a Markdown text, of every rank."""
+    return re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
 
 
 def anchor(heading: str) -> str:

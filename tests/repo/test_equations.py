@@ -10,7 +10,7 @@ import pytest
 
 from flexmb.frisch.errata import Erratum
 from tests.repo.citations import Sources, numbers, texts
-from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, numbers_in, page, papers
+from tests.repo.equations import PAGE, Equation, Index, Paper, anchor, errata_of, headings, numbers_in, page, papers
 from tests.repo.project import ROOT
 
 SOURCES = Sources(
@@ -38,34 +38,26 @@ def test_every_equation_has_code_and_test_or_a_reason(indices: list[Index]) -> N
 def test_errata_name_tests_and_equations_that_exist(indices: list[Index]) -> None:
     """`path.py::test_name` on a page of errata is a test; its headings name equations of the paper."""
     for index in indices:
-        text = _errata(index)
+        text = errata_of(index.paper)
         for path, name in re.findall(r"`([\w/]+\.py)::(\w+)`", text):
             assert name in texts((ROOT / path).read_text(encoding="utf-8")), f"{path} has no {name}"
         known = {equation.number for equation in index.paper.equations}
-        assert all(set(numbers_in(heading)) <= known for heading in _headings(text))
+        assert all(set(numbers_in(heading)) <= known for heading in headings(text))
 
 
 def test_links_within_errata(indices: list[Index]) -> None:
-    for index in indices:
-        text = _errata(index)
-        assert set(re.findall(r"\]\(#([\w-]+)\)", text)) <= {anchor(heading) for heading in _headings(text)}
+    for page_of_errata in {index.paper.errata for index in indices}:
+        text = (ROOT / "docs" / page_of_errata).read_text(encoding="utf-8")
+        assert set(re.findall(r"\]\(#([\w-]+)\)", text)) <= {anchor(heading) for heading in headings(text)}
 
 
 def test_every_switch_of_the_print_is_explained(indices: list[Index]) -> None:
     """Each member of Erratum is in the table of the page, in a row that names its equations."""
     (frisch,) = (index for index in indices if "Frisch" in index.paper.sources.names)
-    rows = [line for line in _errata(frisch).splitlines() if line.startswith("| [(")]
+    rows = [line for line in errata_of(frisch.paper).splitlines() if line.startswith("| [(")]
     for erratum in Erratum:
         (row,) = (row for row in rows if f"`{erratum.name}`" in row)
         assert set(numbers_in(erratum.value)) <= set(numbers_in(row)), row
-
-
-def _errata(index: Index) -> str:
-    return (ROOT / "docs" / index.paper.errata).read_text(encoding="utf-8")
-
-
-def _headings(text: str) -> list[str]:
-    return re.findall(r"^#+ (.*)$", text, flags=re.MULTILINE)
 
 
 @pytest.mark.parametrize(
@@ -82,14 +74,23 @@ def _headings(text: str) -> list[str]:
     ],
 )
 def test_numbers(text: str, in_folder: list[int], elsewhere: list[int]) -> None:
-    assert list(numbers(text, SOURCES, in_folder=True)) == in_folder
-    assert list(numbers(text, SOURCES, in_folder=False)) == elsewhere
+    assert list(numbers(text, SOURCES, in_folder=True)) == list(map(str, in_folder))
+    assert list(numbers(text, SOURCES, in_folder=False)) == list(map(str, elsewhere))
 
 
 def test_numbers_named_by_themselves() -> None:
     assert numbers("(1)-(3), (2); (4), (4) to (5)", SOURCES, in_folder=True) == {
-        1: False, 2: True, 3: False, 4: True, 5: False,
+        "1": False, "2": True, "3": False, "4": True, "5": False,
     }  # fmt: skip
+
+
+def test_numbers_of_appendices() -> None:
+    lettered = Sources(("flexmb/jain",), ("Jain",), ("Frisch",), letters=("A", "B"))
+    text = "(64), (A1)-(A3), (B3) of a matrix (M1), Frisch (A9); f(B2)"
+    assert list(numbers(text, lettered, in_folder=True)) == ["64", "A1", "A2", "A3", "B3"]
+    assert list(numbers("Jain (64), (B3); see (B4)", lettered, in_folder=False)) == ["64", "B3"]
+    assert list(numbers(text, SOURCES, in_folder=True)) == ["64"]
+    assert list(numbers("of (48), Jain (B3) and (12), (M1)", SOURCES, in_folder=True)) == ["48"]
 
 
 SOURCE = '''"""M"""
@@ -125,12 +126,12 @@ def write(tmp_path: Path) -> Write:
 
     put(CODE, 'def mass():\n    """Total mass (1)."""\n')
     put(TEST, 'def test_mass():\n    """(1) of a sum."""\n')
-    put(Path("docs/errata.md"), "# Errata\n\n## (2): a sign\n")
+    put(Path("docs/errata.md"), "# Errata of Q\n\n## (1): not of this paper\n\n# Errata of P\n\n## (2): a sign\n")
     return put
 
 
 def _paper(none: str = "notation") -> Paper:
-    equations = (Equation(1, "Bodies", "mass", ""), Equation(2, "Bodies", "name", none))
+    equations = (Equation("1", "Bodies", "mass", ""), Equation("2", "Bodies", "name", none))
     return Paper("P", "A. Paper", SOURCES, "errata.md", 2, equations)
 
 
@@ -140,6 +141,7 @@ def test_faultless(tmp_path: Path, write: Write) -> None:
     text = page([index], tmp_path)
     assert "[`frisch.mass.mass`](../flexmb/frisch/mass.py) | [`test_mass`](../tests/flexmb/frisch/test_mass.py)" in text
     assert "[erratum](errata.md#2-a-sign)" in text and "none needed: notation" in text
+    assert "not-of-this-paper" not in text
 
 
 @pytest.mark.parametrize(
