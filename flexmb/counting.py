@@ -54,9 +54,9 @@ class Counted:
 
 
 def count(kernel: Callable[..., Any], *arguments: Any) -> Counted:
-    """Call a kernel or helper, interpreted, on copies of the arguments: floats, arrays, bundles; integers as they are.
+    """Call a kernel or helper, interpreted, on copies of the arguments: floats, arrays, bundles, tuples of these.
 
-    What arrays of `arguments` in the answer hold are arrays of objects, tables of records hold namespaces.
+    Arrays of floats become arrays of objects, tables of records hold namespaces; all else stays what it is.
     """
     tally = Counter[str]()
     scalar = _scalars(tally)
@@ -111,19 +111,25 @@ def _divide(a: float, b: float) -> float:
 
 
 def _counting(value: Any, scalar: Any) -> Any:
-    """A copy of an argument whose every float is a `scalar`; bundles and records become namespaces."""
+    """A copy of an argument, of the same class, whose every float is a `scalar`; records become namespaces."""
     if is_dataclass(value) and not isinstance(value, type):
-        return SimpleNamespace(**{f.name: _counting(getattr(value, f.name), scalar) for f in fields(value)})
+        copy = object.__new__(type(value))  # a bundle's own constructor takes addresses of arrays
+        for field in fields(value):
+            object.__setattr__(copy, field.name, _counting(getattr(value, field.name), scalar))
+        return copy
+    if isinstance(value, tuple):
+        parts = [_counting(part, scalar) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
     if isinstance(value, np.void):
         names = value.dtype.names or ()
         return SimpleNamespace(**{name: _counting(value[name], scalar) for name in names})
     if isinstance(value, np.ndarray):
         if value.dtype.kind in "iub":
             return value.copy()
-        copy = np.empty(value.shape, object)
+        objects = np.empty(value.shape, object)
         for place in np.ndindex(value.shape):
-            copy[place] = _counting(value[place], scalar)
-        return copy
+            objects[place] = _counting(value[place], scalar)
+        return objects
     if isinstance(value, np.integer):
         return int(value)
     return scalar(value) if isinstance(value, float) else value

@@ -4,16 +4,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import perf_counter
+from typing import Literal
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Modes, Scene
 from flexmb.scene.shapes import beam_section
 
 SAMPLE_S = 0.01  # a sample shorter than this measures the clock and the scheduler
 ROUNDS = 15
+
+Boundary = Literal["clamped-free", "free-free"]
 
 
 def interleaved(*rivals: Callable[[], object]) -> list[float]:
@@ -62,13 +65,14 @@ def rigid_chain(bodies: int) -> Scene:
     return scene.scene()
 
 
-def flexible_chain(bodies: int, modes: int, level: str, node: str = "tip") -> Scene:
-    """Serial chain of beams, clamped at their hinges, each hinged to `node` of the one before."""
+def flexible_chain(bodies: int, modes: int, level: str, node: str = "tip", boundary: Boundary = "clamped-free") -> Scene:
+    """Serial chain of beams, each hinged at its root to `node` of the one before; modes clamped there or free-free."""
     scene = SceneBuilder(f"{bodies} beams of {modes} modes", gravity=(0.0, 0.0, -9.81))
     section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
     for k in range(bodies):
-        scene.beam(f"b{k}", length=2.0, elements=12, section=section, modes=modes, level=level)
-        at = {} if k == 0 else {"parent_node": node}
+        shapes = Modes(count=modes, boundary=boundary)
+        scene.beam(f"b{k}", length=2.0, elements=12, section=section, modes=shapes, level=level)
+        at = {"child_node": "root"} if k == 0 else {"parent_node": node, "child_node": "root"}
         axis = ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0))[k % 2]
         scene.revolute(f"h{k}", "ground" if k == 0 else f"b{k - 1}", f"b{k}", axis=axis, angle=0.3, rate=0.2, **at)
     return scene.scene()
