@@ -16,7 +16,7 @@ from flexmb.scene.shapes import beam_section
 SAMPLE_S = 0.01  # a sample shorter than this measures the clock and the scheduler
 ROUNDS = 15
 
-Boundary = Literal["clamped-free", "free-free"]
+Ends = Literal["clamped-free", "free-free"]
 
 
 def interleaved(*rivals: Callable[[], object]) -> list[float]:
@@ -65,7 +65,7 @@ def rigid_chain(bodies: int) -> Scene:
     return scene.scene()
 
 
-def flexible_chain(bodies: int, modes: int, level: str, node: str = "tip", boundary: Boundary = "clamped-free") -> Scene:
+def flexible_chain(bodies: int, modes: int, level: str, node: str = "tip", boundary: Ends = "clamped-free") -> Scene:
     """Serial chain of beams, each hinged at its root to `node` of the one before; modes clamped there or free-free."""
     scene = SceneBuilder(f"{bodies} beams of {modes} modes", gravity=(0.0, 0.0, -9.81))
     section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
