@@ -1,9 +1,10 @@
 """Speed against accuracy: the error of every engine, variant and effort in one observable, against wall time.
 
 One chart has one reference for all: the most certain result of its reference variant, of an engine that represents the
-scene exactly if there is one. The error of a run is its largest distance from the reference over the run, relative to
-the reference's range. The reference cannot judge errors below its own uncertainty; its own finest run is shown at that
-uncertainty. Runs that failed have no error and are kept as such.
+scene exactly if there is one; where several are as certain within a factor `RESOLVED`, that of the engine named first.
+The error of a run is its largest distance from the reference over the run, relative to the reference's range. The
+reference cannot judge errors below its own uncertainty; its own finest run is shown at that uncertainty. Runs that
+failed have no error and are kept as such.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from crosscheck.case import Chart
 from crosscheck.channels import distance, signal_range
 from crosscheck.records import RunRecord
 from crosscheck.results import CaseResults, Result
+
+RESOLVED = 2.0  # estimates of U are no better than that
 
 
 @dataclass(frozen=True)
@@ -67,22 +70,19 @@ def work_precision(case: CaseResults, chart: Chart) -> WorkPrecision | None:
         reference=f"{reference.engine} on {reference.variant}, {reference.finest.effort}",
         reference_uncertainty=doubt,
         scale=scale,
-        points=tuple(_with_front(points)),
+        points=tuple(_with_front(points, doubt)),
     )
 
 
 def _reference(case: CaseResults, chart: Chart) -> Result | None:
     """The finished result of the reference variant with the smallest U in the observable, exact engines first."""
-    found = [
-        result
-        for (variant, _, role), result in case.results.items()
-        if role == "main" and variant == chart.reference and chart.observable in result.channels
-    ]
-
-    def doubt(result: Result) -> tuple[bool, float]:
-        return bool(result.finest.support), result.uncertainty(chart.observable).value
-
-    return min(found, key=doubt, default=None)
+    variant = case.case.run.variant(chart.reference)
+    found = [case.get(variant.name, engine) for engine in variant.engines]
+    finished = [result for result in found if chart.observable in result.channels]
+    exact = [result for result in finished if not result.finest.support] or finished
+    doubts = [result.uncertainty(chart.observable).value for result in exact]
+    close = (result for result, doubt in zip(exact, doubts, strict=True) if doubt <= RESOLVED * min(doubts))
+    return next(close, None)
 
 
 def _point(run: RunRecord, observable: str, reference: Result, scale: float, doubt: float) -> Point:
@@ -106,13 +106,14 @@ def _point(run: RunRecord, observable: str, reference: Result, scale: float, dou
     )
 
 
-def _with_front(points: list[Point]) -> list[Point]:
-    """The points by wall time, those marked `best` than which no faster one is as accurate."""
+def _with_front(points: list[Point], doubt: float) -> list[Point]:
+    """The points by wall time, those marked `best` than which no faster one is as accurate as far as can be told."""
     smallest = np.inf
     marked = []
     for point in sorted(points, key=lambda point: point.wall_s):
-        best = point.error is not None and point.error < smallest
+        error = np.inf if point.error is None else max(point.error, doubt)
+        best = error < smallest
         if best:
-            smallest = point.error
+            smallest = error
         marked.append(replace(point, best=best))
     return marked

@@ -27,6 +27,7 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
         keep_trailing_newline=False,
     )
     templates.filters["code"] = _code
+    templates.filters["breakable"] = _breakable
     data = payload([(case, outcome.verdicts[case.case.case]) for case in session.cases])
     page = templates.get_template("report.html.j2").render(
         outcome=outcome,
@@ -52,6 +53,11 @@ def _inline(templates: Environment, name: str) -> Markup:
 def _code(text: str) -> Markup:
     """Text of a README or a note with `words in backticks` set as code."""
     return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+
+
+def _breakable(text: str) -> Markup:
+    """Text that may be broken after a slash."""
+    return Markup(str(escape(text)).replace("/", "/<wbr>"))
 
 
 def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:

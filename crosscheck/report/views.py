@@ -153,7 +153,8 @@ def _cell(group: list[Verdict]) -> Cell:
     if worst.kind == "conservation" and worst.status in ("differ", "agree"):
         text = "conserved" if worst.status == "agree" else "drifts"
     if len(group) > 1:
-        text += f" {len(bad)}/{len(group)}" if bad else f" {len(group)}"
+        alike = len(bad) or sum(verdict.status == worst.status for verdict in group)
+        text += f" {alike}" if alike == len(group) else f" {alike} of {len(group)}"
     if worst.expected != "agree" and worst.kind != "control":
         text += " (expected)" if worst.ok else f" (expected {worst.expected})"
     shown = bad or [verdict for verdict in group if verdict.status == worst.status]

@@ -73,6 +73,11 @@ def test_an_approximation_is_no_reference_however_certain_it_is(records: list[Re
     assert not drawn([approximate(record) for record in records]).reference.startswith(certain)
 
 
+def test_below_the_doubt_of_the_reference_nothing_is_more_accurate(chart: WorkPrecision) -> None:
+    below = [point for point in chart.points if point.best and point.error <= chart.reference_uncertainty]
+    assert len(below) <= 1
+
+
 def test_failed_runs_are_kept_without_an_error(chart: WorkPrecision) -> None:
     failed = [point for point in chart.points if point.engine == "diverger"]
     assert len(failed) == 4

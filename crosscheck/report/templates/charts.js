@@ -96,7 +96,7 @@ function drawWork(node, work) {
   const errors = work.points.filter(p => p.error > 0).map(p => p.error);
   const margin = 10 ** (Math.ceil(Math.log10(Math.max(...errors, 1e-16))) + 0.6);
   for (const point of work.points) {
-    const key = [point.engine, point.variant, point.method].join(" · ");
+    const key = [point.engine, ...(variants.length > 1 ? [point.variant] : []), point.method].join(" · ");
     groups.set(key, [...(groups.get(key) || []), point]);
   }
   const low = Math.floor(Math.log10(Math.min(...errors, work.doubt))) - 0.7;
@@ -125,6 +125,6 @@ function drawWork(node, work) {
       { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: "#5b6675" },
         text: "below the reference's own uncertainty (" + work.reference + ")" },
       { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: "#5b6675" }, text: "× at the top: failed runs" }],
-    legend: { orientation: "h", y: -0.14, yanchor: "top", font: { size: 11 } },
+    legend: { orientation: "h", y: -0.19, yanchor: "top", font: { size: 11 } },
   }), CONFIG);
 }
