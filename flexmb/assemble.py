@@ -8,7 +8,7 @@ from flexmb import arrays as a
 from flexmb.functions import pack
 from flexmb.hinges import catalogue
 from flexmb.inertia_arrays import group, inertia_arrays, shape_records
-from flexmb.links import Link, Port, port
+from flexmb.links import Link, Port, closure_sides, port
 from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
@@ -57,8 +57,8 @@ def body_port(link: Link, node: str, offset: s.Vector) -> Port:
 
 def assemble(
     scene: s.Scene, chain: list[Link], numbering: Numbering, null_partitions: bool = False
-) -> tuple[a.Constants, dict[str, tuple[int, int]]]:
-    """Constants of the scene, and (body, port) of every marker.
+) -> tuple[a.Constants, dict[str, tuple[int, int]], list[tuple[int, int]]]:
+    """Constants of the scene, (body, port) of every marker, and of both sides of every closure; -1, -1 on the ground.
 
     `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
     computed all the same.
@@ -82,6 +82,11 @@ def assemble(
     outboard_ports = [ports.add(k, link.outboard) if link.outboard.deforms else None for k, link in enumerate(chain)]
     wheel_ports, load_ports = [place(wheel) for wheel in wheels], [place(load) for load in loads]
     marker_ports = {marker.name: place(marker) for marker in scene.markers}
+    sides = [
+        None if side.body == GROUND else ports.add(index[side.body], side.port(chain[index[side.body]].model))
+        for closure in scene.closures
+        for side in closure_sides(closure)
+    ]
 
     m = max((link.model.mode_count for link in chain), default=0)
     inertia, points = inertia_arrays(chain, m)
@@ -119,7 +124,8 @@ def assemble(
         **inertia,
         **points,
     )
-    return constants, {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
+    markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
+    return constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides]
 
 
 def _moved(inboard: Port, parent: Link) -> Port:

@@ -54,7 +54,7 @@ def inverse_dynamics(t, y, rates, c, w, tau, loads):
         w.speed[j].acceleration = rates[j]
     inverse.inverse_dynamics(c, w, tau)
     pose_sweep(c, w)
-    _world_loads(c, w, loads)
+    world_loads(c, w, loads)
 
 
 @kernel
@@ -78,7 +78,7 @@ def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, e
     drive_loads(c, w)
     pose_sweep(c, w)
     hinge_loads(c, w)
-    _world_loads(c, w, loads)
+    world_loads(c, w, loads)
     _observe_motion(c, w, marker_body, marker_port, markers, wheel_loads, energy, momentum)
     return OK
 
@@ -123,7 +123,7 @@ def _observe_motion(c, w, marker_body, marker_port, markers, wheel_loads, energy
 
 
 @helper
-def _world_loads(c, w, loads):
+def world_loads(c, w, loads):
     """w.body.load of every body in World axes."""
     for k in range(c.body.shape[0]):
         R = mat3(w.body[k].pose_rotation, 0)

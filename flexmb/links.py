@@ -62,8 +62,6 @@ class Link:
 
 def links(scene: s.Scene) -> list[Link]:
     """All links base to tip: bodies depth-first, then point masses."""
-    if scene.closures:
-        raise NotImplementedError(f'closure "{scene.closures[0].name}": loop closures are not supported yet')
     models = {GROUND: _ground()} | {body.name: _model(body) for body in scene.bodies}
     for wheel in scene.wheels:
         models[wheel.body] = _with_wheel(models[wheel.body], wheel)
@@ -92,6 +90,30 @@ def links(scene: s.Scene) -> list[Link]:
     for mass in scene.point_masses:
         found.append(_point_mass(mass, models))
     return [_in_hinge_frame(link) for link in found]
+
+
+@dataclass(frozen=True)
+class Side:
+    """Where frame A or B of a closure is: a node of a body, fixed offsets, and the turn that brings the axis to z."""
+
+    body: str
+    node: str
+    offset: s.Vector
+    quaternion: s.Quaternion
+    turn: Real
+
+    def port(self, model: FlexibleModel) -> Port:
+        """The frame on a body's model, as the dynamics sees it."""
+        return port(model, self.node, self.offset, self.quaternion, self.turn)
+
+
+def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
+    """Frames A and B of a closure."""
+    turn = _z_to(closure.axis) if closure.type in ("revolute", "prismatic", "cylindrical") else np.eye(3)
+    return (
+        Side(closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a, turn),
+        Side(closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b, turn),
+    )
 
 
 def port(model: FlexibleModel, node: str, offset: s.Vector, quaternion: s.Quaternion, turn: Real) -> Port:

@@ -21,7 +21,7 @@ from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
 from flexmb.status import Status
-from flexmb.system import ENERGIES, ERRATA, Algorithm, DynamicsError, Evaluation, System
+from flexmb.system import ENERGIES, ERRATA, Algorithm, DynamicsError, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 Method = Literal["dop853", "rk4"]
@@ -79,7 +79,7 @@ def simulate(
         check_scene(scene, t_end)
     _check_settings(method, rtol, atol, step, max_steps)
     times = _sample_times(samples, t_end)
-    system = scene if isinstance(scene, System) else System(scene)
+    system = scene if isinstance(scene, System) else assembled(scene)
     raw = _integrate(system, _route(system, algorithm), times, method, rtol, atol, step, max_steps)
     return _observed(system, times, raw, algorithm)
 
@@ -125,6 +125,11 @@ def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array
 
 
 def _route(system: System, algorithm: Algorithm) -> _Route:
+    if system.scene.closures:
+        raise NotImplementedError(
+            f'closure "{system.scene.closures[0].name}": runs of closed chains are not supported yet; '
+            "use accelerations and loads at given states"
+        )
     if algorithm == "articulated":
         return _Route(system.constants, system.workspace, propagate.run_dop853, propagate.run_rk4)
     if algorithm not in ERRATA:

@@ -14,6 +14,8 @@ class Status(IntEnum):
     STEP_TOO_SMALL = 3
     MAX_STEPS = 4
     OUT_OF_RANGE = 5
+    CLOSURE_SINGULAR = 6
+    CLOSURE_OPEN = 7
 
     @property
     def advice(self) -> str:
@@ -40,6 +42,14 @@ _ADVICE = {
         "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
         "look for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
     ),
+    Status.CLOSURE_SINGULAR: (
+        "closure {body} is singular: at this configuration the closures suppress fewer motions than elsewhere, and where "
+        "the mechanism moves next is not determined; start elsewhere, or give a body flexibility"
+    ),
+    Status.CLOSURE_OPEN: (
+        "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
+        "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
+    ),
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
 }
 
@@ -49,3 +59,5 @@ NONFINITE = int(Status.NONFINITE)
 STEP_TOO_SMALL = int(Status.STEP_TOO_SMALL)
 MAX_STEPS = int(Status.MAX_STEPS)
 OUT_OF_RANGE = int(Status.OUT_OF_RANGE)
+CLOSURE_SINGULAR = int(Status.CLOSURE_SINGULAR)
+CLOSURE_OPEN = int(Status.CLOSURE_OPEN)

@@ -357,8 +357,14 @@ class SceneBuilder:
         self, name: str,
         type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
         body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin", axis: ArrayLike = Z_AXIS,
+        position_a: ArrayLike = ZERO, quaternion_a: ArrayLike = IDENTITY, position_b: ArrayLike = ZERO,
+        quaternion_b: ArrayLike = IDENTITY,
     ) -> Self:  # fmt: skip
-        """A loop closure between nodes of two bodies of the tree."""
+        """A loop closure between nodes of two bodies of the tree ("ground" too), plus fixed offsets in node axes (m).
+
+        `axis`: unit vector with the same components in frames A and B.
+        """
         return self._append(
-            s.Closure, name=name, type=type, body_a=body_a, node_a=node_a, body_b=body_b, node_b=node_b, axis=axis
-        )
+            s.Closure, name=name, type=type, body_a=body_a, node_a=node_a, body_b=body_b, node_b=node_b, axis=axis,
+            position_a=position_a, quaternion_a=quaternion_a, position_b=position_b, quaternion_b=quaternion_b,
+        )  # fmt: skip

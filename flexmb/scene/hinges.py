@@ -131,7 +131,14 @@ Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spheric
 
 
 class Closure(_Strict, frozen=True, kw_only=True):
-    """A loop closure on top of the tree. Expressible; not supported by `compile` yet."""
+    """A loop closure on top of the tree: a hinge between any two nodes, whose motions are not coordinates.
+
+    Frame A is the node frame of `body_a` ("ground" too) displaced by `position_a_m`, `quaternion_a` (fixed offsets in
+    node axes), frame B likewise on `body_b`. The closure lets B move relative to A as the hinge of that `type` lets its
+    outboard frame move relative to its inboard one; `axis` has the same components in both frames. Initial coordinates
+    need to fit only roughly: the nearest state that closes all loops is found. Its load is an output: on `body_b`,
+    about B. A gimbal of two axes is a universal closure between turned frames, one of three a spherical one.
+    """
 
     name: str
     type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"]
@@ -139,4 +146,8 @@ class Closure(_Strict, frozen=True, kw_only=True):
     node_a: str = "origin"
     body_b: str
     node_b: str = "origin"
+    position_a_m: Vector = ZERO
+    quaternion_a: Quaternion = IDENTITY
+    position_b_m: Vector = ZERO
+    quaternion_b: Quaternion = IDENTITY
     axis: Vector = Z_AXIS

@@ -16,7 +16,6 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
-from flexmb.scene.hinges import Closure
 from flexmb.system import System
 from tests import trees
 from tests.bounds import algebra, relative
@@ -131,15 +130,6 @@ def test_one_evaluation_leaves_nothing_behind_for_the_next(system):
     other = system.state(state.q, state.u + 1.0)
     system.mass_matrix(other), system.bias(other), system.evaluate(0.0, other.q, other.u)
     assert np.array_equal(system.accelerations(state), first)
-
-
-def test_closures_are_refused_honestly():
-    body = {"mass": 1.0, "inertia": (0.1, 0.2, 0.2)}
-    builder = SceneBuilder("loop").rigid_body("a", **body).rigid_body("b", **body)
-    scene = builder.revolute("first", "ground", "a").revolute("second", "a", "b").scene()
-    loop = Closure(name="loop", body_a="b", body_b="ground", type="spherical")
-    with pytest.raises(NotImplementedError, match='closure "loop"'):
-        flexmb.compile(msgspec.structs.replace(scene, closures=(loop,)))
 
 
 # Without the compiler records have no attributes: `Rows` and `Row` give them some. The statements are the kernels' own.

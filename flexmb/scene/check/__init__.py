@@ -26,7 +26,7 @@ PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, wheels, poin
 def check_scene(scene: Scene, t_end: float | None = None) -> None:
     """Raise SceneError with all problems of a scene, or return. With `t_end` (s) profiles must cover the run.
 
-    Loop closures, SID bodies and every fidelity level pass: whether they can be run is for `compile` to say.
+    SID bodies and every fidelity level pass: whether they can be run is for `compile` to say.
     """
     to_struct(plain(scene), Scene)  # a struct built by hand may hold values of any type
     problems = [*_run_time(t_end), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]

@@ -11,8 +11,8 @@ from flexmb.scene.problems import Place, Problem, closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, rest_frames
 
-# Hinges, wheels and point masses share one table of drive loads and coordinates, hence one set of names.
-NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses"), ("closures",), ("loads",), ("markers",))
+# Hinges, wheels, point masses and closures share tables of loads, drive loads and coordinates, hence one set of names.
+NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses", "closures"), ("loads",), ("markers",))
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 
 

@@ -76,7 +76,7 @@ def unit_vectors(scene: Scene) -> Iterator[Problem]:
 def unit_quaternions(scene: Scene) -> Iterator[Problem]:
     """Quaternions have unit length."""
     for place, key, value in values(ROOT, scene):
-        if key.endswith("quaternion") and not non_finite(value):
+        if "quaternion" in key and not non_finite(value):
             norm = hypot(*value)
             if norm == 0.0:
                 yield Problem(str(place), "the quaternion is zero", "for no rotation write (1, 0, 0, 0), scalar first")

@@ -1,0 +1,7 @@
+"""Closed chains: a tree and closures on top of it, by the operational-space inertia of the closures' nodes.
+
+The tree moves by the recursion of `flexmb.jain`. A closure suppresses relative motions of two ports; the loads that do
+it follow from unit loads passed inward through the articulated quantities. `rows` says what a closure suppresses,
+`unit_loads` passes loads in and motion out, `factor` finds the independent rows, `forces` adds the closure loads to an
+evaluation, `projection` takes a state back to where the closures are closed, `dynamics` holds the entry points.
+"""

@@ -1,0 +1,83 @@
+"""From a scene's closures to the arrays of `flexmb.closure.tables`."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexmb.arrays import RUTHLESS, Constants
+from flexmb.closure import tables as t
+from flexmb.links import Link, closure_sides, matrix
+from flexmb.scene import schema as s
+
+# Suppressed rotations and translations, axes of frame A; z is the axis of a closure that has one.
+SUPPRESSED = {
+    "weld": ("xyz", "xyz"),
+    "revolute": ("xy", "xyz"),
+    "prismatic": ("xyz", "xy"),
+    "cylindrical": ("xy", "xy"),
+    "universal": ("z", "xyz"),
+    "spherical": ("", "xyz"),
+    "planar": ("xy", "z"),
+}
+
+
+def closure_constants(
+    scene: s.Scene, chain: list[Link], constants: Constants, ports: Sequence[tuple[int, int]]
+) -> t.ClosureConstants:
+    """Constants of a scene's closures; `ports` are (body, port) of both sides of each, (-1, -1) on the ground."""
+    _refuse_ruthless(chain, scene.closures[0])
+    sides = np.zeros((len(scene.closures), 2), t.SIDE)
+    closures = np.zeros(len(scene.closures), t.CLOSURE)
+    rows: list[tuple[int, int, int]] = []
+    path: list[int] = []
+    for i, closure in enumerate(scene.closures):
+        row = closures[i]
+        row["row_start"], row["path_start"] = len(rows), len(path)
+        for j, side in enumerate(closure_sides(closure)):
+            sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
+            if sides[i, j]["body"] == t.ON_GROUND:
+                sides[i, j]["position"] = side.offset
+                sides[i, j]["rotation"] = (matrix(side.quaternion) @ side.turn).ravel()
+        rotations, translations = SUPPRESSED[closure.type]
+        rows += [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
+        rows += [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]
+        path += sorted(_ancestors(constants, sides[i]["body"]), reverse=True)
+        row["row_stop"], row["path_stop"] = len(rows), len(path)
+    row_table = np.array(rows, t.ROW)
+    length = _length(constants, sides)
+    return t.ClosureConstants(
+        side=sides,
+        closure=closures,
+        row=row_table,
+        path=np.array(path, np.int64),
+        weight=np.where(row_table["type"] == t.ROTATION, length, 1.0),
+        length=np.array([length]),
+    )
+
+
+def _refuse_ruthless(chain: list[Link], closure: s.Closure) -> None:
+    for link in chain:
+        if link.level == RUTHLESS and link.model.mode_count:
+            raise NotImplementedError(
+                f'closure "{closure.name}": the inertia of body "{link.name}" at level "ruthless" does not see its '
+                'deformation, by which a loop would close; use level "linear" or "full" for all bodies of this scene'
+            )
+
+
+def _ancestors(constants: Constants, bodies: Sequence[int]) -> set[int]:
+    """The bodies and all that carry them."""
+    found: set[int] = set()
+    for k in bodies:
+        while k >= 0:
+            found.add(int(k))
+            k = constants.body["parent"][k]
+    return found
+
+
+def _length(constants: Constants, sides: np.ndarray) -> float:
+    """The largest distance of a frame from the one it is fixed to, on any body or the ground (m); 1 where all are 0."""
+    points = [constants.port["position"] + constants.port["offset"], constants.body["placement_position"]]
+    largest = max(float(np.max(np.linalg.norm(each, axis=-1), initial=0.0)) for each in (*points, sides["position"]))
+    return largest or 1.0

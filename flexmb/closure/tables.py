@@ -1,0 +1,112 @@
+"""The arrays of closures: what a scene fixes, and what one evaluation writes.
+
+C closures with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
+body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.arrays import Index, Real, Record
+from flexmb.bundle import bundle
+
+ROTATION, TRANSLATION = range(2)
+ON_GROUND = -1  # body of a frame that is fixed in World
+ROWS = 6  # the most motions one closure can suppress
+
+_F, _I = np.float64, np.int64
+
+
+def _record(*fields: tuple) -> np.dtype:
+    return np.dtype(list(fields), align=True)
+
+
+SIDE = _record(
+    ("body", _I),  # -1 for ground
+    ("port", _I),
+    ("position", _F, (3,)),  # World, on the ground only
+    ("rotation", _F, (9,)),  # R_World_port, on the ground only
+)
+CLOSURE = _record(
+    ("row_start", _I),
+    ("row_stop", _I),
+    ("path_start", _I),  # its rows of `path`
+    ("path_stop", _I),
+)
+ROW = _record(
+    ("closure", _I),
+    ("type", _I),  # ROTATION or TRANSLATION
+    ("axis", _I),  # 0, 1, 2
+)
+
+
+@bundle
+class ClosureConstants:
+    """What does not change in a run."""
+
+    side: Record  # (C,2) SIDE, A then B
+    closure: Record  # (C,) CLOSURE
+    row: Record  # (G,) ROW
+    path: Index  # bodies that a load on a closure passes on its way to the ground, tips first
+    weight: Real  # (G,) what makes rows comparable: 1 for translations, `length` for rotations
+    length: Real  # (1,) m, a length of the scene
+
+
+ROW_STATE = _record(
+    ("direction", _F, (3,)),  # unit load of the row: torque or force on B, A axes
+    ("value", _F),  # g: 0 where the closure is closed (m, or sine of an angle)
+    ("rate", _F),  # J u
+    ("acceleration", _F),  # J udot + Jdot u
+    ("load", _F),  # what the closure exerts along `direction`
+)
+CLOSURE_STATE = _record(
+    ("rotation", _F, (9,)),  # R_A_B
+    ("position", _F, (3,)),  # of B in A
+    ("world", _F, (9,)),  # R_World_A
+    ("size", _F),  # m, what a row's value is compared with: the scene's length and the distance from the origin
+    ("speed", _F),  # m/s, what its rate is compared with: speeds of the ports
+)
+
+
+@bundle
+class ClosureWorkspace:
+    """What one evaluation writes. One workspace per thread."""
+
+    closure: Record  # (C,) CLOSURE_STATE
+    row: Record  # (G,) ROW_STATE
+    half: Real  # (G,nu) B': D^-1/2 (1 - H Psi K) J' of every row; Lambda^-1 = B' B
+    basis: Real  # (G,nu) orthonormal basis of the chosen rows of `half`
+    factor: Real  # (G,G) R, upper: B P = Q R
+    chosen: Index  # (G,) rows by pivot; the first `rank` are independent
+    rank: Index  # (1,) independent rows; -1 until they are counted
+    scratch: Real  # (G,)
+    force: Real  # (N,ROWS,6) loads on their way inward, body axes
+    modal: Real  # (N,ROWS,m)
+    coefficient: Real  # (nu,)
+    step: Real  # (nu,) a displacement or a change of speeds
+    accel: Real  # (N,6) of the bodies, per `step`
+    gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
+    failure: Index  # (2,) status of the last projection, and where
+
+
+def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureWorkspace:
+    """A workspace of the right sizes."""
+    rows = len(c.row)
+    return ClosureWorkspace(
+        closure=np.zeros(len(c.closure), CLOSURE_STATE),
+        row=np.zeros(rows, ROW_STATE),
+        half=np.zeros((rows, nu)),
+        basis=np.zeros((rows, nu)),
+        factor=np.zeros((rows, rows)),
+        chosen=np.arange(rows),
+        rank=np.array([-1]),
+        scratch=np.zeros(rows),
+        force=np.zeros((bodies, ROWS, 6)),
+        modal=np.zeros((bodies, ROWS, modes)),
+        coefficient=np.zeros(nu),
+        step=np.zeros(nu),
+        accel=np.zeros((bodies, 6)),
+        gain=np.zeros(2),
+        failure=np.zeros(2, np.int64),
+    )

@@ -1,0 +1,80 @@
+"""Random trees with random closures: accelerations and closure loads against one dense system of equations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+import flexmb
+from tests import trees
+from tests.bounds import algebra
+from tests.flexmb.closure import chains
+
+RECIPES = {
+    "rigid": replace(trees.RIGID, prescribed=False), "full": replace(trees.FULL, prescribed=False),
+    "linear": replace(trees.LINEAR, prescribed=False, deformation=0.01), "free-flying": trees.FREE_FLYING,
+}  # fmt: skip
+PAIRS = [("weld", "spherical"), ("revolute", "universal"), ("prismatic", "planar"), ("cylindrical", "revolute")]
+CASES = [(recipe, types, seed) for recipe in RECIPES for seed, types in enumerate(PAIRS)]
+
+
+@dataclass(frozen=True)
+class Pair:
+    """Both routes at a state with closed closures and consistent speeds."""
+
+    system: flexmb.System
+    state: flexmb.State
+    dense: chains.Constrained
+    found: flexmb.Evaluation
+    bound: float
+
+
+@pytest.fixture(scope="module", params=CASES, ids=str)
+def pair(request) -> Pair:
+    recipe, types, seed = request.param
+    scene = trees.random_scene(seed, RECIPES[recipe])
+    scene = chains.with_closures(scene, np.random.default_rng(seed), list(types))
+    system = flexmb.compile(scene)
+    state = flexmb.System(scene).initial_state
+    state = system.state(state.q, chains.consistent_speeds(scene, state.q, state.u))
+    dense = chains.constrained(scene, state.q, state.u)
+    depth = len(scene.bodies) + len(scene.point_masses)
+    bound = algebra(system.nu + len(dense.J), depth)
+    return Pair(system, state, dense, system.evaluate(0.0, state.q, state.u), bound)
+
+
+def test_the_scene_is_closed(pair):
+    assert np.max(np.abs(pair.dense.value)) <= pair.bound
+    assert np.max(np.abs(pair.dense.rate)) <= pair.bound * np.max(np.abs(pair.dense.J)) * np.sum(np.abs(pair.state.u))
+
+
+def test_accelerations_keep_the_closures_closed(pair):
+    rates, J = pair.found.accelerations[pair.dense.free], pair.dense.J
+    size = np.max(np.abs(J)) * np.sum(np.abs(rates)) + np.max(np.abs(pair.dense.gamma))
+    assert np.max(np.abs(J @ rates + pair.dense.gamma)) <= pair.bound * size
+
+
+def test_what_is_left_of_the_trees_equations_is_a_load_of_closures(pair):
+    """M udot - right lies in the range of J': backward error."""
+    rates, J = pair.found.accelerations[pair.dense.free], pair.dense.J
+    missing = pair.dense.M @ rates - pair.dense.right
+    left = missing - J.T @ np.linalg.lstsq(J.T, missing, rcond=1e-13)[0]
+    assert np.max(np.abs(left)) <= pair.bound * np.max(np.abs(pair.dense.M) @ np.abs(rates) + np.abs(pair.dense.right))
+
+
+def test_as_many_rows_are_independent(pair):
+    size = np.linalg.norm(pair.dense.J, axis=1, keepdims=True)
+    rank = np.linalg.matrix_rank(pair.dense.J / np.where(size > 1e-12, size, 1.0), tol=1e-10)
+    assert pair.system.closures._own.rank[0] == rank
+
+
+def test_loads_of_closures_and_hinges_balance(pair):
+    """Newton and Euler for everything outboard of each hinge, with the loads that the closures report."""
+    state, loads = pair.state, pair.found.loads
+    scene = pair.system.scene
+    expected = chains.on_hinges(scene, state.q, state.u, pair.found.accelerations, loads)
+    size = 10.0 * max(np.max(np.abs(load)) for load in (*loads.values(), *expected.values()))
+    for name, load in expected.items():
+        assert np.max(np.abs(loads[name] - load)) <= pair.bound * size
