@@ -68,6 +68,7 @@ function distances(channel, series) {
 function drawChannel(node, channel, series) {
   const letters = channel.components.length > 1 ? " (" + channel.components.map((c, j) => c + " " + DASHES[j % 3]).join(", ") + ")" : "";
   const judged = channel.pairs.length > 0;
+  node.style.height = 355 + 25 * Math.ceil((channel.sides.length + channel.pairs.length) / 3) + "px"; // room for the legend
   const below = !judged ? {} : { yaxis2: { domain: [0, 0.38], type: "log", exponentformat: "power", nticks: 5,
     title: { text: "E, and U dotted" + (channel.unit ? ", " + channel.unit : ""), font: { size: 10.5 } } } };
   Plotly.react(node, [...sides(channel, series), ...distances(channel, series)], layout({
