@@ -44,9 +44,10 @@ def test_the_test_command_is_what_continuous_integration_runs() -> None:
     assert 'grep -E "^python3 .*pytest$" README.md' in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
 
 
-def test_the_python_example_runs() -> None:
-    (example,) = re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL)
+def test_the_python_examples_run() -> None:
+    """One after the other, as a reader would type them."""
     names: dict[str, Any] = {}
-    exec(compile(example, "README.md", "exec"), names)
+    for example in re.findall(r"```python\n(.*?)```", README, flags=re.DOTALL):
+        exec(compile(example, "README.md", "exec"), names)
     assert names["trajectory"].t[-1] == 1.0
     assert names["loads"].shape == (6,)
