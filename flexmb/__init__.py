@@ -20,16 +20,17 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 
 if TYPE_CHECKING:
     from flexmb.simulation import simulate
+    from flexmb.state import DynamicsError, State
     from flexmb.status import Status
-    from flexmb.system import DynamicsError, Evaluation, State, System, compile
+    from flexmb.system import Evaluation, System, compile
     from flexmb.trajectory import Trajectory
 
 _LATER = {
     "simulate": "flexmb.simulation",
     "Status": "flexmb.status",
-    "DynamicsError": "flexmb.system",
+    "DynamicsError": "flexmb.state",
     "Evaluation": "flexmb.system",
-    "State": "flexmb.system",
+    "State": "flexmb.state",
     "System": "flexmb.system",
     "compile": "flexmb.system",
     "Trajectory": "flexmb.trajectory",

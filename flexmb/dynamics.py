@@ -58,13 +58,6 @@ def inverse_dynamics(t, y, rates, c, w, tau, loads):
 
 
 @kernel
-def mass_matrix(t, y, c, w, M):
-    """M (nu,nu) at the configuration of y."""
-    load_state(t, y, c, w)
-    inverse.mass_matrix(c, w, M)
-
-
-@kernel
 def observe(t, y, marker_body, marker_port, c, w, markers, loads, wheel_loads, energy, momentum):
     """Everything observable at one state; w.speed is filled as well. Returns a status code.
 

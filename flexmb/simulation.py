@@ -20,8 +20,9 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
+from flexmb.state import DynamicsError
 from flexmb.status import Status
-from flexmb.system import ENERGIES, ERRATA, Algorithm, DynamicsError, Evaluation, System, assembled
+from flexmb.system import ENERGIES, ERRATA, Algorithm, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 Method = Literal["dop853", "rk4"]

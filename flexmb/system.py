@@ -24,23 +24,15 @@ from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.frisch.system import NestedSystem, Partitions
 from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.links import Link, links
+from flexmb.mechanics import Mechanics
 from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
-from flexmb.status import OK, Status
+from flexmb.state import State, pack
 
 Algorithm = Literal["articulated", "composite", "frisch", "frisch_as_printed"]
 ERRATA = {"frisch": CORRECTED, "frisch_as_printed": AS_PRINTED}
 ENERGIES = ("kinetic", "strain", "spring", "gravity")
-
-
-@dataclass(frozen=True, eq=False)
-class State:
-    """Coordinates q (nq,), speeds u (nu,) and time t (s)."""
-
-    q: Real
-    u: Real
-    t: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -76,14 +68,11 @@ class Evaluation:
     momentum: Real
 
 
-class DynamicsError(ArithmeticError):
-    """The accelerations do not exist at this state; the message names the body and the remedy."""
-
-
-class System:
+class System(Mechanics):
     """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
 
     def __init__(self, scene: s.Scene) -> None:
+        super().__init__()
         self.scene = scene
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
@@ -162,9 +151,10 @@ class System:
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
 
-        "articulated": the O(N) recursion; "composite": mass matrix and inverse dynamics, partitioned for prescribed
-        speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter. Frisch's
-        equations are of first order in the deformation: they take bodies of level `full` as `linear`.
+        "articulated": the O(N) recursion; "composite": mass matrix by composite bodies, bias by inverse dynamics,
+        Cholesky's factors, partitioned for prescribed speeds; "frisch": the nested-body equations of 1975, corrected,
+        "frisch_as_printed": to the letter. Frisch's equations are of first order in the deformation: they take bodies
+        of level `full` as `linear`.
         Raises DynamicsError where an inertia is not positive definite.
         """
         if algorithm not in get_args(Algorithm):
@@ -174,44 +164,10 @@ class System:
             status, rates = nested.accelerations(state.t, pack(state))
             self._check(status, nested.fault)
             return rates
-        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
         if algorithm == "composite":
-            return self._composite(state, self._w.speed["acceleration"].copy(), self._w.speed["applied"].copy())
-        return self._w.speed["acceleration"].copy()
-
-    def _composite(self, state: State, rates: Real, applied: Real) -> Real:
-        fixed = self.constants.speed["prescribed"] >= 0
-        free = ~fixed
-        M, c = self.mass_matrix(state), self.bias(state)
-        right = applied - c - M[:, fixed] @ rates[fixed]
-        rates[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
-        return rates
-
-    def mass_matrix(self, state: State) -> Real:
-        """M (nu,nu)."""
-        M = np.zeros((self.nu, self.nu))
-        dynamics.mass_matrix(state.t, pack(state), self.constants, self._w, M)
-        return M
-
-    def bias(self, state: State) -> Real:
-        """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
-        return self.inverse_dynamics(state, np.zeros(self.nu))
-
-    def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
-        """tau (nu,) = M udot + c (44). Modal rows vanish where the accelerations are those of an undriven structure."""
-        return self._inverse(state, accelerations)[0]
-
-    def _inverse(self, state: State, accelerations: Real) -> tuple[Real, Real]:
-        """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
-        tau, loads = np.zeros(self.nu), np.zeros((len(self._links), 6))
-        rates = np.asarray(accelerations, float)
-        dynamics.inverse_dynamics(state.t, pack(state), rates, self.constants, self._w, tau, loads)
-        return tau, loads
-
-    def applied(self, state: State) -> Real:
-        """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
+            return self._composite(state.t, pack(state))[0]
         self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
-        return self._w.speed["applied"].copy()
+        return self._w.speed["acceleration"].copy()
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
@@ -239,14 +195,18 @@ class System:
         With "frisch" or "frisch_as_printed", accelerations, hinge loads, drive loads and wheel torques are those of
         these equations; a wheel's force follows from its acceleration (the paper counts its mass as the body's).
         """
+        y = np.concatenate([q, u, [0.0]])
         if algorithm in ERRATA:
-            return self._evaluate_nested(t, np.concatenate([q, u, [0.0]]), self.nested(algorithm))
+            return self._evaluate_nested(t, y, self.nested(algorithm))
+        if algorithm == "composite":
+            rates, drives = self._composite(t, y)
+            loads = self._inverse(State(q, u, t), rates)[1]
+            return self._evaluation(rates, drives, *self._observed(t, y, rates, loads))
         if algorithm != "articulated":
-            raise ValueError(f"algorithm must be articulated, {' or '.join(ERRATA)}, not {algorithm!r}")
+            raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
         c, w = self.constants, self._w
         markers, wheel_loads, energy, momentum = self._outputs()
         loads = np.zeros((len(self._links), 6))
-        y = np.concatenate([q, u, [0.0]])
         self._check(
             dynamics.observe(
                 t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
@@ -260,13 +220,18 @@ class System:
         status, motion = nested.motion(t, y)
         self._check(status, nested.fault)
         rates = motion.accelerations
+        markers, loads, wheel_loads, energy, momentum = self._observed(t, y, rates, motion.loads)
+        wheel_loads[:, :3] = motion.wheel_torques
+        return self._evaluation(rates, motion.drives, markers, loads, wheel_loads, energy, momentum)
+
+    def _observed(self, t: float, y: Real, rates: Real, loads: Real) -> tuple[Real, Real, Real, Real, Real]:
+        """Markers, the hinge loads given, wheel loads, energy and momentum of accelerations found elsewhere."""
         markers, wheel_loads, energy, momentum = self._outputs()
         dynamics.observe_motion(
             t, y, rates, self._marker_body, self._marker_port, self.constants, self._w,
             markers, wheel_loads, energy, momentum,
         )  # fmt: skip
-        wheel_loads[:, :3] = motion.wheel_torques
-        return self._evaluation(rates, motion.drives, markers, motion.loads, wheel_loads, energy, momentum)
+        return markers, loads, wheel_loads, energy, momentum
 
     def _outputs(self) -> tuple[Real, Real, Real, Real]:
         """Markers, wheel loads, energy and momentum to be filled."""
@@ -301,16 +266,6 @@ class System:
                 found[name] = drive[place][driven].copy()
         return found
 
-    def _check(self, status: int, fault: int | None = None) -> None:
-        """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
-        if status != OK:
-            place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
-            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
-
-    def fault_name(self, status: int, fault: int) -> str:
-        """What a failure's number stands for: a body."""
-        return self.body_names[fault]
-
 
 def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as flexmb.compile)
     """Check a scene and turn it into arrays.
@@ -335,11 +290,6 @@ def _find(places: dict[str, slice], name: str) -> slice:
     if name not in places:
         raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
     return places[name]
-
-
-def pack(state: State) -> Real:
-    """y = [q, u, work]."""
-    return np.concatenate([state.q, state.u, [0.0]])
 
 
 def _initial_hinge(link: Link, q: Real, u: Real) -> None:

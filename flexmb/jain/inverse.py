@@ -1,4 +1,4 @@
-"""Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45); the mass matrix column by column.
+"""Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
 tau holds inertia, gravity, elasticity and node loads; hinge springs and motors are what it is compared with. Modal rows
 vanish where the accelerations are consistent with an undriven structure.
@@ -14,10 +14,10 @@ from flexmb.jain.kinematics import (
     pose_sweep,
     velocity_sweep,
 )
-from flexmb.jain.sweeps import body_inertia
+from flexmb.jain.sweeps import body_inertia, force_to_parent
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import inertia_times, load_inertia, shift_force
-from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, times, vec3
+from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, store3, times, vec3
 
 
 @helper
@@ -34,26 +34,6 @@ def inverse_dynamics(c, w, tau):
         _inertial_force(c, w, k, tau)
     for k in range(c.body.shape[0] - 1, -1, -1):
         _project_force(c, w, k, tau)
-
-
-@helper
-def mass_matrix(c, w, M):
-    """M (nu,nu): inverse dynamics of unit accelerations, at rest, without gravity, springs and loads."""
-    for j in range(w.u.shape[0]):
-        w.u[j] = 0.0
-    store3(w.ground, 0, (0.0, 0.0, 0.0))
-    velocity_sweep(c, w, False, False)
-    for j in range(w.u.shape[0]):
-        for i in range(w.u.shape[0]):
-            w.speed[i].acceleration = 0.0
-        w.speed[j].acceleration = 1.0
-        acceleration_sweep(c, w)
-        for k in range(c.body.shape[0]):
-            body_inertia(c, w, k)
-            _inertial_force(c, w, k, M[j])
-        for k in range(c.body.shape[0] - 1, -1, -1):
-            _project_force(c, w, k, M[j])
-    store3(w.ground, 0, scale(-1.0, vec3(c.gravity, 0)))
 
 
 @helper
@@ -100,15 +80,5 @@ def _project_force(c, w, k, tau):
         tau[c.body[k].u_index + n] = dot(angular, torque) + dot(linear, force)
     store3(w.body[k].load, 0, torque)
     store3(w.body[k].load, 3, force)
-    p = c.body[k].parent
-    if p < 0:
-        return
-    R = mat3(w.body[k].rotation, 0)
-    torque, force = shift_force(times(R, torque), times(R, force), vec3(w.body[k].arm, 0))
-    i = c.body[k].inboard_port
-    if i >= 0:
-        for n in range(c.body[p].modes):
-            w.mode[p, n].zf += dot(vec3(w.port_mode[i, n].W, 0), torque) + dot(vec3(w.port_mode[i, n].L, 0), force)
-        torque, force = shift_force(torque, force, vec3(w.port[i].r, 0))
-    add3(w.body[p].force, 0, torque)
-    add3(w.body[p].force, 3, force)
+    if c.body[k].parent >= 0:
+        force_to_parent(c, w, w, k, torque, force)

@@ -13,7 +13,8 @@ import pytest
 import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.scene.build import SceneBuilder
-from flexmb.system import DynamicsError, System
+from flexmb.state import DynamicsError
+from flexmb.system import System
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma
 

@@ -8,7 +8,7 @@ from flexmb.hinges import catalogue
 from flexmb.hinges.catalogue import FREE, GIMBAL2, GIMBAL3, KINDS, SPHERICAL
 from flexmb.kernel import kernel
 from flexmb.scene.build import SceneBuilder, angular
-from flexmb.system import DynamicsError
+from flexmb.state import DynamicsError
 from tests.bounds import gamma
 from tests.flexmb import spectral
 

@@ -12,7 +12,8 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
-from flexmb.system import DynamicsError, System
+from flexmb.state import DynamicsError
+from flexmb.system import System
 from tests import trees
 from tests.bounds import algebra, gamma, observed_order, relative
 

@@ -1,0 +1,230 @@
+"""Composite-body inertias and the mass matrix of trees: Jain & Rodriguez (47)-(50), O(N^2 n^2); forward dynamics (46).
+
+R(k) is the modal inertia of all that body k carries, frozen. Every speed of body k has a force X = R H', which travels
+inward through the bodies that carry k; what they meet of it are the elements of M (50). All forces on the way through a
+body travel together: the speeds of what a body carries are neighbours in M when M is written in places (`Places`)
+instead of in the order of u. Rows of M are then filled from one end to the other.
+
+A wheel is one more speed of its body, whose force is the torque I q on its node.
+"""
+
+from flexmb.coordinates import hinge_forces
+from flexmb.jain import inverse
+from flexmb.jain.kinematics import motion_column, velocity_sweep
+from flexmb.jain.sweeps import body_inertia, inertia_to_parent, refer_to_hinge
+from flexmb.kernel import helper
+from flexmb.levels.range import is_out_of_range
+from flexmb.linear_algebra import cholesky_rows, cholesky_solve
+from flexmb.spatial.inertia import inertia_times, load_inertia
+from flexmb.spatial.vector import dot, mat3, scale, times, vec3
+from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
+
+TILE = 16
+
+
+@helper
+def mass_matrix(c, w, m):
+    """Upper triangle of M in places into m.M, at the configuration in w.q."""
+    for j in range(w.u.shape[0]):
+        w.u[j] = 0.0
+    velocity_sweep(c, w, False, False)
+    for k in range(c.body.shape[0]):
+        body_inertia(c, w, k)
+    composite_bodies(c, w, m)
+
+
+@helper
+def forward_dynamics(c, w, m):
+    """Accelerations into w.speed.acceleration by (46), drive loads into w.speed.drive; returns a status code.
+
+    Prescribed speeds have their rates; what these cost is part of the bias. m keeps M, bias and factor.
+    """
+    hinge_forces(c, w)
+    for j in range(w.u.shape[0]):
+        f = c.speed[j].prescribed
+        w.speed[j].acceleration = w.function[f, 2] if f >= 0 else 0.0
+    inverse.inverse_dynamics(c, w, m.bias)
+    for k in range(c.body.shape[0]):
+        if is_out_of_range(c, w, k):
+            w.fault[0] = k
+            return OUT_OF_RANGE
+    composite_bodies(c, w, m)
+    return _solve(w, m)
+
+
+@helper
+def _solve(w, m):
+    """M x = T - C for the free speeds, tips first: pivots as in articulated bodies, and no fill between branches."""
+    free = m.x.shape[0]
+    _reverse(m, free)
+    for a in range(free):
+        j = m.speed[m.order[a]]
+        m.x[a] = w.speed[j].applied - m.bias[j]
+    failed = cholesky_rows(m.U, free)
+    if failed >= 0:
+        w.fault[0] = m.body[m.order[failed]]
+        return NOT_POSITIVE_DEFINITE
+    cholesky_solve(m.U, m.x, free)
+    for a in range(free):
+        w.speed[m.speed[m.order[a]]].acceleration = m.x[a]
+    for b in range(free, m.order.shape[0]):
+        i = m.order[b]
+        j = m.speed[i]
+        load = m.bias[j] - w.speed[j].applied
+        for a in range(free):
+            e = m.order[a]
+            load += m.M[min(i, e), max(i, e)] * m.x[a]
+        w.speed[j].drive = load
+    return OK
+
+
+@helper
+def _reverse(m, n):
+    """The free speeds' upper triangle of M into U, tips first: a transposition, by tiles that stay in the cache."""
+    for a0 in range(0, n, TILE):
+        for b0 in range(a0, n, TILE):
+            for b in range(b0, min(b0 + TILE, n)):
+                row = m.M[m.order[b]]
+                for a in range(a0, min(a0 + TILE, b + 1)):
+                    m.U[a, b] = row[m.order[a]]
+
+
+@helper
+def composite_bodies(c, w, m):
+    """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
+
+    Needs w.body.inertia, w.pff and w.mode.pfr of all bodies, M_m; leaves R there.
+    """
+    for k in range(c.body.shape[0] - 1, -1, -1):
+        if c.body[k].outboard_port >= 0:
+            refer_to_hinge(c, w, k)
+            _forces_to_hinge(c, w, m, k)
+        _own_forces(c, w, m, k)
+        _hinge_rows(c, w, m, k)
+        if c.body[k].parent >= 0:
+            inertia_to_parent(c, w, k, load_inertia(w.body[k].inertia, 0))
+            _forces_to_parent(c, w, m, k)
+
+
+@helper
+def _own_forces(c, w, m, k):
+    """X of body k's own speeds about O into their columns of m.X, and the rows of its modes and wheels among them."""
+    first, modes, wheels = m.hinge[k], m.modes[k], m.wheels[k]
+    p = load_inertia(w.body[k].inertia, 0)
+    for n in range(c.body[k].nv):
+        angular, linear = motion_column(c, w, k, n)
+        tau, f = inertia_times(p, angular, linear)
+        _store_force(m.X, first + n, tau, f)
+    nm = c.body[k].modes
+    for n in range(nm):
+        _store_force(m.X, modes + n, vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3))
+        for i in range(n, nm):
+            m.M[modes + n, modes + i] = w.pff[k, n, i]
+    count = c.body[k].wheel_stop - c.body[k].wheel_start
+    for i in range(count):
+        wheel = c.body[k].wheel_start + i
+        port, axial = c.wheel[wheel].port, c.wheel[wheel].axial
+        torque = scale(axial, times(mat3(w.port[port].R, 0), vec3(c.wheel[wheel].axis, 0)))
+        _store_force(m.X, wheels + i, torque, (0.0, 0.0, 0.0))
+        out = c.body[k].outboard_port
+        for n in range(nm):
+            row = dot(vec3(w.port_mode[port, n].W, 0), torque)
+            if out >= 0:
+                row -= dot(vec3(w.port_mode[out, n].W, 0), torque)
+            m.M[modes + n, wheels + i] = row
+        m.M[wheels + i, wheels + i] = axial
+
+
+@helper
+def _hinge_rows(c, w, m, k):
+    """M(k, j) = H X(j) of the hinge's speeds and all speeds j of what it carries."""
+    start, stop = m.hinge[k], m.stop[k]
+    for n in range(c.body[k].nv):
+        angular, linear = motion_column(c, w, k, n)
+        _project(angular, linear, m.X[:, start + n : stop], m.M[start + n, start + n : stop])
+
+
+@helper
+def _forces_to_hinge(c, w, m, k):
+    """Forces of what body k carries from its origin to O on a node that deforms: modes feel -[Pi_d]' X (45)."""
+    i = c.body[k].outboard_port
+    X = m.X[:, m.carried[k] : m.stop[k]]
+    _shift(scale(-1.0, vec3(w.port[i].r, 0)), X)
+    for n in range(c.body[k].modes):
+        angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+        _project_off(angular, linear, X, m.M[m.modes[k] + n, m.carried[k] : m.stop[k]])
+
+
+@helper
+def _forces_to_parent(c, w, m, k):
+    """X(j) = Phi X(j-1) of all speeds that hinge k carries, and the rows of the parent's modes: [Pi_t]' X."""
+    p, i = c.body[k].parent, c.body[k].inboard_port
+    start, stop = m.hinge[k], m.stop[k]
+    X = m.X[:, start:stop]
+    _rotate(mat3(w.body[k].rotation, 0), X)
+    _shift(vec3(w.body[k].arm, 0), X)
+    for n in range(c.body[p].modes):
+        row = m.M[m.modes[p] + n, start:stop]
+        if i >= 0:
+            _project(vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0), X, row)
+        else:
+            for j in range(row.shape[0]):
+                row[j] = 0.0
+    if i >= 0:
+        _shift(vec3(w.port[i].r, 0), X)
+
+
+@helper
+def _store_force(X, j, tau, f):
+    """Column j of X."""
+    for i in range(3):
+        X[i, j] = tau[i]
+        X[3 + i, j] = f[i]
+
+
+@helper
+def _project(angular, linear, X, row):
+    """row = [angular; linear]' X."""
+    a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
+    for j in range(row.shape[0]):
+        row[j] = (
+            angular[0] * a[j] + angular[1] * b[j] + angular[2] * c[j]
+            + linear[0] * d[j] + linear[1] * e[j] + linear[2] * f[j]
+        )  # fmt: skip
+
+
+@helper
+def _project_off(angular, linear, X, row):
+    """row -= [angular; linear]' X."""
+    a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
+    for j in range(row.shape[0]):
+        row[j] -= (
+            angular[0] * a[j] + angular[1] * b[j] + angular[2] * c[j]
+            + linear[0] * d[j] + linear[1] * e[j] + linear[2] * f[j]
+        )  # fmt: skip
+
+
+@helper
+def _rotate(R, X):
+    """Torques and forces X (6,j) turned by R."""
+    _rotate3(R, X[0], X[1], X[2])
+    _rotate3(R, X[3], X[4], X[5])
+
+
+@helper
+def _rotate3(R, x, y, z):
+    for j in range(x.shape[0]):
+        a, b, c = x[j], y[j], z[j]
+        x[j] = R[0] * a + R[1] * b + R[2] * c
+        y[j] = R[3] * a + R[4] * b + R[5] * c
+        z[j] = R[6] * a + R[7] * b + R[8] * c
+
+
+@helper
+def _shift(d, X):
+    """phi X: torques about a point from which d leads to the one they were about."""
+    a, b, c, x, y, z = X[0], X[1], X[2], X[3], X[4], X[5]
+    for j in range(a.shape[0]):
+        a[j] += d[1] * z[j] - d[2] * y[j]
+        b[j] += d[2] * x[j] - d[0] * z[j]
+        c[j] += d[0] * y[j] - d[1] * x[j]

@@ -1,0 +1,74 @@
+"""Where the speeds of a tree stand in its mass matrix: depth first, so that all that a body carries are neighbours.
+
+u itself has point masses at its end, away from the bodies that carry them.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.arrays import Constants, Index, Real
+from flexmb.bundle import bundle
+
+
+@bundle
+class Matrices:
+    """The mass matrix in places, and its solution. Places of a body: hinge, modes, wheels, all that it carries."""
+
+    hinge: Index  # (N,) first place of a body
+    modes: Index  # (N,) first place of its modes
+    wheels: Index  # (N,) first place of its wheels
+    carried: Index  # (N,) first place of what it carries
+    stop: Index  # (N,) end of what it carries
+    speed: Index  # (nu,) number in u of a place
+    body: Index  # (nu,) body of a place
+    order: Index  # (nu,) places of the n speeds that are free, tips first, then of those that are prescribed
+    X: Real  # (6,nu) forces [torque; force] of the speeds, where they have come to
+    M: Real  # (nu,nu) its upper triangle
+    U: Real  # (n,n) upper Cholesky factor over the free speeds, tips first
+    x: Real  # (n,) its right side and solution
+    bias: Real  # (nu,) C, in the order of u
+
+
+def matrices(c: Constants) -> Matrices:
+    """Places of a tree, and matrices of the right sizes."""
+    bodies, nu = len(c.body), len(c.speed)
+    children: list[list[int]] = [[] for _ in range(bodies + 1)]
+    for k, parent in enumerate(c.body["parent"].tolist()):
+        children[parent].append(k)
+    place = {name: np.zeros(bodies, np.int64) for name in ("hinge", "modes", "wheels", "carried", "stop")}
+    speed: list[int] = []
+    owner: list[int] = []
+    waiting = [(k, False) for k in reversed(children[-1])]
+    while waiting:
+        k, done = waiting.pop()
+        if done:
+            place["stop"][k] = len(speed)
+            continue
+        b = c.body[k]
+        wheels = c.wheel["u_index"][b["wheel_start"] : b["wheel_stop"]]
+        for name, own in (
+            ("hinge", range(b["u_index"], b["u_index"] + b["nv"])),
+            ("modes", range(b["etad_index"], b["etad_index"] + b["modes"])),
+            ("wheels", wheels.tolist()),
+        ):
+            place[name][k] = len(speed)
+            speed += own
+        place["carried"][k] = len(speed)
+        owner += [k] * (len(speed) - len(owner))
+        waiting.append((k, True))
+        waiting += [(child, False) for child in reversed(children[k])]
+    prescribed = c.speed["prescribed"][speed] >= 0
+    order = sorted(range(nu), key=lambda i: (prescribed[i], -i))
+    n = nu - int(np.sum(prescribed))
+    return Matrices(
+        **place,
+        speed=np.array(speed, np.int64),
+        body=np.array(owner, np.int64),
+        order=np.array(order, np.int64),
+        X=np.zeros((6, nu)),
+        M=np.zeros((nu, nu)),
+        U=np.zeros((n, n)),
+        x=np.zeros(n),
+        bias=np.zeros(nu),
+    )

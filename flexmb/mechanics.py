@@ -1,0 +1,130 @@
+"""The equations of motion M udot + c = tau of a tree at one state: inverse dynamics, mass matrix and its factors."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb import composite, dynamics
+from flexmb.arrays import Constants, Real, Workspace
+from flexmb.consistent import consistent_accelerations, held_hinges
+from flexmb.factorisation import MassMatrixFactors
+from flexmb.jain.places import Matrices, matrices
+from flexmb.state import DynamicsError, State, pack
+from flexmb.status import OK, Status
+
+
+class ConsistentMotion(NamedTuple):
+    """accelerations (nu,) that need no modal forces, and the tau (nu,) of hinges and wheels that they need."""
+
+    accelerations: Real
+    tau: Real
+
+
+class Mechanics:
+    """What a `System` answers about its equations of motion. It writes into one workspace."""
+
+    constants: Constants
+    nq: int
+    nu: int
+    _w: Workspace
+
+    def __init__(self) -> None:
+        self._matrices: Matrices | None = None
+        self._held: tuple[Constants, Workspace] | None = None
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Bodies in the order of the dynamics, point masses last."""
+        raise NotImplementedError
+
+    def workspace(self) -> Workspace:
+        """A fresh workspace; one per thread."""
+        raise NotImplementedError
+
+    def mass_matrix(self, state: State) -> Real:
+        """M (nu,nu), by composite bodies."""
+        M = np.empty((self.nu, self.nu))
+        composite.mass_matrix(state.t, pack(state), self.constants, self._w, self._places(), M)
+        return M
+
+    def factorise(self, state: State) -> MassMatrixFactors:
+        """M = F F' by recursion: `solve`, `multiply`, `half_solve` and `log_determinant`, each in O(N).
+
+        Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
+        """
+        factors = MassMatrixFactors(self.constants, self.workspace(), state.t, pack(state))
+        self._check(factors.status, factors.fault)
+        return factors
+
+    def bias(self, state: State) -> Real:
+        """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
+        return self.inverse_dynamics(state, np.zeros(self.nu))
+
+    def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
+        """tau (nu,) = M udot + c, in O(N): Jain & Rodriguez (45).
+
+        Nothing drives a structure but its hinges and wheels: where the modal rows of tau (`modal_residual`) do not
+        vanish, the accelerations are not consistent with each other, and tau is not what motors would have to do.
+        `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
+        """
+        return self._inverse(state, accelerations)[0]
+
+    def modal_residual(self, state: State, accelerations: Real) -> dict[str, Real]:
+        """Modal rows T^f of inverse dynamics by body: the modal forces that these accelerations would need."""
+        tau = self.inverse_dynamics(state, accelerations)
+        places = {name: self._modes(k) for k, name in enumerate(self.body_names)}
+        return {name: tau[place] for name, place in places.items() if place.stop > place.start}
+
+    def consistent_inverse_dynamics(self, state: State, accelerations: Real) -> ConsistentMotion:
+        """Inverse dynamics of hinges and wheels that accelerate as told, structures following without modal forces.
+
+        The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
+        """
+        if self._held is None:
+            self._held = held_hinges(self.constants, self.workspace())
+        held, w = self._held
+        rates = np.asarray(accelerations, float)
+        self._check(
+            consistent_accelerations(state.t, pack(state), rates, self.constants, held, w), int(w.fault[0])
+        )
+        rates = w.speed["acceleration"].copy()
+        return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
+
+    def applied(self, state: State) -> Real:
+        """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
+        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
+        return self._w.speed["applied"].copy()
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """What a failure's number stands for: a body."""
+        return self.body_names[fault]
+
+    def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
+        self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
+        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
+
+    def _inverse(self, state: State, accelerations: Real) -> tuple[Real, Real]:
+        """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
+        tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
+        rates = np.asarray(accelerations, float)
+        dynamics.inverse_dynamics(state.t, pack(state), rates, self.constants, self._w, tau, loads)
+        return tau, loads
+
+    def _places(self) -> Matrices:
+        """Made when first asked for: they are as large as the mass matrix."""
+        if self._matrices is None:
+            self._matrices = matrices(self.constants)
+        return self._matrices
+
+    def _modes(self, k: int) -> slice:
+        body = self.constants.body[k]
+        return slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
+
+    def _check(self, status: int, fault: int | None = None) -> None:
+        """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
+        if status != OK:
+            place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
+            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
