@@ -47,32 +47,34 @@ def loads(t, y, c, w):
 @kernel
 def assemble(t, y, c, w):
     """Partitions and right sides of (111), the transformation and the reduced equations, without solving them."""
-    _equations(t, y, c, w)
-
-
-@helper
-def _equations(t, y, c, w):
-    load_state(t, y, c, w)
-    hinge_forces(c, w)
-    relative_motion(c, w)
-    nest_sums(c, w)
-    coefficient_matrix(c, w)
-    reduce(c, w)
+    _kinematics(t, y, c, w)
+    _equations(c, w)
 
 
 @helper
 def _solution(t, y, c, w):
-    load_state(t, y, c, w)
-    hinge_forces(c, w)
-    relative_motion(c, w)
+    """Equations and their solution; a status code."""
+    _kinematics(t, y, c, w)
     for k in range(c.body.shape[0]):
         if is_out_of_range(c, w, k):
             w.fault[0] = k
             return OUT_OF_RANGE
+    _equations(c, w)
+    return solve(c, w)
+
+
+@helper
+def _kinematics(t, y, c, w):
+    load_state(t, y, c, w)
+    hinge_forces(c, w)
+    relative_motion(c, w)
+
+
+@helper
+def _equations(c, w):
     nest_sums(c, w)
     coefficient_matrix(c, w)
     reduce(c, w)
-    return solve(c, w)
 
 
 @helper
