@@ -21,6 +21,7 @@ Index = NDArray[np.int64]
 Record = NDArray[np.void]
 
 RIGID, RUTHLESS, FULL, LINEAR = range(4)
+EXPLICIT, WOODBURY, CONDENSED = range(3)
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
 
@@ -40,6 +41,11 @@ BODY = _record(
     ("u_index", _I),  # first hinge speed in u
     ("nv", _I),  # number of hinge speeds
     ("modes", _I),  # number of modes
+    ("elimination", _I),  # of the modes: EXPLICIT, WOODBURY or CONDENSED
+    ("reduced", _I),  # row of the tables of ReducedConstants, where not EXPLICIT
+    ("node", _I),  # place of the inboard port among its parent's nodes, where the parent's elimination is not EXPLICIT
+    ("nodes", _I),  # number of such places: hinges of outboard bodies at ports that deform
+    ("orthogonal", _I),  # whether the modal masses are diagonal
     ("eta_index", _I),  # first modal coordinate in q
     ("etad_index", _I),  # first modal speed in u
     ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming
@@ -142,6 +148,28 @@ class Constants:
     table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
 
 
+# Every reduced body has nodes i = 0..C-1 where outboard bodies are hinged; vectors of all of them are stacked (6C).
+REDUCED_NODE = _record(
+    ("port", _I),
+    ("theta", _F, (6, 6)),  # Theta = phi' - Pi Lam M_fr: acceleration of the node by that of the body, modes yielding
+)
+
+
+@bundle
+class ReducedConstants(Constants):
+    """Constants of a scene some of whose bodies are reduced: their D_f is not factorised at run time, Appendix B.
+
+    R reduced bodies; C the most nodes of one. Written for M_ff = L L'; Lam = M_ff^-1.
+    """
+
+    compliance: Real  # (R,m,m) condensed: L^-1; Woodbury: Lam
+    gain: Real  # (R,m,1+C,6) at rest: [Psi, Ups_1 .. Ups_C] of Psi = Lam M_fr, Ups = Lam Pi'; condensed: L' times it
+    node: Record  # (R,C) REDUCED_NODE at rest
+    root: Real  # (R,6C,6C) at rest: Omega = Pi Lam Pi' = root' root
+    rank: Index  # (R,) rows of root
+    zeta: Real  # (R,21) at rest: M_rf Lam M_fr, as a spatial inertia
+
+
 BODY_STATE = _record(
     ("rotation", _F, (9,)),  # R_parent_body
     ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
@@ -203,3 +231,24 @@ class Workspace:
     speed: Record  # (nu,) SPEED_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body where an evaluation failed
+
+
+NODE_STATE = _record(  # node of a reduced body, axes of the body
+    ("gamma", _F, (21,)),  # P_R^+ of the outboard body about the node: Gamma
+    ("force", _F, (6,)),  # z_R^+ of the outboard body about the node, then the force at the node without accelerations
+    ("theta", _F, (6, 6)),
+    ("carried", _F, (6, 6)),  # T Theta: force at the node by acceleration of the body
+    ("response", _F, (6,)),  # of the stacked right side
+)
+
+
+@bundle
+class ReducedWorkspace(Workspace):
+    """The workspace of a scene with reduced bodies. What does not change with the deformation is written once."""
+
+    gain: Real  # (R,m,1+C,6)
+    node: Record  # (R,C) NODE_STATE
+    root: Real  # (R,6C,6C)
+    rank: Index  # (R,)
+    zeta: Real  # (R,21)
+    scratch: Real  # (3,6C,6C): B = C^-1 root Gamma; C C' = 1 + root Gamma root'; T = Gamma - B'B

@@ -3,8 +3,8 @@
 from flexmb.hinges.catalogue import SPHERICAL
 from flexmb.jain.forces import load_vector
 from flexmb.jain.kinematics import port_velocity
-from flexmb.jain.sweeps import body_inertia
 from flexmb.kernel import helper
+from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, times, vec3

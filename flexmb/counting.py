@@ -147,6 +147,9 @@ class _Interpreter:
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
+        if hasattr(thing, "variants"):  # flexmb.kernel.by_bundle
+            array, having, lacking = map(self, thing.variants)
+            return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
         if isinstance(thing, ModuleType) and thing.__name__.startswith(f"{__package__}."):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":

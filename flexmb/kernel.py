@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from numba import config, njit
+from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
 # "contract" fuses a*b + c. No "nnan" or "ninf": they would let the compiler delete the checks that catch a blow-up.
@@ -110,3 +111,26 @@ def generic(function: Callable[..., Any]) -> Any:
     the caller. Written out down to the entry point, which names the kernel, it is a direct call.
     """
     return njit(inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True, **_SEMANTICS)(function)
+
+
+def by_bundle(array: str, having: Callable[..., Any], lacking: Callable[..., Any]) -> Callable[..., Any]:
+    """One helper for two kinds of bundles: `having` where the first argument has `array`, `lacking` where it has not.
+
+    Decided by type, while the caller is compiled: a kernel is compiled once for each kind of bundle that it is called
+    with, and contains nothing of the other.
+    """
+
+    def choose(bundle: Any, *args: Any) -> Any:
+        return (having if hasattr(bundle, array) else lacking)(bundle, *args)
+
+    @overload(choose, jit_options=_SEMANTICS)
+    def _typed(bundle, *args):
+        choice = having if array in dict(bundle.kinds) else lacking
+
+        def call(bundle, *args):
+            return choice(bundle, *args)
+
+        return call
+
+    choose.variants = (array, having, lacking)  # type: ignore[attr-defined]  # for who interprets kernels
+    return choose

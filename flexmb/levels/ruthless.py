@@ -8,11 +8,18 @@ from flexmb.spatial.vector import dot, sym6, sym_times, vec3
 @helper
 def inertia_and_bias(c, w, k):
     """The rigid body at rest shape, constant modal blocks, and the centrifugal force w' B_n w on each mode."""
-    rigid.inertia_and_bias(c, w, k)
-    omega = vec3(w.body[k].velocity, 0)
+    rigid_block_and_bias(c, w, k)
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             w.pff[k, n, i] = c.pair[k, n, i].mff
         for i in range(6):
             w.mode[k, n].pfr[i] = c.mode[k, n].mfr[i]
+
+
+@helper
+def rigid_block_and_bias(c, w, k):
+    """The same without the modal blocks of M_m, for whom has no use for them."""
+    rigid.inertia_and_bias(c, w, k)
+    omega = vec3(w.body[k].velocity, 0)
+    for n in range(c.body[k].modes):
         w.mode[k, n].zf = dot(omega, sym_times(sym6(c.mode[k, n].gyration, 0), omega))

@@ -166,6 +166,22 @@ def outer_inertia(x, y, s):
 
 
 @helper
+def add_product(a, i, s, x, y):
+    """Add s x y' of 6-vectors x, y to the spatial inertia in a: one term of a sum that is symmetric."""
+    for n in range(3):
+        a[i + n] += s * x[n] * y[n]
+        a[i + 15 + n] += s * x[3 + n] * y[3 + n]
+        for m in range(3):
+            a[i + 6 + 3 * n + m] += s * x[n] * y[3 + m]
+    a[i + 3] += s * x[0] * y[1]
+    a[i + 4] += s * x[0] * y[2]
+    a[i + 5] += s * x[1] * y[2]
+    a[i + 18] += s * x[3] * y[4]
+    a[i + 19] += s * x[3] * y[5]
+    a[i + 20] += s * x[4] * y[5]
+
+
+@helper
 def shift_force(tau, f, d):
     """phi F: torque about Q of a force known about O, with d from Q to O."""
     return add(tau, cross(d, f)), f

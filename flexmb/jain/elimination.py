@@ -1,0 +1,162 @@
+"""Which bodies are reduced, by rule or by force, and the constants of Appendix B for them."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any, Literal, get_args
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from flexmb import arrays as a
+
+Elimination = Literal["fastest", "explicit", "woodbury", "condensed"]
+
+ELIMINATIONS = ("explicit", "woodbury", "condensed")  # by the numbers of flexmb.arrays
+
+WELL_CONDITIONED = 1e4  # modal masses scaled to a unit diagonal; condensing loses the square root of it
+NEGLIGIBLE = 2.0**-49  # rows of a scaled root of Omega below it are rounding: 16 units
+
+
+def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Constants:
+    """The constants with the variant that eliminates the modes of each body; ReducedConstants where any is reduced.
+
+    "fastest" follows the rule of `is_faster`; the others force one variant wherever it applies (`applies`), the
+    explicit one elsewhere. ValueError for a choice that does not exist.
+    """
+    if choice not in get_args(Elimination):
+        raise ValueError(f"elimination is {choice!r}: use one of {', '.join(map(repr, get_args(Elimination)))}")
+    if choice == "explicit":
+        return c
+    variant = a.WOODBURY if choice == "woodbury" else a.CONDENSED
+    nodes = [_node_ports(c, k) for k in range(len(c.body))]
+    forced = choice != "fastest"
+    reduced = [
+        k for k in range(len(c.body)) if applies(c, k, variant) and (forced or is_faster(c, k, len(nodes[k])))
+    ]
+    return _reduced_constants(c, reduced, nodes, variant) if reduced else c
+
+
+def applies(c: a.Constants, k: int, variant: int) -> bool:
+    """Whether body k may be reduced: modal masses constant and regular, nothing but its nodes adding to them.
+
+    Not with a hinge on a node that its own modes move (H_f adds the rigid inertia to D_f), nor with a free wheel, which
+    takes a rank-one part out of D_f. The Woodbury form is Appendix B's: of ruthless bodies.
+    """
+    body = c.body[k]
+    free_wheel = any(
+        c.speed["prescribed"][c.wheel["u_index"][i]] < 0 for i in range(body["wheel_start"], body["wheel_stop"])
+    )
+    if body["modes"] == 0 or body["outboard_port"] >= 0 or free_wheel:
+        return False
+    constant = body["level"] == a.RUTHLESS or (
+        variant == a.CONDENSED
+        and body["point_start"] == body["point_stop"]
+        and not (body["level"] == a.LINEAR and body["mass_slope"] >= 0)
+    )
+    return bool(constant) and _is_regular(_modal_mass(c, k))
+
+
+def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
+    """Whether condensing body k was measured to be faster than a Cholesky factor (tests/benchmarks)."""
+    return bool(c.body["modes"][k] > 8 * max(1, nodes))
+
+
+def _is_regular(M: a.Real) -> bool:
+    """Positive definite and well conditioned, whatever the units of the modes."""
+    size = np.sqrt(np.abs(np.diag(M)))
+    if np.any(np.diag(M) <= 0.0):
+        return False
+    values = np.linalg.eigvalsh(M / np.outer(size, size))
+    return bool(values[0] * WELL_CONDITIONED > values[-1])
+
+
+def _modal_mass(c: a.Constants, k: int) -> a.Real:
+    n = c.body["modes"][k]
+    return c.pair["mff"][k, :n, :n]
+
+
+def _node_ports(c: a.Constants, k: int) -> list[int]:
+    """Ports of body k that deform and carry hinges, in the order of the outboard bodies."""
+    port = c.body["inboard_port"]
+    return [int(port[child]) for child in np.flatnonzero(c.body["parent"] == k) if port[child] >= 0]
+
+
+def _reduced_constants(
+    c: a.Constants, reduced: list[int], nodes: list[list[int]], variant: int
+) -> a.ReducedConstants:
+    most, m = max(len(nodes[k]) for k in reduced), c.mode.shape[1]
+    size = 6 * max(most, 1)
+    tables: dict[str, Any] = {
+        "compliance": np.zeros((len(reduced), m, m)),
+        "gain": np.zeros((len(reduced), m, 1 + most, 6)),
+        "node": np.zeros((len(reduced), most), a.REDUCED_NODE),
+        "root": np.zeros((len(reduced), size, size)),
+        "rank": np.zeros(len(reduced), np.int64),
+        "zeta": np.zeros((len(reduced), 21)),
+    }
+    body = c.body.copy()
+    body["reduced"] = body["node"] = -1
+    for row, k in enumerate(reduced):
+        body["elimination"][k], body["reduced"][k], body["nodes"][k] = variant, row, len(nodes[k])
+        M = _modal_mass(c, k)
+        body["orthogonal"][k] = np.array_equal(M, np.diag(np.diag(M)))
+        children = np.flatnonzero((body["parent"] == k) & (body["inboard_port"] >= 0))
+        body["node"][children] = np.arange(len(children))
+        _fill(c, k, row, nodes[k], variant, tables)
+    base = {field.name: getattr(c, field.name) for field in fields(c)} | {"body": body}
+    return a.ReducedConstants(**base, **tables)
+
+
+def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tables: dict[str, Any]) -> None:
+    """Row of body k: the constants of (B4), with Theta and the M_fr they leave out; at rest."""
+    n = c.body["modes"][k]
+    M_fr, Pi_t = c.mode["mfr"][k, :n], _shapes(c, ports, n)
+    L = np.linalg.cholesky(_modal_mass(c, k))
+    inverse = solve_triangular(L, np.eye(n), lower=True)
+    psi, ups = inverse @ M_fr, inverse @ Pi_t
+    scale, pivoted, order = _scaled_root(ups)
+    rank = len(pivoted)
+    tables["root"][row, :rank, order] = (pivoted * scale[order]).T
+    tables["rank"][row] = rank
+    tables["zeta"][row] = _spatial(psi.T @ psi)
+    theta = np.vstack([_shift(c, port) for port in ports] or [np.zeros((0, 6))]) - ups.T @ psi
+    tables["node"]["port"][row, : len(ports)] = ports
+    tables["node"]["theta"][row, : len(ports)] = theta.reshape(len(ports), 6, 6)
+    if variant == a.WOODBURY:
+        inverse, psi, ups = inverse.T @ inverse, inverse.T @ psi, inverse.T @ ups
+    tables["compliance"][row, :n, :n] = inverse
+    tables["gain"][row, :n, 0] = psi
+    tables["gain"][row, :n, 1 : 1 + len(ports)] = ups.reshape(n, len(ports), 6)
+
+
+def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
+    """Rows of the triangular factor of the columns of `ups`, scaled to unit length and pivoted: scale, rows, order."""
+    scale = np.linalg.norm(ups, axis=0)
+    if not ups.shape[1]:
+        return scale, np.zeros((0, 0)), np.zeros(0, int)
+    rows, order = qr(ups / np.where(scale > 0.0, scale, 1.0), mode="r", pivoting=True)
+    rows = rows[: min(ups.shape)]
+    return scale, rows[np.abs(np.diag(rows)) > np.sqrt(NEGLIGIBLE)], order
+
+
+def _shapes(c: a.Constants, ports: list[int], n: int) -> a.Real:
+    """Pi' (n, 6C) of the nodes at rest: angular and linear velocity by modal speed."""
+    rotation, translation = c.port_mode["rotation"][ports, :n], c.port_mode["translation"][ports, :n]
+    linear = translation + np.cross(rotation, c.port["offset"][ports][:, None])
+    return np.concatenate([rotation, linear], axis=2).swapaxes(0, 1).reshape(n, 6 * len(ports))
+
+
+def _shift(c: a.Constants, port: int) -> a.Real:
+    """phi' (6,6): velocity of the port by that of the body origin."""
+    x, y, z = c.port["position"][port] + c.port["offset"][port]
+    out = np.eye(6)
+    out[3:, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
+    return out
+
+
+def _spatial(P: a.Real) -> a.Real:
+    """The 21 numbers of a symmetric (6,6) matrix, as in flexmb.spatial.inertia."""
+    six = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    A, C = [P[i, j] for i, j in six], [P[3 + i, 3 + j] for i, j in six]
+    return np.array([*A, *P[:3, 3:].ravel(), *C])

@@ -1,0 +1,164 @@
+"""Modes eliminated by an explicit Cholesky factor of D_f, (63), (64): for any body, at any level, with any hinge.
+
+After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
+"""
+
+from math import sqrt
+
+from flexmb.kernel import helper
+from flexmb.spatial.inertia import (
+    add_inertia,
+    inertia_times,
+    load_inertia,
+    outer_inertia,
+    rotate_inertia,
+    shift_force,
+    shift_inertia,
+    store_inertia,
+)
+from flexmb.spatial.vector import add3, cross, dot, mat3, scale, store3, sub, times, vec3
+
+SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
+
+
+@helper
+def eliminate_modes(c, w, k):
+    """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
+    nm = c.body[k].modes
+    if c.body[k].outboard_port >= 0:
+        refer_to_hinge(c, w, k)
+    p = load_inertia(w.body[k].inertia, 0)
+    store_inertia(w.body[k].hinge_inertia, 0, p)
+    for i in range(6):
+        w.body[k].hinge_force[i] = w.body[k].force[i]
+    if nm == 0:
+        return True
+    if not cholesky(w.pff[k], nm):
+        return False
+    for n in range(nm):
+        for i in range(n):
+            w.mode[k, n].zf -= w.pff[k, n, i] * w.mode[k, i].zf
+            for b in range(6):
+                w.mode[k, n].pfr[b] -= w.pff[k, n, i] * w.mode[k, i].pfr[b]
+        s = 1.0 / w.pff[k, n, n]
+        w.mode[k, n].zf *= s
+        for b in range(6):
+            w.mode[k, n].pfr[b] *= s
+            w.body[k].hinge_force[b] -= w.mode[k, n].pfr[b] * w.mode[k, n].zf
+        add_inertia(
+            w.body[k].hinge_inertia, 0, outer_inertia(vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), -1.0)
+        )
+    return True
+
+
+@helper
+def cholesky(a, n):
+    """Lower Cholesky factor of a[:n,:n] in place; False where it is not positive definite to round-off (or NaN)."""
+    for j in range(n):
+        d = a[j, j]
+        floor = SINGULAR * d
+        for i in range(j):
+            d -= a[j, i] * a[j, i]
+        if not d > floor:
+            return False
+        d = sqrt(d)
+        a[j, j] = d
+        for m in range(j + 1, n):
+            s = a[m, j]
+            for i in range(j):
+                s -= a[m, i] * a[j, i]
+            a[m, j] = s / d
+    return True
+
+
+@helper
+def refer_to_hinge(c, w, k):
+    """Refer P and z from the body origin to O on the deforming node d: the congruence with H_f of (13), (17).
+
+    With V_body = X V_O - B etadot, B = X [W; L], X the shift from O to the origin: P_ff - B'P_rf - P_fr B + B'P_rr B,
+    (P_fr - B'P_rr) X, X'P_rr X; z_f - B'z_r, X'z_r.
+    """
+    nm = c.body[k].modes
+    i = c.body[k].outboard_port
+    r = vec3(w.port[i].r, 0)
+    p = load_inertia(w.body[k].inertia, 0)
+    tau, f = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
+    for n in range(nm):
+        angular = vec3(w.port_mode[i, n].W, 0)
+        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+        w.mode[k, n].zf -= dot(angular, tau) + dot(linear, f)
+        momentum = inertia_times(p, angular, linear)
+        for m in range(nm):
+            angular_m = vec3(w.port_mode[i, m].W, 0)
+            linear_m = sub(vec3(w.port_mode[i, m].L, 0), cross(angular_m, r))
+            across = dot(angular, vec3(w.mode[k, m].pfr, 0)) + dot(linear, vec3(w.mode[k, m].pfr, 3))
+            w.pff[k, n, m] += dot(momentum[0], angular_m) + dot(momentum[1], linear_m) - across
+            w.pff[k, m, n] -= across
+    back = scale(-1.0, r)
+    for n in range(nm):
+        angular = vec3(w.port_mode[i, n].W, 0)
+        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+        momentum = inertia_times(p, angular, linear)
+        tau_n = sub(vec3(w.mode[k, n].pfr, 0), momentum[0])
+        f_n = sub(vec3(w.mode[k, n].pfr, 3), momentum[1])
+        tau_n, f_n = shift_force(tau_n, f_n, back)
+        store3(w.mode[k, n].pfr, 0, tau_n)
+        store3(w.mode[k, n].pfr, 3, f_n)
+    store_inertia(w.body[k].inertia, 0, shift_inertia(p, back))
+    tau, f = shift_force(tau, f, back)
+    store3(w.body[k].force, 0, tau)
+    store3(w.body[k].force, 3, f)
+
+
+@helper
+def to_parent(c, w, k, p, tau, f):
+    """P_R^+ and z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+    inertia_to_parent(c, w, k, p)
+    force_to_parent(c, w, w, k, tau, f)
+
+
+@helper
+def inertia_to_parent(c, w, k, p):
+    """Gamma = P_R^+ in parent axes at the parent's reference; P += A Gamma A' with A = [Pi'; phi]."""
+    parent = c.body[k].parent
+    gamma = shift_inertia(rotate_inertia(mat3(w.body[k].rotation, 0), p), vec3(w.body[k].arm, 0))
+    i = c.body[k].inboard_port
+    if i >= 0:
+        r = vec3(w.port[i].r, 0)
+        nm = c.body[parent].modes
+        for n in range(nm):
+            angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+            tau_n, f_n = inertia_times(gamma, angular, linear)
+            for m in range(nm):
+                w.pff[parent, n, m] += dot(tau_n, vec3(w.port_mode[i, m].W, 0)) + dot(f_n, vec3(w.port_mode[i, m].L, 0))
+            tau_n, f_n = shift_force(tau_n, f_n, r)
+            add3(w.mode[parent, n].pfr, 0, tau_n)
+            add3(w.mode[parent, n].pfr, 3, f_n)
+        gamma = shift_inertia(gamma, r)
+    add_inertia(w.body[parent].inertia, 0, gamma)
+
+
+@helper
+def force_to_parent(c, w, z, k, tau, f):
+    """A [tau; f] added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+    parent = c.body[k].parent
+    R = mat3(w.body[k].rotation, 0)
+    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
+    i = c.body[k].inboard_port
+    if i >= 0:
+        for n in range(c.body[parent].modes):
+            z.mode[parent, n].zf += dot(vec3(w.port_mode[i, n].W, 0), tau) + dot(vec3(w.port_mode[i, n].L, 0), f)
+        tau, f = shift_force(tau, f, vec3(w.port[i].r, 0))
+    add3(z.body[parent].force, 0, tau)
+    add3(z.body[parent].force, 3, f)
+
+
+@helper
+def modal_accelerations(c, w, k, alpha, a):
+    """Back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
+    for n in range(c.body[k].modes - 1, -1, -1):
+        s = w.mode[k, n].zf + dot(vec3(w.mode[k, n].pfr, 0), alpha) + dot(vec3(w.mode[k, n].pfr, 3), a)
+        for i in range(n + 1, c.body[k].modes):
+            s += w.pff[k, i, n] * w.mode[k, i].etadd
+        w.mode[k, n].etadd = -s / w.pff[k, n, n]
+        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd

@@ -1,0 +1,88 @@
+"""What outboard bodies do to the modes of a reduced body, kept at its nodes: of size 6 each, whatever the mode count.
+
+A node is a port that deforms and carries a hinge. With Gamma and y the articulated inertia and force of what is hinged
+there, A the node's acceleration, F its load on the body, modes included: F = Gamma A + y. Nodes are stacked.
+"""
+
+from flexmb.jain.explicit import cholesky
+from flexmb.kernel import helper
+from flexmb.spatial.inertia import (
+    inertia_times,
+    load_inertia,
+    rotate_inertia,
+    shift_force,
+    shift_inertia,
+    store_inertia,
+)
+from flexmb.spatial.vector import mat3, store3, times, vec3
+
+
+@helper
+def to_node(c, w, k, p, tau, f):
+    """Gamma = P_R^+ and z_R^+ of body k about the node of its parent, parent axes."""
+    R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
+    node = w.node[c.body[c.body[k].parent].reduced, c.body[k].node]
+    store_inertia(node.gamma, 0, shift_inertia(rotate_inertia(R, p), arm))
+    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    store3(node.force, 0, tau)
+    store3(node.force, 3, f)
+
+
+@helper
+def node_inertia(w, r, nodes):
+    """T = (1 + Gamma Omega)^-1 Gamma into w.scratch[2], for Omega = root' root; False where it does not exist.
+
+    As Gamma - B'B with B = C^-1 root Gamma and C C' = 1 + root Gamma root': neither Gamma, which a hinge makes
+    singular, nor Omega, which has the rank of the modes, is inverted.
+    """
+    B, C, T = w.scratch[0], w.scratch[1], w.scratch[2]
+    root, rank = w.root[r], w.rank[r]
+    for i in range(nodes):
+        gamma = load_inertia(w.node[r, i].gamma, 0)
+        for a in range(rank):
+            tau, f = inertia_times(gamma, vec3(root[a], 6 * i), vec3(root[a], 6 * i + 3))
+            store3(B[a], 6 * i, tau)
+            store3(B[a], 6 * i + 3, f)
+    for a in range(rank):
+        for b in range(a + 1):
+            s = 1.0 if a == b else 0.0
+            for i in range(6 * nodes):
+                s += B[a, i] * root[b, i]
+            C[a, b] = s
+    if not cholesky(C, rank):
+        return False
+    for a in range(rank):
+        for b in range(a):
+            for i in range(6 * nodes):
+                B[a, i] -= C[a, b] * B[b, i]
+        s = 1.0 / C[a, a]
+        for i in range(6 * nodes):
+            B[a, i] *= s
+    for i in range(6 * nodes):
+        for j in range(i + 1):
+            s = 0.0
+            for a in range(rank):
+                s -= B[a, i] * B[a, j]
+            T[i, j] = s
+            T[j, i] = s
+    for i in range(nodes):
+        gamma = load_inertia(w.node[r, i].gamma, 0)
+        _add_block(T, 6 * i, gamma)
+    return True
+
+
+@helper
+def _add_block(T, i, gamma):
+    """Add a spatial inertia to the diagonal block of T that starts at row i."""
+    a, b, c = gamma
+    for n in range(3):
+        T[i + n, i + n] += a[n]
+        T[i + 3 + n, i + 3 + n] += c[n]
+        for m in range(3):
+            T[i + n, i + 3 + m] += b[3 * n + m]
+            T[i + 3 + m, i + n] += b[3 * n + m]
+    for n, row, column in ((3, 0, 1), (4, 0, 2), (5, 1, 2)):
+        T[i + row, i + column] += a[n]
+        T[i + column, i + row] += a[n]
+        T[i + 3 + row, i + 3 + column] += c[n]
+        T[i + 3 + column, i + 3 + row] += c[n]

@@ -1,0 +1,52 @@
+"""Which variant eliminates the modes of a body: of a scene where all factorise D_f, the explicit one, at no cost.
+
+Scenes with other choices have ReducedConstants: the kernels are compiled again for them.
+"""
+
+from flexmb.arrays import CONDENSED, EXPLICIT, RUTHLESS, WOODBURY
+from flexmb.jain import condensed, explicit, woodbury
+from flexmb.jain.reduced import to_node
+from flexmb.kernel import by_bundle, helper
+from flexmb.levels.body import body_inertia
+from flexmb.levels.ruthless import rigid_block_and_bias
+
+
+@helper
+def _inertia(c, w, k):
+    if c.body[k].elimination != EXPLICIT and c.body[k].level == RUTHLESS:
+        rigid_block_and_bias(c, w, k)
+    else:
+        body_inertia(c, w, k)
+
+
+@helper
+def _eliminate_modes(c, w, k):
+    if c.body[k].elimination == CONDENSED:
+        return condensed.eliminate_modes(c, w, k)
+    if c.body[k].elimination == WOODBURY:
+        return woodbury.eliminate_modes(c, w, k)
+    return explicit.eliminate_modes(c, w, k)
+
+
+@helper
+def _to_parent(c, w, k, p, tau, f):
+    if c.body[k].node < 0:
+        explicit.to_parent(c, w, k, p, tau, f)
+    else:
+        to_node(c, w, k, p, tau, f)
+
+
+@helper
+def _modal_accelerations(c, w, k, alpha, a):
+    if c.body[k].elimination == CONDENSED:
+        condensed.modal_accelerations(c, w, k, alpha, a)
+    elif c.body[k].elimination == WOODBURY:
+        woodbury.modal_accelerations(c, w, k, alpha, a)
+    else:
+        explicit.modal_accelerations(c, w, k, alpha, a)
+
+
+inertia = by_bundle("compliance", _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
+eliminate_modes = by_bundle("compliance", _eliminate_modes, explicit.eliminate_modes)
+to_parent = by_bundle("compliance", _to_parent, explicit.to_parent)
+modal_accelerations = by_bundle("compliance", _modal_accelerations, explicit.modal_accelerations)

@@ -1,0 +1,100 @@
+"""D_f^-1 of a ruthless body without factorising D_f: (B2)-(B4), corrected.
+
+The print's (B3) inverts Gamma, which a hinge makes singular (its rank is at most 6 - n_r). Instead
+
+    D_f^-1 = Lam - Ups T Ups',   T = (1 + Gamma Omega)^-1 Gamma,
+
+with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4); the rest is (63), (64) as printed.
+"""
+
+from flexmb.jain.reduced import node_inertia
+from flexmb.kernel import helper
+from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_force, shift_inertia
+from flexmb.spatial.vector import add3, dot, vec3
+
+
+@helper
+def eliminate_modes(c, w, k):
+    """P_R = P_rr - g mu', z_R = z_r + g epsilon_f with g = mu D_f^-1, kept in w.gain; D_f^-1 into w.pff[k]."""
+    r = c.body[k].reduced
+    nm = c.body[k].modes
+    for n in range(nm):
+        for b in range(6):
+            w.mode[k, n].pfr[b] = c.mode[k, n].mfr[b]
+    if not node_inertia(w, r, c.body[k].nodes):
+        return False
+    for i in range(c.body[k].nodes):
+        _load_node(c, w, k, i)
+    _inverse(c, w, k)
+    for b in range(21):
+        w.body[k].hinge_inertia[b] = w.body[k].inertia[b]
+    for b in range(6):
+        w.body[k].hinge_force[b] = w.body[k].force[b]
+    for n in range(nm):
+        g = w.gain[r, n, 0]
+        for b in range(6):
+            g[b] = 0.0
+        for i in range(nm):
+            for b in range(6):
+                g[b] += w.pff[k, n, i] * w.mode[k, i].pfr[b]
+        add_product(w.body[k].hinge_inertia, 0, -1.0, g, w.mode[k, n].pfr)
+        for b in range(6):
+            w.body[k].hinge_force[b] -= g[b] * w.mode[k, n].zf
+    return True
+
+
+@helper
+def _load_node(c, w, k, i):
+    """P += A Gamma A' but for its ff block, z += A z_R^+: the outboard body at node i."""
+    node = w.node[c.body[k].reduced, i]
+    port = c.node[c.body[k].reduced, i].port
+    r = vec3(w.port[port].r, 0)
+    gamma = load_inertia(node.gamma, 0)
+    tau, f = vec3(node.force, 0), vec3(node.force, 3)
+    for n in range(c.body[k].modes):
+        angular, linear = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)
+        tau_n, f_n = inertia_times(gamma, angular, linear)
+        tau_n, f_n = shift_force(tau_n, f_n, r)
+        add3(w.mode[k, n].pfr, 0, tau_n)
+        add3(w.mode[k, n].pfr, 3, f_n)
+        w.mode[k, n].zf += dot(angular, tau) + dot(linear, f)
+    add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
+    tau, f = shift_force(tau, f, r)
+    add3(w.body[k].force, 0, tau)
+    add3(w.body[k].force, 3, f)
+
+
+@helper
+def _inverse(c, w, k):
+    """D_f^-1 = Lam - Ups T Ups'."""
+    r = c.body[k].reduced
+    nodes = c.body[k].nodes
+    T = w.scratch[2]
+    row = w.scratch[0, 0]
+    for n in range(c.body[k].modes):
+        for i in range(nodes):
+            for a in range(6):
+                s = 0.0
+                for j in range(nodes):
+                    for b in range(6):
+                        s += T[6 * i + a, 6 * j + b] * w.gain[r, n, 1 + j, b]
+                row[6 * i + a] = s
+        for i in range(n + 1):
+            s = c.compliance[r, n, i]
+            for j in range(nodes):
+                for b in range(6):
+                    s -= row[6 * j + b] * w.gain[r, i, 1 + j, b]
+            w.pff[k, n, i] = s
+            w.pff[k, i, n] = s
+
+
+@helper
+def modal_accelerations(c, w, k, alpha, a):
+    """etadd = nu_f - g' alpha: outward half of (64)."""
+    r = c.body[k].reduced
+    for n in range(c.body[k].modes):
+        s = dot(vec3(w.gain[r, n, 0], 0), alpha) + dot(vec3(w.gain[r, n, 0], 3), a)
+        for i in range(c.body[k].modes):
+            s += w.pff[k, n, i] * w.mode[k, i].zf
+        w.mode[k, n].etadd = -s
+        w.speed[c.body[k].etad_index + n].acceleration = -s
