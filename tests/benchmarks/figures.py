@@ -15,6 +15,7 @@ from matplotlib.axes import Axes
 import flexmb as fm
 from flexmb.frisch.errata import AS_PRINTED
 from flexmb.frisch.system import nested_system
+from tests.benchmarks import cost_figures
 from tests.benchmarks.rivals import flexible_chain, interleaved, rigid_chain
 from tests.benchmarks.test_nested import nested, recursion
 from tests.flexmb.frisch.scenes import at_level, deformed, packed
@@ -33,10 +34,12 @@ def main() -> None:
     FOLDER.mkdir(exist_ok=True)
     _draw(_orders, FOLDER / "frisch_orders.svg")
     _draw(_cost, FOLDER / "frisch_cost.svg")
+    _draw(cost_figures.of_modes, FOLDER / "jain_cost_modes.svg", panels=2)
+    _draw(cost_figures.of_bodies, FOLDER / "jain_cost_bodies.svg", panels=2)
 
 
-def _draw(picture, path: Path) -> None:
-    figure, axes = plt.subplots(figsize=(6.4, 4.4), layout="constrained")
+def _draw(picture, path: Path, panels: int = 1) -> None:
+    figure, axes = plt.subplots(ncols=panels, figsize=(6.4 if panels == 1 else 9.6, 4.4), layout="constrained")
     picture(axes)
     figure.savefig(path, metadata={"Date": None})
     plt.close(figure)

@@ -1,13 +1,16 @@
 """Section VII against its own statements, against algorithms that can be counted, and against our kernels."""
 
+from functools import partial
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 import flexmb
-from flexmb import dynamics
 from flexmb.counting import Operations, count
 from flexmb.jain import cost
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
+from tests.benchmarks.routes import articulated, composite_body
 
 
 @pytest.mark.parametrize("n", range(21))
@@ -69,12 +72,9 @@ def test_linear_equations_are_an_ldl_factorisation(n):
     assert found.additions == printed.additions
 
 
-def executed(scene, kernel=dynamics.accelerations) -> Operations:
+def executed(route, scene) -> Operations:
     """Operations of one evaluation of the accelerations at the initial state."""
-    system = flexmb.compile(scene)
-    state = system.initial_state
-    y = np.concatenate([state.q, state.u, [0.0]])
-    return count(kernel, 0.0, y, system.constants, system.workspace()).operations
+    return route(flexmb.compile(scene)).operations()
 
 
 def degree(counts: list[int]) -> int:
@@ -94,20 +94,68 @@ def test_degree():
         degree([2**n for n in range(8)])
 
 
-@pytest.mark.parametrize("level", ["rigid", "ruthless", "full"])
-def test_articulated_bodies_cost_the_same_each(level):
+CHAINS = {
+    "rigid": rigid_chain,
+    "ruthless": partial(flexible_chain, modes=3, level="ruthless"),
+    "free-free": partial(flexible_chain, modes=3, level="ruthless", boundary="free-free"),
+    "full": partial(flexible_chain, modes=3, level="full"),
+}
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_articulated_bodies_cost_the_same_each(chain):
     """Exactly linear in N once there is an inner body: second differences vanish in every kind of operation."""
-    counts = [executed(rigid_chain(n) if level == "rigid" else flexible_chain(n, 3, level)) for n in range(2, 7)]
-    steps = [b - a for a, b in zip(counts[:-1], counts[1:], strict=True)]
-    assert len(set(steps)) == 1
-    assert steps[0].total > 0
+    counts = [executed(articulated, CHAINS[chain](n)) for n in range(2, 7)]
+    steps = {b - a for a, b in pairwise(counts)}
+    assert len(steps) == 1
+    assert steps.pop().total > 0
+
+
+@pytest.mark.parametrize("chain", CHAINS)
+def test_composite_bodies_are_cubic_in_bodies(chain):
+    """A factorisation of all speeds: their cube over 6 multiplications and as many additions are the leading terms."""
+    speeds = 1 if chain == "rigid" else 4
+    counts = [executed(composite_body, CHAINS[chain](n)) for n in range(2, 9)]
+    for kind in ("multiplications", "additions"):
+        numbers = [getattr(c, kind) for c in counts]
+        assert degree(numbers) == 3
+        assert set(np.diff(numbers, 3)) == {speeds**3}
+
+
+@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
+def test_composite_bodies_are_cubic_in_modes(boundary):
+    """Three bodies: (3 n)^3 / 6 multiplications and as many additions are the leading terms."""
+    counts = [executed(composite_body, flexible_chain(3, n, "ruthless", boundary=boundary)) for n in range(1, 8)]
+    for kind in ("multiplications", "additions"):
+        numbers = [getattr(c, kind) for c in counts]
+        assert degree(numbers) == 3
+        assert set(np.diff(numbers, 3)) == {27}
 
 
 @pytest.mark.parametrize("level", ["ruthless", "full"])
 def test_explicit_elimination_is_cubic_in_modes(level):
-    """A factorisation of D_f: a cubic, its leading term n^3 / 6 multiplications and as many additions."""
-    counts = [executed(flexible_chain(3, n, level)) for n in range(1, 8)]
+    """A factorisation of D_f: n^3 / 6 multiplications and as many additions are the leading terms of each body."""
+    counts = [executed(articulated, flexible_chain(3, n, level)) for n in range(1, 8)]
     for kind in ("multiplications", "additions"):
         numbers = [getattr(c, kind) for c in counts]
         assert degree(numbers) == 3
-        assert set(np.diff(numbers, 3)) == {3}  # three bodies, 3! / 6 each
+        assert set(np.diff(numbers, 3)) == {3}
+
+
+def test_composite_bodies_agree_with_the_paper_in_the_highest_terms():
+    """Ours less theirs, free-free modes: no N^3, no N^2 n^2, in multiplications as in additions.
+
+    The linear equations and the blocks of the mass matrix are those of VII.A.2 and VII.A.5, operation by operation.
+    """
+    for kind in ("multiplications", "additions"):
+        difference = np.array([
+            [
+                getattr(executed(composite_body, flexible_chain(N, n, "ruthless", boundary="free-free")), kind)
+                - getattr(cost.composite([n] * N), kind)
+                for n in range(1, 5)
+            ]
+            for N in range(2, 6)
+        ])  # fmt: skip
+        assert not np.any(np.diff(difference, 3, axis=0))
+        assert not np.any(np.diff(np.diff(difference, 2, axis=0), 2, axis=1))
+        assert np.any(np.diff(difference, 2, axis=0))
