@@ -145,7 +145,7 @@ def test_explicit_elimination_is_cubic_in_modes(level):
 def test_composite_bodies_agree_with_the_paper_in_the_highest_terms():
     """Ours less theirs, free-free modes: no N^3, no N^2 n^2, in multiplications as in additions.
 
-    The linear equations and the blocks of the mass matrix are those of VII.A.2 and VII.A.5, operation by operation.
+    Of these terms are the linear equations, VII.A.5, and the blocks of the mass matrix, VII.A.2.
     """
     for kind in ("multiplications", "additions"):
         difference = np.array([
