@@ -43,6 +43,10 @@ class Mechanics:
         """A fresh workspace; one per thread."""
         raise NotImplementedError
 
+    def composite_workspace(self) -> composite.CompositeWorkspace:
+        """A fresh workspace for runs by composite bodies; one per thread."""
+        return composite.CompositeWorkspace(self.workspace(), matrices(self.constants))
+
     def mass_matrix(self, state: State) -> Real:
         """M (nu,nu), by composite bodies."""
         M = np.empty((self.nu, self.nu))

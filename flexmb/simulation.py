@@ -9,8 +9,9 @@ from typing import Any, Literal, NamedTuple, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import propagate
+from flexmb import composite_runs, propagate
 from flexmb.arrays import Constants, Workspace
+from flexmb.composite import CompositeWorkspace
 from flexmb.frisch import propagation as nested_propagation
 from flexmb.frisch.tables import NestedWorkspace
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
@@ -45,7 +46,7 @@ class _Route(NamedTuple):
     """An algorithm as integrators see it: its constants, a maker of workspaces, and the compiled runs."""
 
     constants: Constants
-    workspace: Callable[[], Workspace | NestedWorkspace]
+    workspace: Callable[[], Workspace | CompositeWorkspace | NestedWorkspace]
     run_dop853: Callable[..., Any]
     run_rk4: Callable[..., Any]
 
@@ -67,8 +68,9 @@ def simulate(
     method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol, in the root mean
     square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s).
     samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
-    algorithm: "articulated", the O(N) recursion, or Frisch's equations, "frisch" or "frisch_as_printed", which take
-    bodies of level `full` as `linear`; accelerations and loads of the output are theirs too.
+    algorithm: "articulated", the O(N) recursion; "composite", the mass matrix and its Cholesky factors; or Frisch's
+    equations, "frisch" or "frisch_as_printed", which take bodies of level `full` as `linear`. Accelerations and loads of
+    the output are theirs too.
 
     Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError for settings that make no sense. A run that fails raises nothing: `status` and
@@ -133,8 +135,12 @@ def _route(system: System, algorithm: Algorithm) -> _Route:
         )
     if algorithm == "articulated":
         return _Route(system.constants, system.workspace, propagate.run_dop853, propagate.run_rk4)
+    if algorithm == "composite":
+        return _Route(
+            system.constants, system.composite_workspace, composite_runs.run_dop853, composite_runs.run_rk4
+        )
     if algorithm not in ERRATA:
-        raise ValueError(f"algorithm is {algorithm!r}: runs use one of 'articulated', {', '.join(map(repr, ERRATA))}")
+        raise ValueError(f"algorithm is {algorithm!r}: runs use one of {', '.join(map(repr, get_args(Algorithm)))}")
     nested = system.nested(algorithm)
     return _Route(nested.constants, nested.workspace, nested_propagation.run_dop853, nested_propagation.run_rk4)
 
