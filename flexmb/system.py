@@ -17,11 +17,12 @@ from typing import Literal, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import arrays, coordinates, dynamics
-from flexmb.arrays import Constants, Real, Workspace
+from flexmb import coordinates, dynamics
+from flexmb.arrays import Real, Workspace
 from flexmb.assemble import assemble
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.frisch.system import NestedSystem, Partitions
+from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.links import Link, links
 from flexmb.mechanics import Mechanics
@@ -29,6 +30,7 @@ from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
 from flexmb.state import State, pack
+from flexmb.workspaces import workspace
 
 Algorithm = Literal["articulated", "composite", "frisch", "frisch_as_printed"]
 ERRATA = {"frisch": CORRECTED, "frisch_as_printed": AS_PRINTED}
@@ -71,7 +73,7 @@ class Evaluation:
 class System(Mechanics):
     """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
 
-    def __init__(self, scene: s.Scene) -> None:
+    def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
         super().__init__()
         self.scene = scene
         self._links = links(scene)
@@ -82,6 +84,8 @@ class System(Mechanics):
         self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
         self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
         self._w = self.workspace()
+        self.recursion_constants = with_elimination(self.constants, elimination)
+        self._recursion_w = self.recursion_workspace()
         self.rhs, self.project = dynamics.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
         self._operators: SpatialOperators | None = None
@@ -125,7 +129,19 @@ class System(Mechanics):
 
     def workspace(self) -> Workspace:
         """A fresh workspace for `rhs`; one per thread."""
-        return _workspace(self.constants, self.nq, self.nu)
+        return workspace(self.constants, self.nq, self.nu)
+
+    def recursion_workspace(self) -> Workspace:
+        """A fresh workspace for `rhs` with `recursion_constants`, whose bodies are eliminated as chosen."""
+        return workspace(self.recursion_constants, self.nq, self.nu)
+
+    @property
+    def elimination(self) -> dict[str, str]:
+        """By flexible body, how the recursion eliminates its modes: "explicit", "woodbury" or "condensed"."""
+        body = self.recursion_constants.body
+        return {
+            name: ELIMINATIONS[body["elimination"][k]] for k, name in enumerate(self.body_names) if body["modes"][k]
+        }
 
     def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
         """Frisch's equations of this scene, corrected or as printed, built at the first call.
@@ -166,8 +182,9 @@ class System(Mechanics):
             return rates
         if algorithm == "composite":
             return self._composite(state.t, pack(state))[0]
-        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
-        return self._w.speed["acceleration"].copy()
+        c, w = self.recursion_constants, self._recursion_w
+        self._check(dynamics.accelerations(state.t, pack(state), c, w), int(w.fault[0]))
+        return w.speed["acceleration"].copy()
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
@@ -204,14 +221,13 @@ class System(Mechanics):
             return self._evaluation(rates, drives, *self._observed(t, y, rates, loads))
         if algorithm != "articulated":
             raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
-        c, w = self.constants, self._w
+        c, w = self.recursion_constants, self._recursion_w
         markers, wheel_loads, energy, momentum = self._outputs()
         loads = np.zeros((len(self._links), 6))
-        self._check(
-            dynamics.observe(
-                t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
-            )
+        status = dynamics.observe(
+            t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
         )
+        self._check(status, int(w.fault[0]))
         return self._evaluation(
             w.speed["acceleration"].copy(), w.speed["drive"], markers, loads, wheel_loads, energy, momentum
         )
@@ -267,23 +283,27 @@ class System(Mechanics):
         return found
 
 
-def compile(scene: s.Scene) -> System:  # noqa: A001  (the field's word; used as flexmb.compile)
+def compile(scene: s.Scene, elimination: Elimination = "fastest") -> System:  # noqa: A001  (used as flexmb.compile)
     """Check a scene and turn it into arrays.
+
+    elimination: how the recursion eliminates the modes of each body, (63) of Jain & Rodriguez: "explicit" factorises
+    D_f, "woodbury" is their (B3), corrected, "condensed" costs O(n_m); where one does not apply, D_f is factorised.
+    All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen.
 
     Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
     supported yet (SID files, level "stiffened").
     """
     check_scene(scene)
-    return assembled(scene)
+    return assembled(scene, elimination)
 
 
-def assembled(scene: s.Scene) -> System:
+def assembled(scene: s.Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that was checked before."""
     if scene.closures:
         from flexmb.closed_system import ClosedSystem  # a tree needs none of it
 
         return ClosedSystem(scene)
-    return System(scene)
+    return System(scene, elimination)
 
 
 def _find(places: dict[str, slice], name: str) -> slice:
@@ -305,27 +325,3 @@ def _initial_hinge(link: Link, q: Real, u: Real) -> None:
                     q[n], u[n] = c.angle_rad, c.rate_rad_s
                 else:
                     q[n], u[n] = c.position_m, c.rate_m_s
-
-
-def _workspace(c: Constants, nq: int, nu: int) -> Workspace:
-    """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
-    n, m = c.mode.shape
-    w = Workspace(
-        q=np.zeros(nq),
-        u=np.zeros(nu),
-        raw=np.zeros(nq),
-        rate=np.zeros(nq),
-        ground=-c.gravity,
-        body=np.zeros(n, arrays.BODY_STATE),
-        mode=np.zeros((n, m), arrays.MODE_STATE),
-        pff=np.zeros((n, m, m)),
-        port=np.zeros(len(c.port), arrays.PORT_STATE),
-        port_mode=np.zeros((len(c.port), m), arrays.COLUMN),
-        point_mode=np.zeros(m, arrays.COLUMN),
-        speed=np.zeros(nu, arrays.SPEED_STATE),
-        function=np.zeros((len(c.function), 3)),
-        fault=np.zeros(1, np.int64),
-    )
-    w.port["r"] = c.port["position"] + c.port["offset"]
-    w.port["R"] = c.port["frame"]
-    return w
