@@ -19,6 +19,7 @@ from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
 if TYPE_CHECKING:
+    from flexmb.closure.system import ClosureError
     from flexmb.simulation import simulate
     from flexmb.state import DynamicsError, State
     from flexmb.status import Status
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from flexmb.trajectory import Trajectory
 
 _LATER = {
+    "ClosureError": "flexmb.closure.system",
     "simulate": "flexmb.simulation",
     "Status": "flexmb.status",
     "DynamicsError": "flexmb.state",
@@ -37,8 +39,8 @@ _LATER = {
 }
 
 __all__ = [
-    "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System", "Trajectory",
-    "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
+    "ClosureError", "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System",
+    "Trajectory", "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
 ]  # fmt: skip
 
 

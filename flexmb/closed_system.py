@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from flexmb import dynamics
 from flexmb.arrays import Real
+from flexmb.closure.assembly import consistent
 from flexmb.closure.constants import closure_constants
-from flexmb.closure.system import ClosedMotion, Closures
+from flexmb.closure.propagate import dop853_run, rk4_run
+from flexmb.closure.system import ClosedWorkspace, ClosureError, Closures
 from flexmb.scene import schema as s
 from flexmb.status import Status
 from flexmb.system import Algorithm, Evaluation, State, System, pack
@@ -20,9 +23,20 @@ class ClosedSystem(System):
 
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
-        self.closures = Closures(
-            self.constants, closure_constants(scene, self._links, self.constants, self._closure_ports), self.workspace()
-        )
+        own = closure_constants(scene, self._links, self.constants, self._closure_ports)
+        self.closures = Closures(scene.closures, self.constants, own, self.workspace(), self._check)
+        self._start: State | None = None
+
+    @property
+    def initial_state(self) -> State:
+        """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
+
+        Closest in the metric of kinetic energy, coordinates first, then speeds; prescribed ones are their functions'.
+        """
+        if self._start is None:
+            y = consistent(self.closures, 0.0, pack(super().initial_state))
+            self._start = State(y[: self.nq], y[self.nq : -1])
+        return State(self._start.q.copy(), self._start.u.copy())
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.
@@ -30,7 +44,7 @@ class ClosedSystem(System):
         Raises DynamicsError where an inertia is not positive definite, or the closures are singular.
         """
         self._only_articulated(algorithm)
-        return self._motion(state.t, pack(state)).accelerations
+        return self.closures.motion(state.t, pack(state)).accelerations
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""
@@ -45,7 +59,7 @@ class ClosedSystem(System):
         """Everything observable at one state; `loads` has the closures' too."""
         self._only_articulated(algorithm)
         y = np.concatenate([q, u, [0.0]])
-        motion = self._motion(t, y)
+        motion = self.closures.motion(t, y)
         markers, wheel_loads, energy, momentum = self._outputs()
         dynamics.observe_motion(
             t, y, motion.accelerations, self._marker_body, self._marker_port, self.constants, self._w,
@@ -57,10 +71,30 @@ class ClosedSystem(System):
         closures = zip(self.scene.closures, motion.closures, strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
 
-    def _motion(self, t: float, y: Real) -> ClosedMotion:
-        status, motion = self.closures.motion(t, y)
-        self._check(status, self.closures.fault)
-        return motion
+    def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
+        """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""
+        return self.closures.gaps(state.t, pack(state))
+
+    def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
+        """Constants, a maker of workspaces and the compiled runs; ClosureError where there is no motion to run."""
+        self._only_articulated(algorithm)
+        if not (np.isfinite(stabilise) and stabilise >= 0.0):
+            raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
+        self._refuse_locked()
+
+        def workspace() -> ClosedWorkspace:
+            return self.closures.workspace(self.workspace(), stabilise)
+
+        return self.closures.constants, workspace, dop853_run, rk4_run
+
+    def _refuse_locked(self) -> None:
+        start = self.initial_state  # counts the independent rows
+        if self.closures.mobility == 0 and not np.any(self.constants.speed["prescribed"] >= 0):
+            names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
+            raise ClosureError(
+                f"closures {names} leave none of the {len(start.u)} free speeds: the mechanism is locked. Free a "
+                "hinge, or let bodies deform"
+            )
 
     def fault_name(self, status: int, fault: int) -> str:
         """What a failure's number stands for: a closure or a body."""

@@ -43,7 +43,7 @@ _ADVICE = {
         "look for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
-        "closure {body} is singular: at this configuration the closures suppress fewer motions than elsewhere, and where "
+        "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and where "
         "the mechanism moves next is not determined; start elsewhere, or give a body flexibility"
     ),
     Status.CLOSURE_OPEN: (

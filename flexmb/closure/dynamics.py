@@ -2,17 +2,18 @@
 
 from flexmb.balance import power
 from flexmb.closure.factor import choose_rows
-from flexmb.closure.forces import add_loads, choose, free_tree, hold_closed
+from flexmb.closure.forces import add_loads, choose, free_tree, row_loads
 from flexmb.closure.projection import displace, locate, project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.unit_loads import pass_outward
 from flexmb.coordinates import configuration_rate, load_state
 from flexmb.dynamics import world_loads
-from flexmb.jain.kinematics import pose_sweep
 from flexmb.kernel import helper, kernel
 from flexmb.loads import drive_loads, hinge_loads
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.status import OK
+
+NOTHING, COORDINATES, SPEEDS = range(3)
 
 
 @helper
@@ -25,9 +26,10 @@ def rhs(t, y, dy, model, _):
     load_state(t, y, c, w)
     status = free_tree(c, w, cc, cw)
     if status == OK:
-        status = hold_closed(c, w, cc, cw)
+        status = row_loads(c, w, cc, cw)
     if status != OK:
         return status
+    add_loads(c, w, cc, cw)
     drive_loads(c, w)
     configuration_rate(c, w)
     nq, nu = w.q.shape[0], w.u.shape[0]
@@ -48,7 +50,7 @@ def project(t, y, model):
 
 @kernel
 def linearise(t, y, c, w, cc, cw):
-    """Rows' values and rates and their half-solved unit loads at y, of the tree; returns a status code."""
+    """The tree without closure loads at y: rows with accelerations, their half-solved unit loads; returns a status."""
     load_state(t, y, c, w)
     return free_tree(c, w, cc, cw)
 
@@ -61,50 +63,39 @@ def count_rows(cc, cw):
 
 
 @kernel
-def move(t, y, x, c, w, cc, cw):
-    """y displaced by (1 - H Psi K)' D^-1/2 x, and its rows' values and rates."""
-    pass_outward(c, w, cw, x, cw.step)
-    displace(t, y, c, w, cw)
+def move(t, y, x, what, c, w, cc, cw):
+    """Change y by (1 - H Psi K)' D^-1/2 x of the state linearised last, and find its rows' values and rates.
+
+    what: COORDINATES displaces it, SPEEDS adds to the speeds, NOTHING leaves it.
+    """
+    if what != NOTHING:
+        pass_outward(c, w, cw, x, cw.step)
+    if what == COORDINATES:
+        displace(t, y, c, w, cw)
+    elif what == SPEEDS:
+        nq = w.q.shape[0]
+        for j in range(w.u.shape[0]):
+            y[nq + j] += cw.step[j]
     locate(t, y, c, w, cc, cw)
 
 
 @kernel
-def push(t, y, x, c, w, cc, cw):
-    """The speeds of y changed by (1 - H Psi K)' D^-1/2 x, and its rows' values and rates."""
-    pass_outward(c, w, cw, x, cw.step)
-    nq = w.q.shape[0]
-    for j in range(w.u.shape[0]):
-        y[nq + j] += cw.step[j]
-    locate(t, y, c, w, cc, cw)
-
-
-@kernel
-def accelerations(t, y, c, w, cc, cw):
-    """udot into w.speed.acceleration and the loads of cw.rank independent rows into cw.row.load; a status code."""
-    load_state(t, y, c, w)
-    status = free_tree(c, w, cc, cw)
+def closure_loads(c, w, cc, cw):
+    """Loads of cw.rank independent rows at the state that was linearised last, into cw.row.load; a status code."""
+    status = choose(c, w, cc, cw)
     if status == OK:
-        status = choose(c, w, cc, cw)
-    if status == OK:
-        status = hold_closed(c, w, cc, cw)
+        status = row_loads(c, w, cc, cw)
     return status
 
 
 @kernel
-def loads(t, y, row_loads, c, w, cc, cw, hinges, closures):
-    """Accelerations and loads when the rows' loads are `row_loads` (G,).
+def loads(c, w, cc, cw, hinges, closures):
+    """Accelerations and loads under the rows' loads in cw.row.load, at the state that was linearised last.
 
     hinges (N,6), closures (C,6): [torque; force] on the outboard body about O, on body_b about frame B; World axes.
     """
-    load_state(t, y, c, w)
-    status = free_tree(c, w, cc, cw)
-    if status != OK:
-        return status
-    for r in range(row_loads.shape[0]):
-        cw.row[r].load = row_loads[r]
     add_loads(c, w, cc, cw)
     drive_loads(c, w)
-    pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, hinges)
     for i in range(cc.closure.shape[0]):
@@ -112,4 +103,3 @@ def loads(t, y, row_loads, c, w, cc, cw, hinges, closures):
         tau, f = load_on_b(cc, cw, i)
         store3(closures[i], 0, times(R, tau))
         store3(closures[i], 3, times(R, f))
-    return OK

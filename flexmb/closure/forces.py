@@ -26,8 +26,8 @@ def free_tree(c, w, cc, cw):
 
 
 @helper
-def hold_closed(c, w, cc, cw):
-    """Loads of the chosen rows into cw.row.load: Lambda^-1 f = -(J udot_0 + gamma); they join the motion of the tree.
+def row_loads(c, w, cc, cw):
+    """Loads of the chosen rows into cw.row.load: Lambda^-1 f = -(J udot_0 + gamma).
 
     With stabilisation g'' + gain[0] g' + gain[1] g = 0 instead of g'' = 0. Returns a status code.
     """
@@ -40,7 +40,6 @@ def hold_closed(c, w, cc, cw):
         damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
         cw.scratch[a] = -(cw.row[r].acceleration + damped)
     solve(cw)
-    add_loads(c, w, cc, cw)
     return OK
 
 

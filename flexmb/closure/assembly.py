@@ -1,0 +1,86 @@
+"""Initial conditions that close all closures, from a user's rough ones, or why there are none.
+
+Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), each the least in the metric of kinetic energy; then
+the speeds nearest in the same metric. Prescribed coordinates and speeds stay as they are. Rows are weighed with a
+length of the scene, and compared with the size of their closure.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.arrays import Real
+from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
+from flexmb.closure.system import ClosureError, Closures
+
+STEPS = 200
+STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
+
+
+def consistent(closures: Closures, t: float, y: Real) -> Real:
+    """y = [q, u, work] with closed closures, close to the one given; ClosureError where there is none."""
+    y = _closed(closures, t, y.copy())
+    closures.count_rows()
+    _refuse_half_a_turn(closures)
+    return _moving(closures, t, y)
+
+
+def _closed(closures: Closures, t: float, y: Real) -> Real:
+    closures.linearise(t, y)
+    errors, damping = closures.errors(), 1e-3
+    for _ in range(STEPS):
+        if _largest(errors) <= CLOSED:
+            break
+        U, s, Vt = np.linalg.svd(closures.responses(), full_matrices=False)
+        # the damping fades with the errors: convergence is quadratic, even where redundant rows become dependent
+        floor = damping * s[0] ** 2 * min(1.0, float(np.linalg.norm(errors))) + np.finfo(float).tiny
+        x = -Vt.T @ (s / (s**2 + floor) * (U.T @ errors))
+        trial = closures.moved(t, y, x)
+        if np.linalg.norm(closures.errors()) < np.linalg.norm(errors):
+            y, damping = trial, damping / 10.0
+        else:
+            damping *= 10.0
+        if damping > STRONGEST:
+            break
+        closures.linearise(t, y)
+        errors = closures.errors()
+    if not _largest(errors) <= OPEN:
+        where = closures.worst(errors)
+        raise ClosureError(
+            f"{where}: no coordinates close it; the nearest that were found leave this. Check lengths, axes and "
+            "offsets, give initial coordinates closer to a closed configuration, or, where closures suppress more "
+            "motions than rigid bodies leave, more digits or flexible bodies"
+        )
+    return y
+
+
+def _moving(closures: Closures, t: float, y: Real) -> Real:
+    """Speeds in the range that the closures leave."""
+    rates, largest = closures.rates()
+    for _ in range(3):
+        if largest <= CLOSED:
+            break
+        y = closures.pushed(t, y, -np.linalg.lstsq(closures.responses(), rates, rcond=DEPENDENT)[0])
+        rates, largest = closures.rates()
+    if not largest <= MOVING_APART:
+        where = closures.worst(rates, rates=True)
+        raise ClosureError(
+            f"{where}: no speeds keep it closed; the nearest leave this. Prescribed motions ask for what the closures "
+            "do not allow: the mechanism is locked; free a hinge, or use flexible bodies"
+        )
+    return y
+
+
+def _refuse_half_a_turn(closures: Closures) -> None:
+    """Axes that should be equal may have come out opposite."""
+    for name, turned in closures.half_turned():
+        if turned:
+            raise ClosureError(
+                f'closure "{name}" closes only with its frames half a turn apart: turn quaternion_b, or give initial '
+                "coordinates closer to the closed configuration"
+            )
+
+
+def _largest(errors: Real) -> float:
+    return float(np.max(np.abs(errors), initial=0.0))

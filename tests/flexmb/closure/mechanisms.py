@@ -1,0 +1,104 @@
+"""Mechanisms whose motion is known in closed form: four-bars, slider-cranks, Bennett's linkage."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.scene.build import SceneBuilder, s
+from flexmb.scene.shapes import beam_section
+
+STEEL = beam_section(E=2.0e11, G=8.0e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=7800.0)
+
+
+class FourBar(NamedTuple):
+    """Lengths of crank, coupler, rocker and ground (m)."""
+
+    crank: float = 0.3
+    coupler: float = 0.8
+    rocker: float = 0.7
+    ground: float = 1.0
+
+    def angles(self, crank: float) -> tuple[float, float]:
+        """Directions of coupler and rocker for the direction of the crank, coupler above the diagonal: two circles."""
+        pin = self.crank * np.array([np.cos(crank), np.sin(crank)])
+        pivot = np.array([self.ground, 0.0])
+        diagonal = pivot - pin
+        d = np.linalg.norm(diagonal)
+        along = (self.coupler**2 - self.rocker**2 + d**2) / (2.0 * d)
+        e = diagonal / d
+        joint = pin + along * e + np.sqrt(self.coupler**2 - along**2) * np.array([-e[1], e[0]])
+        return float(np.arctan2(*(joint - pin)[::-1])), float(np.arctan2(*(joint - pivot)[::-1]))
+
+
+def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> SceneBuilder:
+    """A slender bar along x with a node "end": rigid, or a beam with modes, its node being "tip"."""
+    if modes:
+        return scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, points="line")
+    mass = 0.78 * length
+    inertia = (1e-5, mass * length**2 / 12.0, mass * length**2 / 12.0)
+    return scene.rigid_body(name, mass=mass, com=(0.5 * length, 0, 0), inertia=inertia, nodes={"tip": (length, 0, 0)})
+
+
+def four_bar(
+    lengths: FourBar = FourBar(), *, crank: float = 1.0, rate: float = 2.0, closure: str = "revolute",
+    gravity: float = -9.81, modes: int = 0, off: float = 0.0, prescribed: s.Function | None = None, **place,
+) -> s.Scene:  # fmt: skip
+    """A four-bar in the x-y plane, cut at the pin between coupler and rocker; `off` spoils its initial angles (rad)."""
+    coupler, rocker = lengths.angles(crank)
+    scene = SceneBuilder("four-bar", gravity=(0.0, gravity, 0.0))
+    for name, length in zip(("crank", "coupler", "rocker"), lengths[:3], strict=True):
+        bar(scene, name, length, modes=modes)
+    motion = {"prescribed": prescribed} if prescribed else {"angle": crank, "rate": rate}
+    scene.revolute("drive", "ground", "crank", **motion)
+    scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - crank + off)
+    scene.revolute("pivot", "ground", "rocker", parent_position=(lengths.ground, 0.0, 0.0), angle=rocker - off)
+    scene.closure("loop", closure, "coupler", "rocker", node_a="tip", node_b="tip", **place)
+    scene.marker("joint", "coupler", node="tip")
+    return scene.scene()
+
+
+def slider_crank(
+    crank: float, rod: float, *, angle: float, rate: float = 3.0, modes: int = 0, cut: str = "slider", off: float = 0.0,
+) -> s.Scene:  # fmt: skip
+    """A slider-crank in the x-y plane; cut between slider and ground ("slider") or between rod and slider ("pin")."""
+    lean = -np.arcsin(crank * np.sin(angle) / rod)
+    scene = SceneBuilder("slider-crank", gravity=(0.0, -9.81, 0.0))
+    bar(scene, "crank", crank), bar(scene, "rod", rod, modes=modes)
+    scene.rigid_body("slider", mass=0.4, inertia=(1e-3, 1e-3, 1e-3))
+    scene.revolute("drive", "ground", "crank", angle=angle, rate=rate)
+    scene.revolute("crankpin", "crank", "rod", parent_node="tip", angle=lean - angle + off)
+    if cut == "slider":
+        scene.revolute("wristpin", "rod", "slider", parent_node="tip", angle=-lean)
+        scene.closure("guide", "prismatic", "ground", "slider", axis=(1, 0, 0))
+    else:
+        scene.prismatic("guide", "ground", "slider", axis=(1, 0, 0), position=crank * np.cos(angle) + rod * np.cos(lean))
+        scene.closure("wristpin", "revolute", "rod", "slider", node_a="tip")
+    scene.marker("piston", "slider")
+    return scene.scene()
+
+
+def bennett(a: float = 1.0, b: float = 0.7, alpha: float = 0.8, *, angle: float = 1.0, rate: float = 1.5) -> s.Scene:
+    """Bennett's linkage: four skew axes, opposite links equal, sin(alpha)/a = sin(beta)/b; cut at its fourth axis.
+
+    Links along x between axes z, each turned about x by its twist; joint angles theta, phi, -theta, -phi with
+    tan(theta/2) tan(phi/2) = sin((beta+alpha)/2)/sin((beta-alpha)/2).
+    """
+    beta = float(np.arcsin(np.sin(alpha) * b / a))
+    ratio = np.sin(0.5 * (beta + alpha)) / np.sin(0.5 * (beta - alpha))
+    other = 2.0 * np.arctan(ratio / np.tan(0.5 * angle))
+    scene = SceneBuilder("Bennett", gravity=(0.0, -9.81, 1.0))
+    links = [("one", b, beta), ("two", a, alpha), ("three", b, beta)]
+    for name, length, twist in links:
+        node = s.Node(name="tip", position_m=(length, 0, 0), quaternion=(np.cos(twist / 2), np.sin(twist / 2), 0, 0))
+        scene.rigid_body(
+            name, mass=length, com=(length / 2, 0.02, 0.01), inertia=np.diag([0.01, 0.1, 0.1]) * length, nodes=[node]
+        )
+    # the fourth link is the ground: length a, twist alpha, from the fourth axis to the first
+    scene.revolute("first", "ground", "one", angle=angle, rate=rate)
+    scene.revolute("second", "one", "two", parent_node="tip", angle=other)
+    scene.revolute("third", "two", "three", parent_node="tip", angle=-angle)
+    turn = (np.cos(alpha / 2), -np.sin(alpha / 2), 0.0, 0.0)
+    scene.closure("fourth", "revolute", "three", "ground", node_a="tip", position_b=(-a, 0, 0), quaternion_b=turn)
+    return scene.scene()
