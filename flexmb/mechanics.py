@@ -6,11 +6,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb import composite, dynamics
+from flexmb import composite, dynamics, unsplit
 from flexmb.arrays import Constants, Real, Workspace
 from flexmb.consistent import consistent_accelerations, held_hinges
 from flexmb.factorisation import MassMatrixFactors
 from flexmb.jain.places import Matrices, matrices
+from flexmb.jain.unsplit import Joint
 from flexmb.state import DynamicsError, State, pack
 from flexmb.status import OK, Status
 
@@ -32,6 +33,7 @@ class Mechanics:
 
     def __init__(self) -> None:
         self._matrices: Matrices | None = None
+        self._joint: Joint | None = None
         self._held: tuple[Constants, Workspace] | None = None
 
     @property
@@ -108,6 +110,13 @@ class Mechanics:
     def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
         """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
         self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
+        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
+
+    def _unsplit(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Accelerations (nu,) and drive loads (nu,) by the unsplit recursion."""
+        if self._joint is None:
+            self._joint = unsplit.joint(self.constants)
+        self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
     def _inverse(self, state: State, accelerations: Real) -> tuple[Real, Real]:

@@ -32,7 +32,7 @@ from flexmb.scene.check import check_scene
 from flexmb.state import State, pack
 from flexmb.workspaces import workspace
 
-Algorithm = Literal["articulated", "composite", "frisch", "frisch_as_printed"]
+Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
 ERRATA = {"frisch": CORRECTED, "frisch_as_printed": AS_PRINTED}
 ENERGIES = ("kinetic", "strain", "spring", "gravity")
 
@@ -167,10 +167,10 @@ class System(Mechanics):
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
 
-        "articulated": the O(N) recursion; "composite": mass matrix by composite bodies, bias by inverse dynamics,
-        Cholesky's factors, partitioned for prescribed speeds; "frisch": the nested-body equations of 1975, corrected,
-        "frisch_as_printed": to the letter. Frisch's equations are of first order in the deformation: they take bodies
-        of level `full` as `linear`.
+        "articulated": the O(N) recursion; "unsplit": the same with modes and hinge of a body eliminated together;
+        "composite": mass matrix by composite bodies, bias by inverse dynamics, Cholesky's factors, partitioned for
+        prescribed speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter.
+        Frisch's equations are of first order in the deformation: they take bodies of level `full` as `linear`.
         Raises DynamicsError where an inertia is not positive definite.
         """
         if algorithm not in get_args(Algorithm):
@@ -182,6 +182,8 @@ class System(Mechanics):
             return rates
         if algorithm == "composite":
             return self._composite(state.t, pack(state))[0]
+        if algorithm == "unsplit":
+            return self._unsplit(state.t, pack(state))[0]
         c, w = self.recursion_constants, self._recursion_w
         self._check(dynamics.accelerations(state.t, pack(state), c, w), int(w.fault[0]))
         return w.speed["acceleration"].copy()
@@ -215,8 +217,8 @@ class System(Mechanics):
         y = np.concatenate([q, u, [0.0]])
         if algorithm in ERRATA:
             return self._evaluate_nested(t, y, self.nested(algorithm))
-        if algorithm == "composite":
-            rates, drives = self._composite(t, y)
+        if algorithm in ("composite", "unsplit"):
+            rates, drives = self._composite(t, y) if algorithm == "composite" else self._unsplit(t, y)
             loads = self._inverse(State(q, u, t), rates)[1]
             return self._evaluation(rates, drives, *self._observed(t, y, rates, loads))
         if algorithm != "articulated":

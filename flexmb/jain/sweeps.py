@@ -42,6 +42,18 @@ SINGLE = -1  # free_count of a hinge with one free speed along z: no small matri
 @helper
 def forward_dynamics(c, w):
     """Accelerations udot into w.speed.acceleration from the state in w.q, w.u; returns a status code."""
+    status = bodies(c, w)
+    if status != OK:
+        return status
+    if not inward(c, w):
+        return NOT_POSITIVE_DEFINITE
+    outward(c, w)
+    return OK
+
+
+@helper
+def bodies(c, w):
+    """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
     velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0:
@@ -54,9 +66,6 @@ def forward_dynamics(c, w):
         elastic_forces(c, w, k)
         node_loads(c, w, k)
         wheel_forces(c, w, k)
-    if not inward(c, w):
-        return NOT_POSITIVE_DEFINITE
-    outward(c, w)
     return OK
 
 
@@ -80,13 +89,7 @@ def _eliminate_hinge(c, w, k):
     kind = c.body[k].hinge_kind
     j = c.body[k].u_index
     single = kind in (REVOLUTE, PRISMATIC) and c.body[k].outboard_port < 0
-    for n in range(c.body[k].nv):
-        f = c.speed[j + n].prescribed
-        if f >= 0:
-            angular, linear = motion_column(c, w, k, n)
-            w.speed[j + n].acceleration = w.function[f, 2]
-            add3(w.body[k].bias, 0, scale(w.function[f, 2], angular))
-            add3(w.body[k].bias, 3, scale(w.function[f, 2], linear))
+    impose(c, w, k)
     moved = inertia_times(p, vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3))
     tau = add(vec3(w.body[k].hinge_force, 0), moved[0])
     f = add(vec3(w.body[k].hinge_force, 3), moved[1])
@@ -113,15 +116,35 @@ def _eliminate_hinge(c, w, k):
 
 
 @helper
-def _eliminate_several(c, w, k, p, tau, f):
-    """The general hinge: D_R = L L' over its free speeds; gains are kept as L^-1 (P_R H)'."""
+def impose(c, w, k):
+    """Rates of the hinge's prescribed speeds, added to the bias."""
     j = c.body[k].u_index
+    for n in range(c.body[k].nv):
+        f = c.speed[j + n].prescribed
+        if f >= 0:
+            angular, linear = motion_column(c, w, k, n)
+            w.speed[j + n].acceleration = w.function[f, 2]
+            add3(w.body[k].bias, 0, scale(w.function[f, 2], angular))
+            add3(w.body[k].bias, 3, scale(w.function[f, 2], linear))
+
+
+@helper
+def find_free(c, w, k):
+    """The hinge's free speeds into w.body[k].free_speed; returns how many there are."""
     free = 0
     for n in range(c.body[k].nv):
-        if c.speed[j + n].prescribed < 0:
+        if c.speed[c.body[k].u_index + n].prescribed < 0:
             w.body[k].free_speed[free] = n
             free += 1
     w.body[k].free_count = free
+    return free
+
+
+@helper
+def _eliminate_several(c, w, k, p, tau, f):
+    """The general hinge: D_R = L L' over its free speeds; gains are kept as L^-1 (P_R H)'."""
+    j = c.body[k].u_index
+    free = find_free(c, w, k)
     store_inertia(w.body[k].inertia, 0, p)
     D = w.body[k].hinge_factor
     G = w.body[k].hinge_gain
@@ -164,7 +187,7 @@ def outward(c, w):
         modal_accelerations(c, w, k, alpha, a)
         store_body_acceleration(c, w, k, alpha, a)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            _wheel_acceleration(c, w, k, i)
+            wheel_acceleration(c, w, k, i)
 
 
 @helper
@@ -196,7 +219,7 @@ def _hinge_acceleration(c, w, k, alpha, a):
 
 
 @helper
-def _wheel_acceleration(c, w, k, i):
+def wheel_acceleration(c, w, k, i):
     """I (thetadd + q . alpha_node) = torque: the rate of a free wheel."""
     j = c.wheel[i].u_index
     f = c.speed[j].prescribed

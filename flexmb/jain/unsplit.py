@@ -1,0 +1,126 @@
+"""Articulated-body forward dynamics as (51) and (58) have it: modes and hinge of a body eliminated together.
+
+D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The split algorithm (63), (64) of
+`flexmb.jain.sweeps` does the same to a smaller matrix after the modes: this one is what it is checked against.
+"""
+
+from flexmb.arrays import Real
+from flexmb.bundle import bundle
+from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
+from flexmb.jain.kinematics import inboard_acceleration, motion_column, store_body_acceleration
+from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
+from flexmb.kernel import helper
+from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
+from flexmb.spatial.vector import add, dot, scale, store3, vec3
+from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+
+
+@bundle
+class Joint:
+    """Modes and free hinge speeds of each body, in this order, as one joint."""
+
+    D: Real  # (N,m+6,m+6), then its Cholesky factor L
+    gain: Real  # (N,m+6,6) P script-H', then L^-1 of it: what of G = P script-H' D^-1 concerns the rigid motion
+    residual: Real  # (N,m+6) epsilon, then L^-1 of it
+
+
+@helper
+def forward_dynamics(c, w, x):
+    """Accelerations into w.speed.acceleration; w.body.hinge_inertia, hinge_force, accel_hinge hold P^+, z^+, alpha^+.
+
+    Loads across hinges are f = P^+ alpha^+ + z^+, so that `flexmb.loads` finds them here too. Returns a status code.
+    """
+    status = bodies(c, w)
+    if status != OK:
+        return status
+    for k in range(c.body.shape[0] - 1, -1, -1):
+        if not _eliminate(c, w, x, k):
+            w.fault[0] = k
+            return NOT_POSITIVE_DEFINITE
+    for k in range(c.body.shape[0]):
+        _accelerate(c, w, x, k)
+    return OK
+
+
+@helper
+def _eliminate(c, w, x, k):
+    """D, G, P^+ = (1 - G script-H) P and z^+ = z + P a + G epsilon of (51), (58), about O; handed to the parent."""
+    nm = c.body[k].modes
+    if c.body[k].outboard_port >= 0:
+        refer_to_hinge(c, w, k)
+    impose(c, w, k)
+    p = load_inertia(w.body[k].inertia, 0)
+    alpha, a = vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3)
+    moved = inertia_times(p, alpha, a)
+    tau, f = add(vec3(w.body[k].force, 0), moved[0]), add(vec3(w.body[k].force, 3), moved[1])
+    D, gain, residual = x.D[k], x.gain[k], x.residual[k]
+    for n in range(nm):
+        angular, linear = vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3)
+        store3(gain[n], 0, angular)
+        store3(gain[n], 3, linear)
+        residual[n] = -(w.mode[k, n].zf + dot(angular, alpha) + dot(linear, a))
+        for i in range(n + 1):
+            D[n, i] = w.pff[k, n, i]
+    rows = nm + find_free(c, w, k)
+    for n in range(nm, rows):
+        j = w.body[k].free_speed[n - nm]
+        angular, linear = motion_column(c, w, k, j)
+        momentum = inertia_times(p, angular, linear)
+        store3(gain[n], 0, momentum[0])
+        store3(gain[n], 3, momentum[1])
+        residual[n] = w.speed[c.body[k].u_index + j].applied - dot(angular, tau) - dot(linear, f)
+        for i in range(nm):
+            D[n, i] = dot(vec3(gain[i], 0), angular) + dot(vec3(gain[i], 3), linear)
+        for i in range(nm, n + 1):
+            other = motion_column(c, w, k, w.body[k].free_speed[i - nm])
+            D[n, i] = dot(momentum[0], other[0]) + dot(momentum[1], other[1])
+    if not cholesky(D, rows):
+        return False
+    store_inertia(w.body[k].hinge_inertia, 0, p)
+    for n in range(rows):
+        for i in range(n):
+            residual[n] -= D[n, i] * residual[i]
+            for b in range(6):
+                gain[n, b] -= D[n, i] * gain[i, b]
+        s = 1.0 / D[n, n]
+        residual[n] *= s
+        for b in range(6):
+            gain[n, b] *= s
+        angular, linear = vec3(gain[n], 0), vec3(gain[n], 3)
+        add_inertia(w.body[k].hinge_inertia, 0, outer_inertia(angular, linear, -1.0))
+        tau, f = add(tau, scale(residual[n], angular)), add(f, scale(residual[n], linear))
+    store3(w.body[k].hinge_force, 0, tau)
+    store3(w.body[k].hinge_force, 3, f)
+    if c.body[k].parent >= 0:
+        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), tau, f)
+    return True
+
+
+@helper
+def _accelerate(c, w, x, k):
+    """chi-dot = nu - G' alpha^+ and alpha = alpha^+ + script-H' chi-dot + a: the outward half of (58)."""
+    nm = c.body[k].modes
+    rows = nm + w.body[k].free_count
+    alpha, a = inboard_acceleration(c, w, k)
+    D, gain, residual = x.D[k], x.gain[k], x.residual[k]
+    for n in range(rows - 1, -1, -1):
+        s = residual[n] - dot(vec3(gain[n], 0), alpha) - dot(vec3(gain[n], 3), a)
+        for i in range(n + 1, rows):
+            s -= D[i, n] * residual[i]
+        residual[n] = s / D[n, n]
+    moved_alpha = add(alpha, vec3(w.body[k].bias, 0))
+    moved_a = add(a, vec3(w.body[k].bias, 3))
+    for n in range(nm):
+        w.mode[k, n].etadd = residual[n]
+        w.speed[c.body[k].etad_index + n].acceleration = residual[n]
+    for n in range(nm, rows):
+        j = w.body[k].free_speed[n - nm]
+        w.speed[c.body[k].u_index + j].acceleration = residual[n]
+        angular, linear = motion_column(c, w, k, j)
+        moved_alpha = add(moved_alpha, scale(residual[n], angular))
+        moved_a = add(moved_a, scale(residual[n], linear))
+    store_body_acceleration(c, w, k, moved_alpha, moved_a)
+    store3(w.body[k].accel_hinge, 0, alpha)
+    store3(w.body[k].accel_hinge, 3, a)
+    for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+        wheel_acceleration(c, w, k, i)
