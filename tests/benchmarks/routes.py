@@ -30,8 +30,9 @@ class Evaluation:
 
 
 def articulated(system: fm.System) -> Evaluation:
-    """By articulated bodies."""
-    return Evaluation(dynamics.accelerations, (0.0, _start(system), system.constants, system.workspace()))
+    """By articulated bodies, their modes eliminated as the system says."""
+    written = system.recursion_workspace()
+    return Evaluation(dynamics.accelerations, (0.0, _start(system), system.recursion_constants, written))
 
 
 def composite_body(system: fm.System) -> Evaluation:

@@ -9,6 +9,8 @@ import pytest
 import flexmb
 from flexmb.counting import Operations, count
 from flexmb.jain import cost
+from flexmb.jain.forces import elastic_forces
+from flexmb.levels.range import is_out_of_range
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.benchmarks.routes import articulated, composite_body
 
@@ -72,9 +74,9 @@ def test_linear_equations_are_an_ldl_factorisation(n):
     assert found.additions == printed.additions
 
 
-def executed(route, scene) -> Operations:
+def executed(route, scene, elimination="explicit") -> Operations:
     """Operations of one evaluation of the accelerations at the initial state."""
-    return route(flexmb.compile(scene)).operations()
+    return route(flexmb.compile(scene, elimination)).operations()
 
 
 def degree(counts: list[int]) -> int:
@@ -159,3 +161,23 @@ def test_composite_bodies_agree_with_the_paper_in_the_highest_terms():
         assert not np.any(np.diff(difference, 3, axis=0))
         assert not np.any(np.diff(np.diff(difference, 2, axis=0), 2, axis=1))
         assert np.any(np.diff(difference, 2, axis=0))
+
+
+# Beams of 4 to 8 modes: their tips move along and turn about the same axes, so that Omega keeps its rank.
+SAME_RANK = range(4, 9)
+
+
+@pytest.mark.parametrize(("elimination", "expected"), [("woodbury", 2)])
+def test_degree_of_each_elimination_in_modes(elimination, expected):
+    """(63) by (B3); less elastic forces and check of range, which are quadratic in modes."""
+    totals = []
+    for n in SAME_RANK:
+        system = flexmb.compile(flexible_chain(3, n, "ruthless"), elimination)
+        assert set(system.elimination.values()) == {elimination}
+        constants, workspace = system.recursion_constants, system.recursion_workspace()
+        quadratic = sum(
+            (count(kernel, constants, workspace, k).operations for kernel in (elastic_forces, is_out_of_range)
+             for k in range(3)), Operations(),
+        )  # fmt: skip
+        totals.append((articulated(system).operations() - quadratic).total)
+    assert degree(totals) == expected
