@@ -43,6 +43,7 @@ class Operators:
                         gravity among them, plus modal damping
     K_m (nbar,nbar)     modal stiffness (38), to act on `deformation` (nbar,) = [eta; 0] of every body
     chi (n,)            generalised speeds (4), with etad = 0 at level ruthless
+    V_m (nbar,)         modal spatial velocities Phi' H' chi (20)
     """
 
     bodies: tuple[str, ...]
@@ -57,6 +58,7 @@ class Operators:
     K_m: Array
     deformation: Array
     chi: Array
+    V_m: Array
 
     # Newton-Euler operators, section II
 
@@ -64,11 +66,6 @@ class Operators:
     def Phi(self) -> Array:
         """(1 - E_Phi)^-1 (nbar,nbar) (19)."""
         return self._resolvent(self.E_Phi)
-
-    @cached_property
-    def V_m(self) -> Array:
-        """Modal spatial velocities (nbar,) (20)."""
-        return self.Phi.T @ (self.H.T @ self.chi)
 
     def alpha_m(self, chi_dot: Array) -> Array:
         """Modal spatial accelerations (nbar,) (26)."""
@@ -191,7 +188,7 @@ class Operators:
     def driven(self, prescribed: NDArray[np.bool_], rates: Array) -> Operators:
         """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.
 
-        The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds.
+        The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds; V_m stays.
         """
         place = np.cumsum(~prescribed) - 1
         return replace(
@@ -245,9 +242,9 @@ class SpatialOperators:
         none, nbar = np.zeros(ends[-1]), np.zeros((ends[-1], ends[-1]))
         kinematics = Operators(
             tuple(member.name for member in members), tuple(member.parent for member in members), columns, rows,
-            value(E_Phi), value(H), nbar, none, none, nbar, none, now.u,
+            value(E_Phi), value(H), nbar, none, none, nbar, none, now.u, none,
         )  # fmt: skip
-        V_m = kinematics.V_m
+        V_m = kinematics.Phi.T @ (kinematics.H.T @ now.u)
         M_m, b_m = self._inertia(now, columns, V_m)
         deformation, damping = none.copy(), none.copy()
         for m, member, at in zip(modes, members, columns, strict=True):
@@ -260,6 +257,7 @@ class SpatialOperators:
             b_m=b_m + damping - self._external(now, t, columns, M_m),
             K_m=block_diag(*(block_diag(member.model.stiffness, np.zeros((6, 6))) for member in members)),
             deformation=deformation,
+            V_m=V_m,
         )
 
     def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Array) -> tuple[Array, Array]:

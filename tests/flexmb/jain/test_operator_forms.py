@@ -50,7 +50,8 @@ def as_two(o: Operators, modes_outboard: bool = True) -> Operators:
         M_m[outer, outer], K_m[outer, outer] = o.M_m[at, at], o.K_m[at, at]
         a_m[inner], b_m[outer], deformation[outer] = o.a_m[at], o.b_m[at], o.deformation[at]
     names = tuple(name + part for name in o.bodies for part in ("'", ""))
-    return Operators(names, tuple(parent), columns, tuple(rows), E_Phi, H, M_m, a_m, b_m, K_m, deformation, o.chi)
+    V_m = np.linalg.solve(np.eye(nbar) - E_Phi.T, H.T @ o.chi)
+    return Operators(names, tuple(parent), columns, tuple(rows), E_Phi, H, M_m, a_m, b_m, K_m, deformation, o.chi, V_m)
 
 
 def close(a: Array, b: Array, n: int, size: float) -> bool:
@@ -64,6 +65,8 @@ def test_each_body_as_two(seed):
     o = system.operators(system.initial_state)
     two = as_two(o)
     n = len(two.M_m)
+    for k, at in enumerate(o.columns):
+        assert close(two.V_m[two.columns[2 * k + 1]], o.V_m[at], n, np.max(np.abs(o.V_m)))
     assert close(two.M, o.M, n, np.max(np.abs(o.M)))
     assert close(two.C, o.C, n, np.max(np.abs(o.C)))
     assert close(two.innovations @ two.D @ two.innovations.T, o.M, n, np.max(np.abs(o.M)))
