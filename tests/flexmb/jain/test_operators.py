@@ -153,14 +153,17 @@ def check_accelerations(o: Operators, rng: np.random.Generator) -> None:
 
 
 def test_operators_are_as_defined(found):
+    """(19), (51)-(53): inverses, nilpotent operators, block diagonals."""
     check_operators(found.operators)
 
 
 def test_lemmas(found):
+    """Lemmas 1 to 4: (48), (49), (54), (55), (56), with (A4), of the operators (47), (51), (52)."""
     check_lemmas(found.operators)
 
 
 def test_accelerations_are_those_of_lemma_5(found):
+    """(57), and back by (40), (41)."""
     check_accelerations(found.operators, np.random.default_rng(0))
 
 
@@ -203,7 +206,10 @@ def check_equations(case: Case, M: Array, c: Array) -> None:
 
 
 def test_three_routes(found):
-    """Operators, compiled recursion and node Jacobians (42), (43), (57)."""
+    """Operators, compiled recursion and node Jacobians (42), (43), (57).
+
+    Of the same inverse dynamics (41), (44), stiffness (38) and bias (28), (31), (37).
+    """
     check_recursion(found)
     dense, state = DenseSystem(found.system.scene), found.state
     check_equations(found, dense.mass_matrix(state.q), dense.bias(state.q, state.u))
@@ -239,7 +245,7 @@ def test_transitions_compose(found):
 
 
 def test_velocities_and_accelerations_are_those_of_the_frames(found):
-    """(20), (25), (26): of every body frame, by Taylor series of its motion."""
+    """(20), (24)-(26): of every body frame, by Taylor series of its motion."""
     o, tree = found.operators, DenseSystem(found.system.scene).tree
     chi_dot = np.random.default_rng(3).normal(size=len(o.chi))
     now = Snapshot(tree, *undeformed(tree, found.state.q, found.state.u), chi_dot)
