@@ -72,8 +72,8 @@ def simulate(
     square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s).
     samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
     algorithm: "articulated", the O(N) recursion; "composite", the mass matrix and its Cholesky factors; or Frisch's
-    equations, "frisch" or "frisch_as_printed", which take bodies of level `full` as `linear`. Accelerations and loads of
-    the output are theirs too.
+    equations, "frisch" or "frisch_as_printed", which take bodies of level `full` as `linear`. Accelerations and loads
+    of the output are theirs too.
     stabilise: how closures are kept closed. 0: after every step coordinates and speeds are projected back to where all
     closures are closed, to 1e-13 of the mechanism's size. A rate k (1/s): errors g of closures are left to decay by
     g'' + 2 k g' + k^2 g = 0 (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
