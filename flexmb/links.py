@@ -37,6 +37,7 @@ class Port:
 
     @property
     def deforms(self) -> bool:
+        """Whether modes move the node: those that are clamped there do not, Jain & Rodriguez (1)."""
         return bool(np.any(self.node.translation) or np.any(self.node.rotation_modes))
 
 

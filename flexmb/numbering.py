@@ -8,7 +8,7 @@ from flexmb.scene import schema as s
 
 
 class Numbering:
-    """Places of all coordinates in q and speeds in u: body by body hinge, modes, wheels."""
+    """Places of all coordinates in q and speeds in u, Jain & Rodriguez (3), (4): body by body hinge, modes, wheels."""
 
     def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
         self.q: dict[str, slice] = {}

@@ -191,7 +191,7 @@ class System(Mechanics):
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
 
-        Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced: inverse dynamics (44).
+        Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced, Jain & Rodriguez (44).
         """
         if accelerations is None:
             return self.evaluate(state.t, state.q, state.u).loads

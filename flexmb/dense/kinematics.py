@@ -151,7 +151,7 @@ def on_body(seat: Seat, eta: Jet) -> Frame:
 
 
 def field(member: Member, motion: Motion) -> Frame:
-    """Mass centres and axes of a member's inertia points seen from its body."""
+    """Mass centres and axes of a member's inertia points seen from its body: Jain & Rodriguez (2), turned exactly."""
     model, eta = member.model, motion.modes(member)[:, 0]
     rotation = rotation_exponential(eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x)))
     point = constant(model.position) + eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
