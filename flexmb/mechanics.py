@@ -9,7 +9,7 @@ import numpy as np
 from flexmb import composite, dynamics, unsplit
 from flexmb.arrays import Constants, Real, Workspace
 from flexmb.consistent import consistent_accelerations, held_hinges
-from flexmb.factorisation import MassMatrixFactors
+from flexmb.factors import MassMatrixFactors
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.state import DynamicsError, State, pack
@@ -56,7 +56,7 @@ class Mechanics:
         return M
 
     def factorise(self, state: State) -> MassMatrixFactors:
-        """M = F F' by recursion: `solve`, `multiply`, `half_solve` and `log_determinant`, each in O(N).
+        """M = F F' by recursion: `solve`, `multiply`, their halves and `log_determinant`, each in O(N).
 
         Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
         """

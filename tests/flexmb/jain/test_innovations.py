@@ -10,7 +10,7 @@ import pytest
 import flexmb
 from flexmb import factorisation
 from flexmb.counting import count
-from flexmb.factorisation import MassMatrixFactors
+from flexmb.factors import MassMatrixFactors
 from flexmb.jain.response import response
 from flexmb.state import DynamicsError
 from tests import trees
@@ -68,6 +68,8 @@ def test_half_solutions_are_those_of_the_cholesky_factor(found, factors):
     assert np.all(np.diag(triangle) > 0.0)
     size = norm(triangle) * norm(M) * norm(triangle.T)
     assert norm(triangle @ M @ triangle.T - np.eye(len(M))) <= found.bound * size
+    F = factors.half_multiply(np.eye(len(M)))
+    assert norm(F @ F.T - found.M) <= found.bound * norm(F) * norm(F.T)
 
 
 def elimination_order(system: flexmb.System) -> list[int]:
@@ -91,7 +93,7 @@ def test_determinant(found, factors):
 
 def test_several_right_sides_are_several_solutions(found, factors):
     B = np.random.default_rng(3).normal(size=(found.system.nu, 3))
-    for apply in (factors.solve, factors.half_solve, factors.multiply):
+    for apply in (factors.solve, factors.half_solve, factors.multiply, factors.half_multiply):
         assert np.array_equal(apply(B), np.transpose([apply(column) for column in B.T]))
 
 
@@ -150,7 +152,11 @@ def test_an_indefinite_mass_matrix_is_refused():
     assert refused > 0
 
 
-@pytest.mark.parametrize("kernel", [factorisation.solve, factorisation.half_solve, factorisation.multiply])
+@pytest.mark.parametrize(
+    "kernel",
+    [factorisation.solve, factorisation.half_solve, factorisation.multiply, factorisation.half_multiply],
+    ids=lambda kernel: kernel.__name__,
+)
 def test_operations_grow_with_the_bodies(kernel):
     """(55), (56): one body more costs the same wherever the chain ends."""
 
