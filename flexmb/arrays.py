@@ -46,6 +46,7 @@ BODY = _record(
     ("node", _I),  # place of the inboard port among its parent's nodes, where the parent's elimination is not EXPLICIT
     ("nodes", _I),  # number of such places: hinges of outboard bodies at ports that deform
     ("orthogonal", _I),  # whether the modal masses are diagonal
+    ("uncoupled", _I),  # whether modal stiffness and damping are diagonal
     ("eta_index", _I),  # first modal coordinate in q
     ("etad_index", _I),  # first modal speed in u
     ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming

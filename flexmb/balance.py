@@ -88,7 +88,8 @@ def power(c, w):
             total += w.speed[j].drive * rate
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
-            for i in range(c.body[k].modes):
+            start, stop = (n, n + 1) if c.body[k].uncoupled else (0, c.body[k].modes)
+            for i in range(start, stop):
                 total -= w.u[c.body[k].etad_index + n] * c.pair[k, n, i].damping * w.u[c.body[k].etad_index + i]
         for i in range(c.body[k].load_start, c.body[k].load_stop):
             port, tau, f = load_vector(c, w, k, i)

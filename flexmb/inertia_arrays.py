@@ -38,6 +38,8 @@ def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict
     for k, each in enumerate(bodies):
         n = len(each.mode)
         body["rigid"][k], mode[k, :n], pair[k, :n, :n] = each.rigid, each.mode, each.pair
+        body["orthogonal"][k] = _is_diagonal(each.pair["mff"])
+        body["uncoupled"][k] = _is_diagonal(each.pair["stiffness"]) and _is_diagonal(each.pair["damping"])
     slopes = [each.slope for each in bodies]
     mass_slopes = [each.mass_slope for each in bodies]
     body["slope"], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
@@ -51,6 +53,10 @@ def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict
     shapes = shape_records([(p.translation[i], p.rotation[i]) for p, i in turning], m)
     tables = {"body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope}
     return tables, {"point": point, "point_mode": shapes}
+
+
+def _is_diagonal(m: a.Real) -> bool:
+    return np.array_equal(m, np.diag(np.diag(m)))
 
 
 def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[list[int], NDArray[Any]]:

@@ -76,22 +76,19 @@ def _tables(c, w, k):
         w.zeta[r, b] = 0.0
     for n in range(nm):
         first = n if c.body[k].orthogonal else 0
-        for b in range(6):
-            s = 0.0
-            for i in range(first, n + 1):
-                s += c.compliance[r, n, i] * w.mode[k, i].pfr[b]
-            w.gain[r, n, 0, b] = s
+        for j in range(1 + nodes):
+            for b in range(6):
+                w.gain[r, n, j, b] = 0.0
+        for i in range(first, n + 1):
+            s = c.compliance[r, n, i]
+            for b in range(6):
+                w.gain[r, n, 0, b] += s * w.mode[k, i].pfr[b]
+            for j in range(nodes):
+                column = w.port_mode[c.node[r, j].port, i]
+                for b in range(3):
+                    w.gain[r, n, 1 + j, b] += s * column.W[b]
+                    w.gain[r, n, 1 + j, 3 + b] += s * column.L[b]
         add_product(w.zeta[r], 0, 1.0, w.gain[r, n, 0], w.gain[r, n, 0])
-        for j in range(nodes):
-            column = w.port_mode[c.node[r, j].port]
-            for b in range(3):
-                angular = 0.0
-                linear = 0.0
-                for i in range(first, n + 1):
-                    angular += c.compliance[r, n, i] * column[i].W[b]
-                    linear += c.compliance[r, n, i] * column[i].L[b]
-                w.gain[r, n, 1 + j, b] = angular
-                w.gain[r, n, 1 + j, 3 + b] = linear
     omega = w.scratch[0]
     for j in range(nodes):
         _theta(c, w, k, j)

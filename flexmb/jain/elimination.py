@@ -58,8 +58,15 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 
 
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
-    """Whether condensing body k was measured to be faster than a Cholesky factor (tests/benchmarks)."""
-    return bool(c.body["modes"][k] > 8 * max(1, nodes))
+    """Whether condensing body k was measured to be faster than a Cholesky factor of D_f: tests/benchmarks.
+
+    With constant tables from 10 modes on where there is one node, and at once at a tip, whose P_R is then constant.
+    With tables made anew at each evaluation only where the modal masses are diagonal.
+    """
+    body = c.body[k]
+    if body["level"] == a.RUTHLESS:
+        return bool(body["modes"] >= 10 * nodes)
+    return bool(body["orthogonal"] and body["modes"] >= 16 * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:
@@ -99,8 +106,6 @@ def _reduced_constants(
     body["reduced"] = body["node"] = -1
     for row, k in enumerate(reduced):
         body["elimination"][k], body["reduced"][k], body["nodes"][k] = variant, row, len(nodes[k])
-        M = _modal_mass(c, k)
-        body["orthogonal"][k] = np.array_equal(M, np.diag(np.diag(M)))
         children = np.flatnonzero((body["parent"] == k) & (body["inboard_port"] >= 0))
         body["node"][children] = np.arange(len(children))
         _fill(c, k, row, nodes[k], variant, tables)

@@ -21,7 +21,8 @@ def elastic_forces(c, w, k):
     """Add K eta + D etadot, at the true deformation for every level."""
     nm = c.body[k].modes
     for n in range(nm):
-        for i in range(nm):
+        start, stop = (n, n + 1) if c.body[k].uncoupled else (0, nm)
+        for i in range(start, stop):
             eta = w.q[c.body[k].eta_index + i]
             etad = w.u[c.body[k].etad_index + i]
             w.mode[k, n].zf += c.pair[k, n, i].stiffness * eta + c.pair[k, n, i].damping * etad

@@ -8,9 +8,15 @@ RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, no
 @helper
 def is_out_of_range(c, w, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
+    body = c.body[k].rigid
+    limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
+    diagonal = 0.0
+    for n in range(c.body[k].modes):
+        diagonal += w.mode[k, n].eta * c.pair[k, n, n].mff * w.mode[k, n].eta
+    if c.body[k].modes * diagonal <= limit:  # Cauchy and Schwarz: the sum below is no larger
+        return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    body = c.body[k].rigid
-    return squares > RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
+    return squares > limit
