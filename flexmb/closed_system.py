@@ -6,6 +6,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb import dynamics
 from flexmb.arrays import Real
@@ -31,7 +32,8 @@ class ClosedSystem(System):
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
 
-        Closest in the metric of kinetic energy, coordinates first, then speeds; prescribed ones are their functions'.
+        Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates first,
+        then speeds. Prescribed ones are their functions'.
         """
         if self._start is None:
             y = consistent(self.closures, 0.0, pack(super().initial_state))
@@ -70,6 +72,15 @@ class ClosedSystem(System):
         )
         closures = zip(self.scene.closures, motion.closures, strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
+
+    def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
+        """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
+
+        The others, in overconstrained mechanisms of rigid bodies, are those of the least closure loads (`evaluate`).
+        """
+        hinges, closures = self.closures.determined(state.t, pack(state))
+        names = [link.hinge.name for link in self._links], [closure.name for closure in self.scene.closures]
+        return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
         """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""

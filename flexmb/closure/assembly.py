@@ -1,8 +1,9 @@
 """Initial conditions that close all closures, from a user's rough ones, or why there are none.
 
-Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), each the least in the metric of kinetic energy; then
-the speeds nearest in the same metric. Prescribed coordinates and speeds stay as they are. Rows are weighed with a
-length of the scene, and compared with the size of their closure.
+Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), then the speeds, each the least in one metric: that of
+kinetic energy, with modes so much heavier, in proportion to their stiffness, that they only move where hinges cannot
+close the loop. Prescribed coordinates and speeds stay as they are. Rows are weighed with a length of the scene, and
+compared with the size of their closure.
 """
 
 from __future__ import annotations
@@ -21,13 +22,14 @@ STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
 def consistent(closures: Closures, t: float, y: Real) -> Real:
     """y = [q, u, work] with closed closures, close to the one given; ClosureError where there is none."""
     y = _closed(closures, t, y.copy())
+    closures.linearise(t, y)
     closures.count_rows()
     _refuse_half_a_turn(closures)
     return _moving(closures, t, y)
 
 
 def _closed(closures: Closures, t: float, y: Real) -> Real:
-    closures.linearise(t, y)
+    closures.linearise(t, y, stiff=True)
     errors, damping = closures.errors(), 1e-3
     for _ in range(STEPS):
         if _largest(errors) <= CLOSED:
@@ -43,7 +45,7 @@ def _closed(closures: Closures, t: float, y: Real) -> Real:
             damping *= 10.0
         if damping > STRONGEST:
             break
-        closures.linearise(t, y)
+        closures.linearise(t, y, stiff=True)
         errors = closures.errors()
     if not _largest(errors) <= OPEN:
         where = closures.worst(errors)
@@ -57,6 +59,7 @@ def _closed(closures: Closures, t: float, y: Real) -> Real:
 
 def _moving(closures: Closures, t: float, y: Real) -> Real:
     """Speeds in the range that the closures leave."""
+    closures.linearise(t, y, stiff=True)
     rates, largest = closures.rates()
     for _ in range(3):
         if largest <= CLOSED:

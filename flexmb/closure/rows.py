@@ -67,6 +67,9 @@ def norm1(x):
 @helper
 def evaluate_rows(c, w, cc, cw, accelerated):
     """Fill cw.closure and cw.row; row accelerations only where `accelerated`, which needs those of the bodies."""
+    fastest = 0.0
+    for rate in w.u:
+        fastest = max(fastest, abs(rate))
     for i in range(cc.closure.shape[0]):
         A, B = cc.side[i, 0], cc.side[i, 1]
         x_a, R_a = pose(w, A)
@@ -83,7 +86,7 @@ def evaluate_rows(c, w, cc, cw, accelerated):
         store9(cw.closure[i].world, 0, R_a)
         cw.closure[i].size = cc.length[0] + norm1(x_a)
         turns = norm1(omega_a) + norm1(omega_b)
-        cw.closure[i].speed = norm1(v_a) + norm1(v_b) + cc.length[0] * turns
+        cw.closure[i].speed = norm1(v_a) + norm1(v_b) + cc.length[0] * (turns + fastest)
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             _row(cc, cw, r, R, p, spin, speed)
         if accelerated:

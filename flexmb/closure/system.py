@@ -3,14 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb.arrays import Constants, Real, Workspace
 from flexmb.closure import dynamics
 from flexmb.closure.tables import ROTATION, ClosureConstants, ClosureWorkspace, workspace
 from flexmb.scene.schema import Closure
+
+STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
+SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
 
 
 class ClosureError(ValueError):
@@ -79,16 +85,29 @@ class Closures:
         cw.rank[0] = self.rank
         self.linearise(t, y)
         self._check(dynamics.closure_loads(c, w, cc, cw), self.fault)
-        cw.row["load"] = self._least(cw.row["load"])
+        cw.row["load"] = self._last = self._least(cw.row["load"])
         dynamics.loads(c, w, cc, cw, hinges, closures)
         drives = np.where(c.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
         return ClosedMotion(w.speed["acceleration"].copy(), drives, hinges, closures)
 
     # Newton's steps, for initial conditions
 
-    def linearise(self, t: float, y: Real) -> None:
-        """Rows' values, rates and responses to unit loads at y."""
-        self._check(dynamics.linearise(t, y, *self._arrays), self.fault)
+    def linearise(self, t: float, y: Real, *, stiff: bool = False) -> None:
+        """Rows' values, rates and responses to unit loads at y; `stiff`: with the metric that hardly bends bodies."""
+        c, *others = self._arrays
+        self._check(dynamics.linearise(t, y, self._stiff if stiff else c, *others), self.fault)
+
+    @cached_property
+    def _stiff(self) -> Constants:
+        """The tree with modal masses M + K (STIFF/omega)^2, omega its lowest modal frequency."""
+        c = self.constants[0]
+        mass, stiffness = (np.einsum("kii->ki", c.pair[key]) for key in ("mff", "stiffness"))
+        squares = stiffness[stiffness > 0.0] / mass[stiffness > 0.0]
+        if not squares.size:
+            return c
+        pair = c.pair.copy()
+        pair["mff"] += STIFF**2 / np.min(squares) * pair["stiffness"]
+        return replace(c, pair=pair)
 
     def responses(self) -> Real:
         """B' (G,nu) of the rows in the size of their closures: Lambda^-1 = B'B."""
@@ -155,6 +174,22 @@ class Closures:
             R = state["rotation"].reshape(3, 3)
             about = {"weld": (1, 2), "prismatic": (1, 2), "universal": (), "spherical": ()}.get(closure.type, (2,))
             yield closure.name, any(R[i, i] < 0.0 for i in about)
+
+    def determined(self, t: float, y: Real) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Whether each component of the hinges' (N,6) and closures' (C,6) loads is the same for all null loads."""
+        c, w, cc, cw = self._arrays
+        found = [self.motion(t, y)]
+        size = max(1.0, float(np.max(np.abs(cw.row["load"]))))
+        for null in self.null_loads().T:
+            self.linearise(t, y)
+            hinges, closures = np.zeros((len(c.body), 6)), np.zeros((len(cc.closure), 6))
+            cw.row["load"] = self._last + size * null
+            dynamics.loads(c, w, cc, cw, hinges, closures)
+            found.append(found[0]._replace(hinges=hinges, closures=closures))
+        return (
+            np.ptp([each.hinges for each in found], axis=0) <= SAME * size,
+            np.ptp([each.closures for each in found], axis=0) <= SAME * size,
+        )
 
     def _least(self, loads: Real) -> Real:
         """Of all loads of the rows that move the mechanism alike, the least in the sum of squares (SI)."""

@@ -32,6 +32,9 @@ class FourBar(NamedTuple):
         return float(np.arctan2(*(joint - pin)[::-1])), float(np.arctan2(*(joint - pivot)[::-1]))
 
 
+GRASHOF = FourBar()
+
+
 def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> SceneBuilder:
     """A slender bar along x with a node "end": rigid, or a beam with modes, its node being "tip"."""
     if modes:
@@ -42,7 +45,7 @@ def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> Sce
 
 
 def four_bar(
-    lengths: FourBar = FourBar(), *, crank: float = 1.0, rate: float = 2.0, closure: str = "revolute",
+    lengths: FourBar = GRASHOF, *, crank: float = 1.0, rate: float = 2.0, closure: str = "revolute",
     gravity: float = -9.81, modes: int = 0, off: float = 0.0, prescribed: s.Function | None = None, **place,
 ) -> s.Scene:  # fmt: skip
     """A four-bar in the x-y plane, cut at the pin between coupler and rocker; `off` spoils its initial angles (rad)."""
@@ -73,20 +76,26 @@ def slider_crank(
         scene.revolute("wristpin", "rod", "slider", parent_node="tip", angle=-lean)
         scene.closure("guide", "prismatic", "ground", "slider", axis=(1, 0, 0))
     else:
-        scene.prismatic("guide", "ground", "slider", axis=(1, 0, 0), position=crank * np.cos(angle) + rod * np.cos(lean))
+        reach = crank * np.cos(angle) + rod * np.cos(lean)
+        scene.prismatic("guide", "ground", "slider", axis=(1, 0, 0), position=reach)
         scene.closure("wristpin", "revolute", "rod", "slider", node_a="tip")
     scene.marker("piston", "slider")
     return scene.scene()
+
+
+def bennett_ratio(a: float, b: float, alpha: float) -> tuple[float, float]:
+    """The other twist, and the product of the tangents of two neighbouring half angles."""
+    beta = float(np.arcsin(np.sin(alpha) * b / a))
+    return beta, float(np.sin(0.5 * (alpha + beta)) / np.sin(0.5 * (alpha - beta)))
 
 
 def bennett(a: float = 1.0, b: float = 0.7, alpha: float = 0.8, *, angle: float = 1.0, rate: float = 1.5) -> s.Scene:
     """Bennett's linkage: four skew axes, opposite links equal, sin(alpha)/a = sin(beta)/b; cut at its fourth axis.
 
     Links along x between axes z, each turned about x by its twist; joint angles theta, phi, -theta, -phi with
-    tan(theta/2) tan(phi/2) = sin((beta+alpha)/2)/sin((beta-alpha)/2).
+    tan(theta/2) tan(phi/2) = sin((alpha+beta)/2)/sin((alpha-beta)/2).
     """
-    beta = float(np.arcsin(np.sin(alpha) * b / a))
-    ratio = np.sin(0.5 * (beta + alpha)) / np.sin(0.5 * (beta - alpha))
+    beta, ratio = bennett_ratio(a, b, alpha)
     other = 2.0 * np.arctan(ratio / np.tan(0.5 * angle))
     scene = SceneBuilder("Bennett", gravity=(0.0, -9.81, 1.0))
     links = [("one", b, beta), ("two", a, alpha), ("three", b, beta)]
@@ -101,4 +110,31 @@ def bennett(a: float = 1.0, b: float = 0.7, alpha: float = 0.8, *, angle: float 
     scene.revolute("third", "two", "three", parent_node="tip", angle=-angle)
     turn = (np.cos(alpha / 2), -np.sin(alpha / 2), 0.0, 0.0)
     scene.closure("fourth", "revolute", "three", "ground", node_a="tip", position_b=(-a, 0, 0), quaternion_b=turn)
+    return scene.scene()
+
+
+def tilted_four_bar(*, modes: int, drive: s.Function | None, tilt: float = np.deg2rad(5.0)) -> s.Scene:
+    """The four-bar of Bauchau et al., Multibody Syst. Dyn. 37 (2016) 29: a parallelogram with one pin tilted.
+
+    Bars of 0.12, 0.24 and 0.12 m; rigid bars cannot move. `modes` of each bar, 0 for rigid; `drive` the crank's angle.
+    """
+    stiff = {"EA_N": 5.2992e7, "GJ_Nm2": 733.488, "EIy_Nm2": 1130.5, "EIz_Nm2": 1130.5, "mass_per_length_kg_m": 1.9968}
+    soft = {"EA_N": 1.3248e7, "GJ_Nm2": 45.843, "EIy_Nm2": 70.656, "EIz_Nm2": 70.656, "mass_per_length_kg_m": 0.4992}
+    scene = SceneBuilder("four-bar with a tilted pin")
+    for name, length, data in (("one", 0.12, stiff), ("two", 0.24, stiff), ("three", 0.12, soft)):
+        section = s.BeamStation(x_m=0.0, rotary_y_kg_m=1e-4, rotary_z_kg_m=1e-4, **data)
+        scene.beam(
+            name, length=length, elements=4, section=section, level="full" if modes else "rigid",
+            modes=s.Modes(count=max(1, modes), families=("torsion", "bending_y", "bending_z")), points="rotary",
+        )  # fmt: skip
+    quarter = 0.5 * np.pi
+    scene.revolute("a", "ground", "one", **({"prescribed": drive} if drive else {"angle": quarter}))
+    scene.revolute("b", "one", "two", parent_node="tip", angle=-quarter)
+    scene.revolute("d", "ground", "three", parent_position=(0.24, 0.0, 0.0), angle=quarter)
+    back = (np.cos(0.5 * quarter), 0.0, 0.0, -np.sin(0.5 * quarter))
+    scene.closure(
+        "c", "revolute", "two", "three", node_a="tip", node_b="tip", quaternion_b=back,
+        axis=(0.0, np.sin(tilt), np.cos(tilt)),
+    )  # fmt: skip
+    scene.marker("pin", "two", node="tip")
     return scene.scene()

@@ -1,0 +1,181 @@
+"""Initial states that close all closures, or refusals that say where and why; failures on the way."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb.scene import schema as s
+from flexmb.status import Status
+from tests import trees
+from tests.flexmb.closure import chains
+from tests.flexmb.closure import mechanisms as m
+
+
+def gap(system: flexmb.System, state: flexmb.State) -> float:
+    return max(max(each) for each in system.closure_gaps(state).values())
+
+
+def test_a_closed_scene_is_left_as_it_is():
+    scene = m.four_bar(rate=0.0)
+    start = flexmb.compile(scene).initial_state
+    assert np.array_equal(start.q, flexmb.System(scene).initial_state.q)
+    assert np.array_equal(start.u, np.zeros(3))
+
+
+@pytest.mark.parametrize("off", [1e-3, 0.1, 0.5])
+@pytest.mark.parametrize("modes", [0, 2])
+def test_rough_coordinates_are_closed(off, modes):
+    system = flexmb.compile(m.four_bar(off=off, modes=modes))
+    start = system.initial_state
+    assert gap(system, start) < 1e-12
+    assert np.linalg.norm(start.q - flexmb.System(system.scene).initial_state.q) < 3.0 * off
+
+
+def test_rough_angles_do_not_bend_bodies():
+    system = flexmb.compile(m.four_bar(off=0.2, modes=2))
+    start = system.initial_state
+    assert system.evaluate(0.0, start.q, start.u).energy["strain"] < 1e-6
+
+
+def test_a_small_correction_is_the_nearest_in_the_metric_of_kinetic_energy():
+    system = flexmb.compile(m.four_bar(off=1e-6))
+    rough, start = flexmb.System(system.scene).initial_state, system.initial_state
+    dense = chains.constrained(system.scene, start.q, start.u)
+    moved = dense.M @ (start.q - rough.q)
+    left = moved - dense.J.T @ np.linalg.lstsq(dense.J.T, moved, rcond=1e-12)[0]
+    assert np.max(np.abs(left)) < 1e-4 * np.max(np.abs(moved))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_random_loops(seed):
+    recipe = replace(trees.FULL, prescribed=False, branching=False, deformation=0.01)
+    rng = np.random.default_rng(seed)
+    scene = chains.with_closures(trees.random_scene(seed, recipe), rng, ["revolute", "spherical"])
+    system = flexmb.compile(scene)
+    start = system.initial_state
+    assert gap(system, start) < 1e-12
+    dense = chains.constrained(scene, start.q, start.u)
+    assert np.max(np.abs(dense.rate)) < 1e-12 * np.max(np.abs(dense.J)) * np.sum(np.abs(start.u))
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_speeds_of_rigid_bodies_are_the_nearest_in_the_metric_of_kinetic_energy(seed):
+    recipe = replace(trees.RIGID, prescribed=False, branching=False)
+    scene = chains.with_closures(trees.random_scene(seed, recipe), np.random.default_rng(seed), ["revolute"])
+    start = flexmb.compile(scene).initial_state
+    expected = chains.consistent_speeds(scene, start.q, flexmb.System(scene).initial_state.u)
+    assert np.max(np.abs(start.u - expected)) < 1e-9 * np.max(np.abs(expected))
+
+
+def test_a_loop_that_cannot_be_closed_is_refused_with_its_gap():
+    scene = m.four_bar(position_b=(0.0, 0.0, 0.1))
+    with pytest.raises(flexmb.ClosureError, match=r'closure "loop" \(gap 0\.1 m.*no coordinates close it'):
+        flexmb.simulate(scene, 1.0)
+
+
+def test_axes_that_come_out_opposite_are_refused():
+    scene = m.four_bar(quaternion_b=(0.0, 1.0, 0.0, 0.0))
+    with pytest.raises(flexmb.ClosureError, match="half a turn apart"):
+        flexmb.simulate(scene, 1.0)
+
+
+def test_prescribed_motions_that_contradict_each_other_are_refused():
+    scene = m.four_bar(prescribed=s.Ramp(value=1.0, rate=2.0))
+    pivot = next(hinge for hinge in scene.hinges if hinge.name == "pivot")
+    angle = pivot.rotation.angle_rad
+    held = msgspec.structs.replace(pivot, rotation=s.AngularCoordinate(prescribed_rad=s.Constant(value=angle)))
+    scene = msgspec.structs.replace(scene, hinges=(*(h for h in scene.hinges if h is not pivot), held))
+    with pytest.raises(flexmb.ClosureError, match="no speeds keep it closed"):
+        flexmb.simulate(scene, 1.0)
+
+
+def test_a_driven_mechanism_has_no_freedom_left_and_runs():
+    """The crank turns as prescribed; the work of its drive is what energy gains."""
+    system = flexmb.compile(m.four_bar(prescribed=s.Ramp(value=1.0, rate=3.0)))
+    run = flexmb.simulate(system, 4.0, rtol=1e-11, atol=1e-12, samples=41)
+    assert run.finished and system.closures.mobility == 0
+    rocker = np.array([m.GRASHOF.angles(1.0 + 3.0 * t)[1] for t in run.t])
+    assert np.max(np.abs(np.sin(run.q[:, system.coordinate("pivot").start] - rocker))) < 1e-11
+    assert np.max(np.abs(run.energy_drift)) < 1e-9 * run.energy_scale
+
+
+def test_the_rigid_four_bar_with_a_tilted_pin_is_locked():
+    with pytest.raises(flexmb.ClosureError, match=r'"c" leave none of the 3 free speeds: the mechanism is locked'):
+        flexmb.simulate(m.tilted_four_bar(modes=0, drive=None), 1.0)
+    with pytest.raises(flexmb.ClosureError, match=r'closure "c" .*the mechanism is locked'):
+        flexmb.simulate(m.tilted_four_bar(modes=0, drive=s.Ramp(value=0.5 * np.pi, rate=0.6)), 1.0)
+
+
+def test_the_flexible_four_bar_with_a_tilted_pin_runs():
+    scene = m.tilted_four_bar(modes=6, drive=s.Ramp(value=0.5 * np.pi, rate=0.6))
+    system = flexmb.compile(scene)
+    run = flexmb.simulate(system, 0.05, rtol=1e-8, atol=1e-10, samples=11)
+    assert run.finished, run.message
+    assert max(gap(system, system.state(*each)) for each in zip(run.q, run.u, run.t, strict=True)) < 1e-10
+    assert np.max(np.abs(run.energy_drift)) < 1e-6 * run.energy_scale
+    # without the tilt the bars of a parallelogram turn together and stay straight
+    straight = m.tilted_four_bar(modes=6, drive=s.Ramp(value=0.5 * np.pi, rate=0.6), tilt=0.0)
+    plane = flexmb.simulate(straight, 0.05, rtol=1e-8, atol=1e-10, samples=11)
+    assert np.max(np.abs(plane.markers["pin"].position[:, 2])) < 1e-12
+    assert np.max(np.abs(run.markers["pin"].position[:, 2])) > 1e-6
+
+
+def test_a_singular_configuration_has_a_status():
+    """A parallelogram's four pins on one line: one suppressed motion less, two ways to go on."""
+    system = flexmb.compile(m.four_bar(m.FourBar(0.3, 1.0, 0.3, 1.0), crank=0.8))
+    system.initial_state  # noqa: B018  (counts the independent rows)
+    flat = system.state(np.zeros(3), np.array([1.0, -1.0, 1.0]))
+    with pytest.raises(flexmb.DynamicsError, match='closure "loop" is singular'):
+        system.accelerations(flat)
+
+
+def test_a_start_at_a_singular_configuration_is_noticed():
+    scene = m.four_bar(m.FourBar(0.3, 1.0, 0.3, 1.0), crank=1e-14, rate=1.0)
+    run = flexmb.simulate(scene, 1.0)
+    assert run.status in (Status.CLOSURE_OPEN, Status.CLOSURE_SINGULAR) and run.stopped_at < 0.1
+    assert '"loop"' in run.message
+
+
+def test_a_crank_driven_beyond_its_reach_stops_there():
+    """0.6, 0.5, 0.5, 1: coupler and rocker stretch out where 1 + 0.36 - 1.2 cos(crank) = 1."""
+    lengths = m.FourBar(0.6, 0.5, 0.5, 1.0)
+    run = flexmb.simulate(m.four_bar(lengths, crank=0.8, prescribed=s.Ramp(value=0.8, rate=1.0)), 1.0)
+    assert run.status in (Status.CLOSURE_OPEN, Status.CLOSURE_SINGULAR, Status.STEP_TOO_SMALL)
+    assert run.stopped_at == pytest.approx(np.arccos(0.3) - 0.8, abs=1e-3)
+    assert len(run.t) > 50
+
+
+def test_what_is_not_supported_is_refused_with_a_remedy():
+    scene = m.four_bar(modes=2)
+    system = flexmb.compile(scene)
+    for algorithm in ("composite", "frisch"):
+        with pytest.raises(NotImplementedError, match='use algorithm="articulated"'):
+            flexmb.simulate(scene, 1.0, algorithm=algorithm)
+        with pytest.raises(NotImplementedError, match='use algorithm="articulated"'):
+            system.accelerations(system.initial_state, algorithm)
+    with pytest.raises(NotImplementedError, match="leave accelerations out"):
+        system.hinge_loads(system.initial_state, np.zeros(system.nu))
+    ruthless = tuple(msgspec.structs.replace(body, level="ruthless") for body in scene.bodies)
+    with pytest.raises(NotImplementedError, match='closure "loop": .*use level "linear" or "full"'):
+        flexmb.compile(msgspec.structs.replace(scene, bodies=ruthless))
+
+
+def test_stabilisation_holds_a_drift_that_projection_does_not_have():
+    system = flexmb.compile(m.four_bar())
+    runs = {rate: flexmb.simulate(system, 10.0, "rk4", step=0.005, samples=21, stabilise=rate) for rate in (0.0, 20.0)}
+    drift = {rate: max(gap(system, system.state(q, u)) for q, u in zip(run.q, run.u, strict=True))
+             for rate, run in runs.items()}  # fmt: skip
+    assert all(run.finished for run in runs.values())
+    assert drift[0.0] < 1e-12 < drift[20.0] < 1e-5
+
+
+def test_stabilisation_needs_closures_and_a_rate():
+    with pytest.raises(ValueError, match="no closures"):
+        flexmb.simulate(msgspec.structs.replace(m.four_bar(), closures=()), 1.0, stabilise=1.0)
+    with pytest.raises(ValueError, match="positive rate"):
+        flexmb.simulate(m.four_bar(), 1.0, stabilise=-1.0)
