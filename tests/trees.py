@@ -27,8 +27,10 @@ CARRIERS = ("rigid", "modal", "beam", "floating")
 class Recipe:
     """What a random scene contains.
 
-    `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam".
-    `conservative` leaves out dampers, motors, loads and prescribed motion. `hinges`: kinds drawn in turn.
+    `carriers`: kinds of bodies, drawn in turn: "rigid", "modal" (raw, clamped), "floating" (raw, free-free), "beam",
+    "masses" (raw, clamped, points without inertia). `at_clamps`: hinges sit where the modes of the outboard body are
+    clamped, unless it floats. `conservative` leaves out dampers, motors, loads and prescribed motion.
+    `hinges`: kinds drawn in turn.
     """
 
     bodies: int = 10
@@ -43,6 +45,7 @@ class Recipe:
     point_masses: int = 2
     beam_points: tuple[str, ...] = ("section", "rotary", "line")
     deformation: float = 0.1
+    at_clamps: bool = False
 
 
 RIGID = Recipe(carriers=("rigid",))
@@ -70,7 +73,7 @@ def random_scene(seed: int, recipe: Recipe = FULL) -> s.Scene:
         parent = int(rng.integers(-1 if recipe.grounded else 0, k)) if k > 1 and recipe.branching else k - 1
         kind = "free" if k == 0 and not recipe.grounded else kinds[k % len(kinds)]
         at = {} if parent < 0 else {"parent_node": str(rng.choice(nodes[parent]))}
-        child_node = str(rng.choice(nodes[k]))
+        child_node = nodes[k][0] if recipe.at_clamps else str(rng.choice(nodes[k]))
         place = _placement(rng) | at | {"child_node": child_node}
         _hinge(scene, rng, kind, f"h{k}", "ground" if parent < 0 else f"b{parent}", f"b{k}", place, recipe)
         scene.marker(f"m{k}", f"b{k}", node=str(rng.choice(nodes[k])), offset=vector(rng, 0.2))
@@ -119,7 +122,10 @@ def _body(
         nodes = ["root", "tip", "middle"]
     else:
         modes = 3
-        _modal(scene, rng, name, level, modes, floating=carrier == "floating", lossless=recipe.conservative)
+        _modal(
+            scene, rng, name, level, modes, floating=carrier == "floating", lossless=recipe.conservative,
+            rotary=carrier != "masses",
+        )  # fmt: skip
         nodes = ["a", "b"] if carrier == "floating" else ["origin", "a", "b"]
     if level != "rigid":
         size = recipe.deformation if carrier != "beam" else 0.3 * recipe.deformation
@@ -144,15 +150,17 @@ def _beam(scene: SceneBuilder, rng: Generator, name: str, level: s.Level, recipe
 
 
 def _modal(
-    scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes: int, *, floating: bool, lossless: bool
-) -> None:
-    """Points with mass, offset mass centres and turning tensors, moved by arbitrary assumed modes."""
+    scene: SceneBuilder, rng: Generator, name: str, level: s.Level, modes: int, *, floating: bool, lossless: bool,
+    rotary: bool,
+) -> None:  # fmt: skip
+    """Points with mass and, if `rotary`, offset mass centres and turning tensors, moved by arbitrary assumed modes."""
     n = 5
     masses = rng.uniform(0.1, 0.4, n)
     points = inertia_points(
         masses, rng.uniform(-0.6, 0.6, (n, 3)), rng.uniform(-1.0, 1.0, (n, 3, modes)),
         rotation_modes=rng.uniform(-2.0, 2.0, (n, 3, modes)),
-        inertia=np.array([inertia(rng, m, 0.3) for m in masses]), com_offset=rng.uniform(-0.1, 0.1, (n, 3)),
+        inertia=rotary * np.array([inertia(rng, m, 0.3) for m in masses]),
+        com_offset=rotary * rng.uniform(-0.1, 0.1, (n, 3)),
     )  # fmt: skip
     root = rng.normal(size=(modes, modes))
     loss = rng.normal(size=(modes, modes)) * (not lossless)

@@ -60,13 +60,12 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
     """Whether condensing body k was measured to be faster than a Cholesky factor of D_f: tests/benchmarks.
 
-    With constant tables from 10 modes on where there is one node, and at once at a tip, whose P_R is then constant.
-    With tables made anew at each evaluation only where the modal masses are diagonal.
+    With constant tables from 10 modes a node on; with tables made anew at each evaluation later, and only where the
+    modal masses are diagonal. A tip counts as one node: it would gain earlier, but not what compiling costs.
     """
     body = c.body[k]
-    if body["level"] == a.RUTHLESS:
-        return bool(body["modes"] >= 10 * nodes)
-    return bool(body["orthogonal"] and body["modes"] >= 16 * max(1, nodes))
+    constant = body["level"] == a.RUTHLESS
+    return bool((constant or body["orthogonal"]) and body["modes"] >= (10 if constant else 16) * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:
