@@ -53,9 +53,11 @@ class NativeEngine:
         return tuple(Effort("tolerance", value, "dop853") for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
-        """ValueError where the print does not apply: modes that are not clamped at the hinge."""
+        """ValueError where the print does not apply: modes not clamped at the hinge. NotImplementedError for loops."""
         system = compile(scene)
         if self._algorithm in ERRATA:
+            if scene.closures:
+                raise NotImplementedError("Frisch's equations are those of trees: closures are for engine native")
             system.nested(self._algorithm)
         return NativeModel(system, self._algorithm)
 

@@ -10,6 +10,7 @@ import pytest
 import flexmb
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.registry import engine
+from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from tests import trees
 from tests.bounds import algebra
@@ -105,6 +106,17 @@ def test_the_print_refuses_modes_that_are_not_clamped_at_the_hinge():
     assert support.kind == "no"
     assert "clamped" in support.reason and '"b0"' in support.reason
     assert engine(FRISCH).supports(scene).kind == "exact"
+
+
+def test_frisch_refuses_closed_chains():
+    rods = SceneBuilder("double pendulum held at its end")
+    for rod in "ab":
+        rods.rigid_body(rod, mass=1.0, inertia=(0.1, 0.1, 0.1))
+    tree = rods.revolute("first", "ground", "a").revolute("second", "a", "b", parent_position=(1, 0, 0))
+    scene = tree.closure("end", "spherical", "ground", "b", position_a=(2, 0, 0), position_b=(1, 0, 0)).scene()
+    for name in (FRISCH, PRINT):
+        support = engine(name).supports(scene)
+        assert support.kind == "no" and "closures" in support.reason
 
 
 def test_the_print_is_right_on_rigid_bodies_and_wrong_on_flexible_ones():
