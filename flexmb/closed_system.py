@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from flexmb import dynamics
 from flexmb.arrays import Real
 from flexmb.closure.assembly import consistent
-from flexmb.closure.constants import closure_constants
+from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.propagate import dop853_run, rk4_run
 from flexmb.closure.system import ClosedWorkspace, ClosureError, Closures
 from flexmb.scene import schema as s
@@ -25,15 +25,16 @@ class ClosedSystem(System):
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
         own = closure_constants(scene, self._links, self.constants, self._closure_ports)
-        self.closures = Closures(scene.closures, self.constants, own, self.workspace(), self._check)
+        slowest = slowest_mode(self._links)
+        self.closures = Closures(scene.closures, self.constants, own, self.workspace(), slowest, self._check)
         self._start: State | None = None
 
     @property
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
 
-        Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates first,
-        then speeds. Prescribed ones are their functions'.
+        Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates
+        first, then speeds. Prescribed ones are their functions'.
         """
         if self._start is None:
             y = consistent(self.closures, 0.0, pack(super().initial_state))

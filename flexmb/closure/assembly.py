@@ -1,7 +1,7 @@
 """Initial conditions that close all closures, from a user's rough ones, or why there are none.
 
-Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), then the speeds, each the least in one metric: that of
-kinetic energy, with modes so much heavier, in proportion to their stiffness, that they only move where hinges cannot
+Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), then the speeds, each the least in one metric: that
+of kinetic energy, with modes so much heavier, in proportion to their stiffness, that they only move where hinges cannot
 close the loop. Prescribed coordinates and speeds stay as they are. Rows are weighed with a length of the scene, and
 compared with the size of their closure.
 """
@@ -14,6 +14,7 @@ from flexmb.arrays import Real
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
 from flexmb.closure.system import ClosureError, Closures
+from flexmb.status import OK
 
 STEPS = 200
 STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
@@ -29,24 +30,20 @@ def consistent(closures: Closures, t: float, y: Real) -> Real:
 
 
 def _closed(closures: Closures, t: float, y: Real) -> Real:
-    closures.linearise(t, y, stiff=True)
-    errors, damping = closures.errors(), 1e-3
+    errors, damping = _errors(closures, t, y), 1e-3
     for _ in range(STEPS):
-        if _largest(errors) <= CLOSED:
+        if _largest(errors) <= CLOSED or damping > STRONGEST:
             break
         U, s, Vt = np.linalg.svd(closures.responses(), full_matrices=False)
         # the damping fades with the errors: convergence is quadratic, even where redundant rows become dependent
         floor = damping * s[0] ** 2 * min(1.0, float(np.linalg.norm(errors))) + np.finfo(float).tiny
-        x = -Vt.T @ (s / (s**2 + floor) * (U.T @ errors))
-        trial = closures.moved(t, y, x)
-        if np.linalg.norm(closures.errors()) < np.linalg.norm(errors):
-            y, damping = trial, damping / 10.0
+        trial = closures.moved(t, y, -Vt.T @ (s / (s**2 + floor) * (U.T @ errors)))
+        smaller = np.linalg.norm(closures.errors()) < np.linalg.norm(errors)
+        if smaller and closures.linearise_stiff(t, trial) == OK:
+            y, errors, damping = trial, closures.errors(), damping / 10.0
         else:
             damping *= 10.0
-        if damping > STRONGEST:
-            break
-        closures.linearise(t, y, stiff=True)
-        errors = closures.errors()
+            closures.linearise_stiff(t, y)
     if not _largest(errors) <= OPEN:
         where = closures.worst(errors)
         raise ClosureError(
@@ -59,7 +56,7 @@ def _closed(closures: Closures, t: float, y: Real) -> Real:
 
 def _moving(closures: Closures, t: float, y: Real) -> Real:
     """Speeds in the range that the closures leave."""
-    closures.linearise(t, y, stiff=True)
+    closures.linearise_stiff(t, y)
     rates, largest = closures.rates()
     for _ in range(3):
         if largest <= CLOSED:
@@ -83,6 +80,12 @@ def _refuse_half_a_turn(closures: Closures) -> None:
                 f'closure "{name}" closes only with its frames half a turn apart: turn quaternion_b, or give initial '
                 "coordinates closer to the closed configuration"
             )
+
+
+def _errors(closures: Closures, t: float, y: Real) -> Real:
+    closures.linearise(t, y)  # raises where the tree itself has no dynamics
+    closures.linearise_stiff(t, y)
+    return closures.errors()
 
 
 def _largest(errors: Real) -> float:

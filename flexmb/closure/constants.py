@@ -81,3 +81,16 @@ def _length(constants: Constants, sides: np.ndarray) -> float:
     points = [constants.port["position"] + constants.port["offset"], constants.body["placement_position"]]
     largest = max(float(np.max(np.linalg.norm(each, axis=-1), initial=0.0)) for each in (*points, sides["position"]))
     return largest or 1.0
+
+
+def slowest_mode(chain: list[Link]) -> float:
+    """The lowest frequency (rad/s) of a mode by itself, body held; infinite where none has stiffness."""
+    found = [np.inf]
+    for link in chain:
+        m = link.model
+        mass = np.einsum("p,pan->n", m.mass, m.translation**2)
+        mass += np.einsum("pan,pab,pbn->n", m.rotation, m.inertia, m.rotation)
+        stiffness = np.diag(m.stiffness)
+        moving = (stiffness > 0.0) & (mass > 0.0)
+        found += np.sqrt(stiffness[moving] / mass[moving]).tolist()
+    return min(found)

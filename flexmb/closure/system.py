@@ -53,10 +53,14 @@ class Closures:
         constants: Constants,
         own: ClosureConstants,
         tree: Workspace,
+        slowest: float,
         check: Callable[[int, int], None],
     ) -> None:
-        """`check` raises unless a status is OK; its second argument is the body or closure at fault."""
-        self.scene, self._check = closures, check
+        """`slowest`: lowest modal frequency (rad/s), infinite without modes.
+
+        `check` raises unless a status is OK; its second argument is the body or closure at fault.
+        """
+        self.scene, self._check, self._slowest = closures, check, slowest
         self.constants = constants, own
         self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
         self._tree, self._own = self.workspace(tree)
@@ -92,21 +96,21 @@ class Closures:
 
     # Newton's steps, for initial conditions
 
-    def linearise(self, t: float, y: Real, *, stiff: bool = False) -> None:
-        """Rows' values, rates and responses to unit loads at y; `stiff`: with the metric that hardly bends bodies."""
-        c, *others = self._arrays
-        self._check(dynamics.linearise(t, y, self._stiff if stiff else c, *others), self.fault)
+    def linearise(self, t: float, y: Real) -> None:
+        """Rows' values, rates and responses to unit loads at y."""
+        self._check(dynamics.linearise(t, y, *self._arrays), self.fault)
+
+    def linearise_stiff(self, t: float, y: Real) -> int:
+        """The same with the metric that hardly bends bodies; returns the status code."""
+        _, *others = self._arrays
+        return int(dynamics.linearise(t, y, self._stiff, *others))
 
     @cached_property
     def _stiff(self) -> Constants:
         """The tree with modal masses M + K (STIFF/omega)^2, omega its lowest modal frequency."""
         c = self.constants[0]
-        mass, stiffness = (np.einsum("kii->ki", c.pair[key]) for key in ("mff", "stiffness"))
-        squares = stiffness[stiffness > 0.0] / mass[stiffness > 0.0]
-        if not squares.size:
-            return c
         pair = c.pair.copy()
-        pair["mff"] += STIFF**2 / np.min(squares) * pair["stiffness"]
+        pair["mff"] += (STIFF / self._slowest) ** 2 * pair["stiffness"]
         return replace(c, pair=pair)
 
     def responses(self) -> Real:
