@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import Any, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from flexmb import composite_runs, propagate
 from flexmb.arrays import Workspace
-from flexmb.closed_system import ClosedSystem
-from flexmb.closure.system import ClosedWorkspace
 from flexmb.composite import CompositeWorkspace
 from flexmb.frisch import propagation as nested_propagation
 from flexmb.frisch.tables import NestedWorkspace
@@ -27,6 +25,10 @@ from flexmb.state import DynamicsError
 from flexmb.status import Status
 from flexmb.system import ENERGIES, ERRATA, Algorithm, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
+
+if TYPE_CHECKING:
+    from flexmb.closed_system import ClosedSystem
+    from flexmb.closure.system import ClosedWorkspace
 
 Method = Literal["dop853", "rk4"]
 FINEST_RTOL = 100 * np.finfo(float).eps
@@ -135,8 +137,8 @@ def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array
 
 
 def _route(system: System, algorithm: Algorithm, stabilise: float) -> _Route:
-    if isinstance(system, ClosedSystem):
-        return _Route(*system.route(algorithm, stabilise))
+    if system.scene.closures:
+        return _Route(*cast("ClosedSystem", system).route(algorithm, stabilise))
     if stabilise != 0.0:
         raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures: leave it out")
     if algorithm == "articulated":

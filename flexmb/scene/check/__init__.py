@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from flexmb.scene.check.beams import beams
-from flexmb.scene.check.hinges import hinges, point_masses, wheels
+from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
 from flexmb.scene.check.names import references, unique_names
@@ -20,7 +20,7 @@ from flexmb.scene.schema import Scene
 
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
-PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, wheels, point_masses)
+PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses)
 
 
 def check_scene(scene: Scene, t_end: float | None = None) -> None:

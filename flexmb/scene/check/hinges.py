@@ -1,4 +1,4 @@
-"""Coordinates of hinges, wheels and point masses: counts, springs, motors, prescribed motions."""
+"""Coordinates of hinges, wheels and point masses: counts, springs, motors, prescribed motions; axes of closures."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from flexmb.scene.bodies import _Strict
 from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
-from flexmb.scene.hinges import AngularCoordinate, Gimbal
+from flexmb.scene.hinges import Z_AXIS, AngularCoordinate, Gimbal
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
@@ -26,6 +26,14 @@ def hinges(scene: Scene) -> Iterator[Problem]:
         yield from _coordinates(place, hinge)
         if isinstance(hinge, Gimbal):
             yield from _gimbal(place, hinge)
+
+
+def closures(scene: Scene) -> Iterator[Problem]:
+    """A closure without an axis is not given one."""
+    for place, closure in sound(scene, "closures"):
+        if closure.axis != Z_AXIS and closure.type not in ("revolute", "prismatic", "cylindrical"):
+            what = f"a {closure.type} closure has no axis of its own"
+            yield Problem(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
 
 
 def wheels(scene: Scene) -> Iterator[Problem]:

@@ -124,6 +124,17 @@ BAD = {
     "closure to an unknown body": (put("closures", 0, "body_b", "slid"), ["$.closures[0].body_b"], [], ["slider"]),
     "closure of a body with itself": (put("closures", 0, "body_b", "bob"), ["$.closures[0]"], ["itself"],
                                       ["different"]),
+    "closure named like a hinge": (put("closures", 0, "name", "rail"), ["$.closures[0].name"], ['"rail"'], ["rename"]),
+    "closure at a node of the ground": (
+        both(put("closures", 0, "body_b", "ground"), put("closures", 0, "node_b", "pad")), ["$.closures[0].node_b"],
+        ["ground"], ["offset"]),
+    "closure with a quaternion that is none": (put("closures", 0, "quaternion_b", [1.0, 1.0, 0.0, 0.0]),
+                                               ["$.closures[0].quaternion_b"], ["unit"], []),
+    "closure without an axis": (put("closures", 0, "axis", [1.0, 0.0, 0.0]), ["$.closures[0].axis"],
+                                ["spherical closure has no axis"], ["quaternion_a"]),
+    "closure with a zero axis": (
+        both(put("closures", 0, "type", "revolute"), put("closures", 0, "axis", [0.0, 0.0, 0.0])),
+        ["$.closures[0].axis"], ["zero"], ["unit vector"]),
     # the tree
     "cycle": (put("hinges", 0, "parent", "bob"), ["$.hinges"], ["cycle", "boom -> bob -> hub -> boom"], ["ground"]),
     "self hinge": (put("hinges", 4, "parent", "slider"), ["$.hinges[4]", 'hinge "rail"'], ["itself"], ["different"]),
