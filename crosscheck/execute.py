@@ -64,8 +64,9 @@ def _with_engine(engine: Engine, job: Job, blank: RunRecord, emit: Emit) -> None
         emit(msgspec.structs.replace(blank, status="refused", message=support.reason))
         return
     ladder = job.efforts or engine.efforts(job.scene)
-    chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == len(ladder) - 1]
-    waiting = [(rung, effort) for rung, effort in chosen if (effort.label, version) not in job.done]
+    rungs = len(ladder)
+    chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]
+    waiting = [(rung, effort) for rung, effort in chosen if (effort.label, version, rung, rungs) not in job.done]
     if not waiting:
         return
     emit("compiling")
@@ -75,7 +76,7 @@ def _with_engine(engine: Engine, job: Job, blank: RunRecord, emit: Emit) -> None
     compile_s = time.perf_counter() - start
     for rung, effort in waiting:
         emit(effort.label)
-        full = rung >= len(ladder) - FULLY_STORED
+        full = rung >= rungs - FULLY_STORED
         record = msgspec.structs.replace(
             blank,
             effort=effort.label,
@@ -83,7 +84,7 @@ def _with_engine(engine: Engine, job: Job, blank: RunRecord, emit: Emit) -> None
             effort_method=effort.method,
             effort_value=effort.value,
             rung=rung,
-            rungs=len(ladder),
+            rungs=rungs,
             compile_s=compile_s,
         )
         emit(_run(model, Run(times=job.times), effort, record, None if full else job.kept))

@@ -32,7 +32,8 @@ class Job:
 
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
     channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
-    name. `done` are the (effort, version) already recorded for this very scene. A job with an `error` cannot be run.
+    name. `done` are the (effort, version, rung, rungs) already recorded for this very scene: a result is a ladder, and
+    another ladder is run from its foot. A job with an `error` cannot be run.
     """
 
     case: str
@@ -46,7 +47,7 @@ class Job:
     efforts: tuple[Effort, ...] = ()
     finest_only: bool = False
     kept: tuple[str, ...] = ()
-    done: frozenset[tuple[str, str]] = field(default_factory=frozenset)
+    done: frozenset[tuple[str, str, int, int]] = field(default_factory=frozenset)
     error: str = ""
 
     @property

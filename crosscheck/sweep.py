@@ -62,19 +62,19 @@ def _engine(job: Job) -> str:
     return COMPILED_LIKE.get(job.engine, job.engine)
 
 
-def _done(known: Sequence[Record], job: Job) -> frozenset[tuple[str, str]]:
-    """Efforts of the job, with the engine's version, whose outcome is already known for the very same scene.
+def _done(known: Sequence[Record], job: Job) -> frozenset[tuple[str, str, int, int]]:
+    """Efforts of the job, with version and place in the ladder, whose outcome is already known for the same scene.
 
     A later record without an effort (missing engine, crash) withdraws the earlier ones.
     """
-    done: set[tuple[str, str]] = set()
+    done: set[tuple[str, str, int, int]] = set()
     for record in known:
         if not isinstance(record, RunRecord) or record.key[:4] != (job.case, job.variant, job.role, job.engine):
             continue
         if not record.effort:
             done.clear()
         elif record.status in ("finished", "diverged") and record.scene == job.scene_id:
-            done.add((record.effort, record.version))
+            done.add((record.effort, record.version, record.rung, record.rungs))
     return frozenset(done)
 
 

@@ -183,6 +183,26 @@ def test_a_changed_scene_is_run_again(tmp_path) -> None:
     assert len(scenes) == 2
 
 
+def test_a_longer_ladder_is_climbed_from_its_foot(tmp_path) -> None:
+    """Else its result would have the new effort alone, and no uncertainty."""
+    ladder = """
+[[variant]]
+name = "rigid"
+engines = ["stepper", "fine"]
+efforts = [{ engine = "stepper", kind = "step", method = "rk4", values = [0.0125, 0.00625] }]
+
+[[comparison]]
+name = "all"
+variant = "rigid"
+goals = { "marker:tip.position" = 1e-4 }
+"""
+    folder, records = copy_case(tmp_path, ladder), tmp_path / "records.jsonl"
+    assert run_case(folder, records).ok
+    longer = (folder / "run.toml").read_text(encoding="utf-8").replace("0.00625]", "0.00625, 0.003125]")
+    (folder / "run.toml").write_text(longer, encoding="utf-8")
+    assert run_case(folder, records).ok
+
+
 def test_a_missing_library_withdraws_earlier_results_and_comes_back(tmp_path) -> None:
     """Engine there, then gone, then there again: the verdict follows."""
     folder, records = copy_case(tmp_path), tmp_path / "records.jsonl"
