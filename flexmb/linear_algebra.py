@@ -11,22 +11,24 @@ SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left
 def cholesky_rows(U, n):
     """Upper factor of U' U in place of the upper triangle of U[:n,:n]; returns -1.
 
-    Where the matrix is not positive definite to round-off, or not finite, the row of the pivot that shows it.
+    Where the matrix is not positive definite to round-off, or not finite, the row of the pivot that shows it. Four
+    rows are finished and then taken off all rows below at once. The first column below the diagonal is scratch: it
+    keeps the diagonal, which tells what a pivot lost.
     """
+    for m in range(1, n):
+        U[m, 0] = U[m, m]
     for m in range(n):
-        row, floor = U[m, m:n], SINGULAR * U[m, m]
-        j = 0
-        while j + 3 < m:  # four rows above at a time: the row stays in registers
-            _subtract4(U[j : j + 4, m], U[j, m:n], U[j + 1, m:n], U[j + 2, m:n], U[j + 3, m:n], row)
-            j += 4
-        while j < m:
-            _subtract(U[j, m], U[j, m:n], row)
-            j += 1
-        if not row[0] > floor:
+        row, first = U[m], m // 4 * 4
+        floor = SINGULAR * row[0]
+        for j in range(first, m):
+            _subtract(U[j, m], U[j], row, m, n)
+        if not row[m] > floor:
             return m
-        s = 1.0 / sqrt(row[0])
-        for i in range(row.shape[0]):
+        s = 1.0 / sqrt(row[m])
+        for i in range(m, n):
             row[i] *= s
+        if m == first + 3:
+            _subtract_rows(U, first, n)
     return -1
 
 
@@ -35,25 +37,29 @@ def cholesky_solve(U, x, n):
     """Solve U' U x = b; x[:n] holds b and receives the solution."""
     for m in range(n):
         x[m] /= U[m, m]
-        _subtract(x[m], U[m, m + 1 : n], x[m + 1 : n])
+        _subtract(x[m], U[m], x, m + 1, n)
     for m in range(n - 1, -1, -1):
+        row, s = U[m], x[m]
         for i in range(m + 1, n):
-            x[m] -= U[m, i] * x[i]
-        x[m] /= U[m, m]
+            s -= row[i] * x[i]
+        x[m] = s / row[m]
 
 
 @helper
-def _subtract(s, a, y):
-    """y -= s a; nothing to do where trees branch."""
+def _subtract(s, a, y, start, stop):
+    """y -= s a from start to stop; nothing to do between branches of a tree."""
     if s != 0.0:
-        for i in range(y.shape[0]):
+        for i in range(start, stop):
             y[i] -= s * a[i]
 
 
 @helper
-def _subtract4(s, a, b, c, d, y):
-    """y -= s0 a + s1 b + s2 c + s3 d."""
-    s0, s1, s2, s3 = s[0], s[1], s[2], s[3]
-    if s0 != 0.0 or s1 != 0.0 or s2 != 0.0 or s3 != 0.0:
-        for i in range(y.shape[0]):
-            y[i] -= s0 * a[i] + s1 * b[i] + s2 * c[i] + s3 * d[i]
+def _subtract_rows(U, first, n):
+    """Take rows first .. first + 3 of the factor off all rows below them."""
+    a, b, c, d = U[first], U[first + 1], U[first + 2], U[first + 3]
+    for r in range(first + 4, n):
+        row = U[r]
+        s, t, u, v = a[r], b[r], c[r], d[r]
+        if s != 0.0 or t != 0.0 or u != 0.0 or v != 0.0:
+            for i in range(r, n):
+                row[i] -= s * a[i] + t * b[i] + u * c[i] + v * d[i]

@@ -138,21 +138,20 @@ def _own_forces(c, w, m, k):
 @helper
 def _hinge_rows(c, w, m, k):
     """M(k, j) = H X(j) of the hinge's speeds and all speeds j of what it carries."""
-    start, stop = m.hinge[k], m.stop[k]
     for n in range(c.body[k].nv):
         angular, linear = motion_column(c, w, k, n)
-        _project(angular, linear, m.X[:, start + n : stop], m.M[start + n, start + n : stop])
+        place = m.hinge[k] + n
+        _project(angular, linear, m.X, m.M[place], place, m.stop[k])
 
 
 @helper
 def _forces_to_hinge(c, w, m, k):
     """Forces of what body k carries from its origin to O on a node that deforms: modes feel -[Pi_d]' X (45)."""
-    i = c.body[k].outboard_port
-    X = m.X[:, m.carried[k] : m.stop[k]]
-    _shift(scale(-1.0, vec3(w.port[i].r, 0)), X)
+    i, start, stop = c.body[k].outboard_port, m.carried[k], m.stop[k]
+    _shift(scale(-1.0, vec3(w.port[i].r, 0)), m.X, start, stop)
     for n in range(c.body[k].modes):
         angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
-        _project_off(angular, linear, X, m.M[m.modes[k] + n, m.carried[k] : m.stop[k]])
+        _project_off(angular, linear, m.X, m.M[m.modes[k] + n], start, stop)
 
 
 @helper
@@ -160,18 +159,17 @@ def _forces_to_parent(c, w, m, k):
     """X(j) = Phi X(j-1) of all speeds that hinge k carries, and the rows of the parent's modes: [Pi_t]' X."""
     p, i = c.body[k].parent, c.body[k].inboard_port
     start, stop = m.hinge[k], m.stop[k]
-    X = m.X[:, start:stop]
-    _rotate(mat3(w.body[k].rotation, 0), X)
-    _shift(vec3(w.body[k].arm, 0), X)
-    for n in range(c.body[p].modes):
-        row = m.M[m.modes[p] + n, start:stop]
-        if i >= 0:
-            _project(vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0), X, row)
-        else:
-            for j in range(row.shape[0]):
-                row[j] = 0.0
+    _rotate(mat3(w.body[k].rotation, 0), m.X, start, stop)
+    _shift(vec3(w.body[k].arm, 0), m.X, start, stop)
     if i >= 0:
-        _shift(vec3(w.port[i].r, 0), X)
+        for n in range(c.body[p].modes):
+            angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+            _project(angular, linear, m.X, m.M[m.modes[p] + n], start, stop)
+        _shift(vec3(w.port[i].r, 0), m.X, start, stop)
+    else:
+        for n in range(c.body[p].modes):
+            for j in range(start, stop):
+                m.M[m.modes[p] + n, j] = 0.0
 
 
 @helper
@@ -183,10 +181,10 @@ def _store_force(X, j, tau, f):
 
 
 @helper
-def _project(angular, linear, X, row):
-    """row = [angular; linear]' X."""
+def _project(angular, linear, X, row, start, stop):
+    """row = [angular; linear]' X in columns start .. stop."""
     a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
-    for j in range(row.shape[0]):
+    for j in range(start, stop):
         row[j] = (
             angular[0] * a[j] + angular[1] * b[j] + angular[2] * c[j]
             + linear[0] * d[j] + linear[1] * e[j] + linear[2] * f[j]
@@ -194,10 +192,10 @@ def _project(angular, linear, X, row):
 
 
 @helper
-def _project_off(angular, linear, X, row):
-    """row -= [angular; linear]' X."""
+def _project_off(angular, linear, X, row, start, stop):
+    """row -= [angular; linear]' X in columns start .. stop."""
     a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
-    for j in range(row.shape[0]):
+    for j in range(start, stop):
         row[j] -= (
             angular[0] * a[j] + angular[1] * b[j] + angular[2] * c[j]
             + linear[0] * d[j] + linear[1] * e[j] + linear[2] * f[j]
@@ -205,15 +203,15 @@ def _project_off(angular, linear, X, row):
 
 
 @helper
-def _rotate(R, X):
-    """Torques and forces X (6,j) turned by R."""
-    _rotate3(R, X[0], X[1], X[2])
-    _rotate3(R, X[3], X[4], X[5])
+def _rotate(R, X, start, stop):
+    """Torques and forces in columns start .. stop of X turned by R."""
+    _rotate3(R, X[0], X[1], X[2], start, stop)
+    _rotate3(R, X[3], X[4], X[5], start, stop)
 
 
 @helper
-def _rotate3(R, x, y, z):
-    for j in range(x.shape[0]):
+def _rotate3(R, x, y, z, start, stop):
+    for j in range(start, stop):
         a, b, c = x[j], y[j], z[j]
         x[j] = R[0] * a + R[1] * b + R[2] * c
         y[j] = R[3] * a + R[4] * b + R[5] * c
@@ -221,10 +219,10 @@ def _rotate3(R, x, y, z):
 
 
 @helper
-def _shift(d, X):
+def _shift(d, X, start, stop):
     """phi X: torques about a point from which d leads to the one they were about."""
     a, b, c, x, y, z = X[0], X[1], X[2], X[3], X[4], X[5]
-    for j in range(a.shape[0]):
+    for j in range(start, stop):
         a[j] += d[1] * z[j] - d[2] * y[j]
         b[j] += d[2] * x[j] - d[0] * z[j]
         c[j] += d[0] * y[j] - d[1] * x[j]
