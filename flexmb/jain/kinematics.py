@@ -27,7 +27,7 @@ from flexmb.spatial.vector import (
 
 @helper
 def velocity_sweep(c, w, shape, rates):
-    """Poses, velocities and bias accelerations of all bodies and ports.
+    """Poses, velocities and bias accelerations of all bodies and ports, base to tip (10), (11).
 
     `shape` and `rates` say whether a ruthless body shows its true eta and etadot or zero: neither in the equations of
     motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers.
@@ -65,7 +65,7 @@ def _move_port(c, w, k, i):
 
 @helper
 def port_velocity(w, k, i):
-    """Velocity (w, v) of port i of body k, body axes."""
+    """Velocity (w, v) of port i of body k, body axes (5)."""
     omega = vec3(w.body[k].velocity, 0)
     v = add(vec3(w.body[k].velocity, 3), cross(omega, vec3(w.port[i].r, 0)))
     return add(omega, vec3(w.port[i].v, 0)), add(v, vec3(w.port[i].v, 3))
@@ -95,7 +95,7 @@ def port_acceleration(c, w, k, i):
 
 @helper
 def _inboard(c, w, k):
-    """O+ of body k in parent axes: (w, v, alpha, a) of the parent's reference, the arm from it to O+, R_parent_O+."""
+    """O+ of body k in parent axes (7): (w, v, alpha, a) of the parent's reference, the arm from it to O+, R_parent_O+."""
     p = c.body[k].parent
     i = c.body[k].inboard_port
     zero = (0.0, 0.0, 0.0)
