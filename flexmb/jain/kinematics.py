@@ -95,7 +95,7 @@ def port_acceleration(c, w, k, i):
 
 @helper
 def _inboard(c, w, k):
-    """O+ of body k in parent axes (7): (w, v, alpha, a) of the parent's reference, the arm from it to O+, R_parent_O+."""
+    """O+ of body k in parent axes (7): (w, v, alpha, a) of the parent's reference, arm from it to O+, R_parent_O+."""
     p = c.body[k].parent
     i = c.body[k].inboard_port
     zero = (0.0, 0.0, 0.0)
