@@ -14,6 +14,7 @@ deformation, the tables are made anew at each evaluation.
 from math import sqrt
 
 from flexmb.arrays import RUTHLESS
+from flexmb.jain.explicit import refer_rigid
 from flexmb.jain.reduced import node_inertia
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import add_product
@@ -24,11 +25,13 @@ NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are roundi
 
 @helper
 def eliminate_modes(c, w, k):
-    """P_R and z_R of (63), (64); False where T does not exist."""
+    """P_R and z_R of (63), (64) from the constants of (B4); False where T does not exist."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     if c.body[k].level != RUTHLESS:
         _tables(c, w, k)
+    elif c.body[k].outboard_port >= 0:
+        refer_rigid(c, w, k)
     _to_orthonormal(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b] - w.zeta[r, b]

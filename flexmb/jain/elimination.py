@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -40,21 +40,24 @@ def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Const
 def applies(c: a.Constants, k: int, variant: int) -> bool:
     """Whether body k may be reduced: modal masses constant and regular, nothing but its nodes adding to them.
 
-    Not with a hinge on a node that its own modes move (H_f adds the rigid inertia to D_f), nor with a free wheel, which
-    takes a rank-one part out of D_f. The Woodbury form is Appendix B's: of ruthless bodies.
+    Not with a free wheel, which takes a rank-one part out of D_f. A hinge on a node that its own modes move adds the
+    rigid inertia to D_f: it must be constant too, so that level ruthless is needed and no outboard body may sit on a
+    point that does not deform. The Woodbury form is Appendix B's: of ruthless bodies.
     """
     body = c.body[k]
     free_wheel = any(
         c.speed["prescribed"][c.wheel["u_index"][i]] < 0 for i in range(body["wheel_start"], body["wheel_stop"])
     )
-    if body["modes"] == 0 or body["outboard_port"] >= 0 or free_wheel:
+    ridden = np.any((c.body["parent"] == k) & (c.body["inboard_port"] < 0))
+    floating = body["outboard_port"] >= 0 and (body["level"] != a.RUTHLESS or ridden)
+    if body["modes"] == 0 or floating or free_wheel:
         return False
     constant = body["level"] == a.RUTHLESS or (
         variant == a.CONDENSED
         and body["point_start"] == body["point_stop"]
         and not (body["level"] == a.LINEAR and body["mass_slope"] >= 0)
     )
-    return bool(constant) and _is_regular(_modal_mass(c, k))
+    return bool(constant) and _is_regular(_Rest.of(c, k, []).M_ff)
 
 
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
@@ -75,11 +78,6 @@ def _is_regular(M: a.Real) -> bool:
         return False
     values = np.linalg.eigvalsh(M / np.outer(size, size))
     return bool(values[0] * WELL_CONDITIONED > values[-1])
-
-
-def _modal_mass(c: a.Constants, k: int) -> a.Real:
-    n = c.body["modes"][k]
-    return c.pair["mff"][k, :n, :n]
 
 
 def _node_ports(c: a.Constants, k: int) -> list[int]:
@@ -112,19 +110,43 @@ def _reduced_constants(
     return a.ReducedConstants(**base, **tables)
 
 
+@dataclass(frozen=True)
+class _Rest:
+    """H_f M_m H_f' of a body at rest: modal masses (n,n), coupling (n,6); and of its nodes Pi' (n,6C), phi' (6C,6)."""
+
+    M_ff: a.Real
+    M_fr: a.Real
+    Pi_t: a.Real
+    phi_t: a.Real
+
+    @classmethod
+    def of(cls, c: a.Constants, k: int, ports: list[int]) -> _Rest:
+        """About O. Where O sits on a node d of the body: with V = X V_O - B etadot, the congruence of (13), (17)."""
+        n, hinge = c.body["modes"][k], int(c.body["outboard_port"][k])
+        M_ff, M_fr, Pi_t = c.pair["mff"][k, :n, :n], c.mode["mfr"][k, :n], _shapes(c, ports, n)
+        phi_t = np.vstack([np.zeros((0, 6)), *(_shift(_place(c, port)) for port in ports)])
+        if hinge < 0:
+            return cls(M_ff, M_fr, Pi_t, phi_t)
+        X = _shift(-_place(c, hinge))
+        B_t = _shapes(c, [hinge], n) @ X.T
+        momentum = B_t @ _rigid_block(c.body["rigid"][k])
+        across = B_t @ M_fr.T
+        M_ff = M_ff - across - across.T + momentum @ B_t.T
+        return cls(M_ff, (M_fr - momentum) @ X, Pi_t - B_t @ phi_t.T, phi_t @ X)
+
+
 def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tables: dict[str, Any]) -> None:
-    """Row of body k: the constants of (B4), with Theta and the M_fr they leave out; at rest."""
+    """Row of body k: the constants of (B4), with the zeta = M_rf Lam M_fr and Theta they leave out; at rest."""
     n = c.body["modes"][k]
-    M_fr, Pi_t = c.mode["mfr"][k, :n], _shapes(c, ports, n)
-    L = np.linalg.cholesky(_modal_mass(c, k))
-    inverse = solve_triangular(L, np.eye(n), lower=True)
-    psi, ups = inverse @ M_fr, inverse @ Pi_t
+    rest = _Rest.of(c, k, ports)
+    inverse = solve_triangular(np.linalg.cholesky(rest.M_ff), np.eye(n), lower=True)
+    psi, ups = inverse @ rest.M_fr, inverse @ rest.Pi_t
     scale, pivoted, order = _scaled_root(ups)
     rank = len(pivoted)
     tables["root"][row, :rank, order] = (pivoted * scale[order]).T
     tables["rank"][row] = rank
     tables["zeta"][row] = _spatial(psi.T @ psi)
-    theta = np.vstack([_shift(c, port) for port in ports] or [np.zeros((0, 6))]) - ups.T @ psi
+    theta = rest.phi_t - ups.T @ psi
     tables["node"]["port"][row, : len(ports)] = ports
     tables["node"]["theta"][row, : len(ports)] = theta.reshape(len(ports), 6, 6)
     if variant == a.WOODBURY:
@@ -151,9 +173,20 @@ def _shapes(c: a.Constants, ports: list[int], n: int) -> a.Real:
     return np.concatenate([rotation, linear], axis=2).swapaxes(0, 1).reshape(n, 6 * len(ports))
 
 
-def _shift(c: a.Constants, port: int) -> a.Real:
-    """phi' (6,6): velocity of the port by that of the body origin."""
-    x, y, z = c.port["position"][port] + c.port["offset"][port]
+def _place(c: a.Constants, port: int) -> a.Real:
+    return c.port["position"][port] + c.port["offset"][port]
+
+
+def _rigid_block(rigid: a.Real) -> a.Real:
+    """M_rr (6,6) of a body from its mass, first moment and inertia."""
+    xx, yy, zz, xy, xz, yz = rigid[4:]
+    skew = _shift(rigid[1:4])[:3, 3:] - _shift(rigid[1:4])[3:, :3]
+    return np.block([[np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]), skew], [skew.T, rigid[0] * np.eye(3)]])
+
+
+def _shift(r: a.Real) -> a.Real:
+    """phi' (6,6): velocity at r from the origin by that of the origin."""
+    x, y, z = r
     out = np.eye(6)
     out[3:, :3] = [[0.0, z, -y], [-z, 0.0, x], [y, -x, 0.0]]
     return out

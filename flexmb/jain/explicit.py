@@ -78,36 +78,61 @@ def refer_to_hinge(c, w, k):
     With V_body = X V_O - B etadot, B = X [W; L], X the shift from O to the origin: P_ff - B'P_rf - P_fr B + B'P_rr B,
     (P_fr - B'P_rr) X, X'P_rr X; z_f - B'z_r, X'z_r.
     """
-    nm = c.body[k].modes
-    i = c.body[k].outboard_port
-    r = vec3(w.port[i].r, 0)
     p = load_inertia(w.body[k].inertia, 0)
+    for n in range(c.body[k].modes):
+        _add_momentum(c, w, k, n, p, -0.5)
+    for n in range(c.body[k].modes):
+        angular, linear = from_hinge(c, w, k, n)
+        torque, force = vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3)
+        for m in range(n + 1):
+            angular_m, linear_m = from_hinge(c, w, k, m)
+            s = w.pff[k, n, m] - dot(torque, angular_m) - dot(force, linear_m)
+            s -= dot(angular, vec3(w.mode[k, m].pfr, 0)) + dot(linear, vec3(w.mode[k, m].pfr, 3))
+            w.pff[k, n, m] = s
+            w.pff[k, m, n] = s
+    refer_coupling(c, w, k, -0.5)
+    refer_rigid(c, w, k)
+
+
+@helper
+def from_hinge(c, w, k, n):
+    """Column n of B: velocity of the body origin against the rate of mode n, O at rest."""
+    i = c.body[k].outboard_port
+    angular = vec3(w.port_mode[i, n].W, 0)
+    return angular, sub(vec3(w.port_mode[i, n].L, 0), cross(angular, vec3(w.port[i].r, 0)))
+
+
+@helper
+def _add_momentum(c, w, k, n, p, s):
+    """P_fr += s B'P_rr, row n."""
+    angular, linear = from_hinge(c, w, k, n)
+    tau, f = inertia_times(p, angular, linear)
+    add3(w.mode[k, n].pfr, 0, scale(s, tau))
+    add3(w.mode[k, n].pfr, 3, scale(s, f))
+
+
+@helper
+def refer_coupling(c, w, k, s):
+    """(P_fr + s B'P_rr) X: loads of unit modal rates about O."""
+    back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
+    p = load_inertia(w.body[k].inertia, 0)
+    for n in range(c.body[k].modes):
+        _add_momentum(c, w, k, n, p, s)
+        tau, f = shift_force(vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), back)
+        store3(w.mode[k, n].pfr, 0, tau)
+
+
+@helper
+def refer_rigid(c, w, k):
+    """z_f - B'z_r, X'P_rr X and X'z_r."""
     tau, f = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
-    for n in range(nm):
-        angular = vec3(w.port_mode[i, n].W, 0)
-        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+    for n in range(c.body[k].modes):
+        angular, linear = from_hinge(c, w, k, n)
         w.mode[k, n].zf -= dot(angular, tau) + dot(linear, f)
-        momentum = inertia_times(p, angular, linear)
-        for m in range(nm):
-            angular_m = vec3(w.port_mode[i, m].W, 0)
-            linear_m = sub(vec3(w.port_mode[i, m].L, 0), cross(angular_m, r))
-            across = dot(angular, vec3(w.mode[k, m].pfr, 0)) + dot(linear, vec3(w.mode[k, m].pfr, 3))
-            w.pff[k, n, m] += dot(momentum[0], angular_m) + dot(momentum[1], linear_m) - across
-            w.pff[k, m, n] -= across
-    back = scale(-1.0, r)
-    for n in range(nm):
-        angular = vec3(w.port_mode[i, n].W, 0)
-        linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
-        momentum = inertia_times(p, angular, linear)
-        tau_n = sub(vec3(w.mode[k, n].pfr, 0), momentum[0])
-        f_n = sub(vec3(w.mode[k, n].pfr, 3), momentum[1])
-        tau_n, f_n = shift_force(tau_n, f_n, back)
-        store3(w.mode[k, n].pfr, 0, tau_n)
-        store3(w.mode[k, n].pfr, 3, f_n)
-    store_inertia(w.body[k].inertia, 0, shift_inertia(p, back))
+    back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
+    store_inertia(w.body[k].inertia, 0, shift_inertia(load_inertia(w.body[k].inertia, 0), back))
     tau, f = shift_force(tau, f, back)
     store3(w.body[k].force, 0, tau)
-    store3(w.body[k].force, 3, f)
 
 
 @helper
@@ -129,8 +154,11 @@ def inertia_to_parent(c, w, k, p):
         for n in range(nm):
             angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
             tau_n, f_n = inertia_times(gamma, angular, linear)
-            for m in range(nm):
-                w.pff[parent, n, m] += dot(tau_n, vec3(w.port_mode[i, m].W, 0)) + dot(f_n, vec3(w.port_mode[i, m].L, 0))
+            for m in range(n + 1):
+                s = dot(tau_n, vec3(w.port_mode[i, m].W, 0)) + dot(f_n, vec3(w.port_mode[i, m].L, 0))
+                s += w.pff[parent, n, m]
+                w.pff[parent, n, m] = s
+                w.pff[parent, m, n] = s
             tau_n, f_n = shift_force(tau_n, f_n, r)
             add3(w.mode[parent, n].pfr, 0, tau_n)
             add3(w.mode[parent, n].pfr, 3, f_n)

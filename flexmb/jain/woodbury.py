@@ -7,6 +7,7 @@ The print's (B3) inverts Gamma, which a hinge makes singular (its rank is at mos
 with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4); the rest is (63), (64) as printed.
 """
 
+from flexmb.jain.explicit import refer_coupling, refer_rigid
 from flexmb.jain.reduced import node_inertia
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_force, shift_inertia
@@ -15,7 +16,7 @@ from flexmb.spatial.vector import add3, dot, vec3
 
 @helper
 def eliminate_modes(c, w, k):
-    """P_R = P_rr - g mu', z_R = z_r + g epsilon_f with g = mu D_f^-1, kept in w.gain; D_f^-1 into w.pff[k]."""
+    """P_R = P_rr - g mu', z_R = z_r + g epsilon_f of (63), (64) with g = mu D_f^-1, kept in w.gain; D_f^-1 of (B3)."""
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
@@ -25,6 +26,9 @@ def eliminate_modes(c, w, k):
         return False
     for i in range(c.body[k].nodes):
         _load_node(c, w, k, i)
+    if c.body[k].outboard_port >= 0:
+        refer_coupling(c, w, k, -1.0)
+        refer_rigid(c, w, k)
     _inverse(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b]
@@ -66,7 +70,7 @@ def _load_node(c, w, k, i):
 
 @helper
 def _inverse(c, w, k):
-    """D_f^-1 = Lam - Ups T Ups'."""
+    """D_f^-1 = Lam - Ups T Ups' into w.pff[k]: (B3), corrected."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     T = w.scratch[2]

@@ -23,6 +23,7 @@ CLAMPED = replace(
 )
 RECIPES = {
     "ruthless": replace(CLAMPED, levels=("ruthless",)),
+    "hinges at deforming nodes": replace(trees.RUTHLESS, bodies=8, wheels=0, point_masses=0),
     "full": replace(CLAMPED, carriers=("masses", "rigid", "masses")),
     "linear": replace(CLAMPED, carriers=("masses", "masses", "beam"), levels=("linear",), deformation=0.02),
     "every level": replace(CLAMPED, levels=("linear", "full", "ruthless"), deformation=0.02),
@@ -85,21 +86,23 @@ def test_everything_observable_is_that_of_the_explicit_form(found):
 
 def test_the_trees_have_what_reduction_must_handle():
     """Interior bodies, several nodes of one body, tips, and bodies that are left to the explicit form."""
-    nodes, chosen = set[int](), set[str]()
+    nodes, chosen, floating = set[int](), set[str](), 0
     for recipe in RECIPES.values():
         for seed in SEEDS:
             system = flexmb.compile(trees.random_scene(seed, recipe), "condensed")
             body = system.recursion_constants.body
             nodes |= set(body["nodes"][body["elimination"] > 0].tolist())
             chosen |= set(system.elimination.values())
+            floating += np.count_nonzero((body["elimination"] > 0) & (body["outboard_port"] >= 0))
     assert {0, 1, 2} <= nodes
+    assert floating > 0
     assert chosen == {"explicit", "condensed"}
 
 
 @pytest.mark.parametrize("name", ["ruthless", "linear", "full", "every level"])
 @pytest.mark.parametrize("seed", range(2))
 def test_unsplit_recursion(name, seed):
-    """(58) against the dense equations and the split form: free-free modes, any hinge, free wheels, prescribed speeds."""
+    """(58) against the dense equations and the split form: free-free modes, any hinge, free wheels, prescriptions."""
     recipe = {"ruthless": trees.RUTHLESS, "linear": trees.LINEAR, "full": trees.FULL, "every level": trees.EVERY_LEVEL}
     scene = trees.random_scene(seed, replace(recipe[name], deformation=0.02))
     system, dense = flexmb.compile(scene, "explicit"), DenseSystem(scene)
@@ -151,7 +154,8 @@ MASSES = np.array([1.0, 2.0, 3.0])
         (arm(MASSES, axis=(0.0, 0.0, 1.0)), "explicit"),  # a free wheel takes a rank-one part out of D_f
         (arm(MASSES, level="full", axis=(0.0, 0.0, 1.0), prescribed=schema.Constant(value=1.0)), "explicit"),
         (arm(np.array([1.0, 1e-9, 1e-9])), "explicit"),  # modal masses that only a factorisation handles
-        (arm(MASSES, hinge_node="tip"), "explicit"),
+        (arm(MASSES, hinge_node="tip"), "condensed"),
+        (arm(MASSES, hinge_node="tip", level="linear"), "explicit"),  # D_f has the moving rigid inertia in it
     ],
 )  # fmt: skip
 def test_where_condensing_applies(scene, expected):
