@@ -161,6 +161,11 @@ class Closures:
         self.rank = int(cw.rank[0])
 
     @property
+    def independent(self) -> int:
+        """Independent rows at the state evaluated last."""
+        return int(self._own.rank[0])
+
+    @property
     def mobility(self) -> int:
         """Free speeds that the closures leave, modes and wheels included."""
         return int(np.sum(self.constants[0].speed["prescribed"] < 0)) - self.rank

@@ -13,7 +13,7 @@ from flexmb.hinges.catalogue import REVOLUTE
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.sweeps import SINGLE
 from flexmb.kernel import helper
-from flexmb.spatial.inertia import inertia_column, load_inertia, shift_force
+from flexmb.spatial.inertia import shift_force
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, store3, sub, times, times_t, vec3
 
 
@@ -121,10 +121,8 @@ def pass_inward(c, w, cw, k, s, x):
 
 @helper
 def pivot(c, w, k):
-    """D_R of a hinge with one free speed along z."""
-    row = 2 if c.body[k].hinge_kind == REVOLUTE else 5
-    angular, linear = inertia_column(load_inertia(w.body[k].hinge_inertia, 0), row)
-    return angular[2] if c.body[k].hinge_kind == REVOLUTE else linear[2]
+    """D_R of a hinge with one free speed along z: an element of P_R."""
+    return w.body[k].hinge_inertia[2 if c.body[k].hinge_kind == REVOLUTE else 17]
 
 
 @helper

@@ -127,10 +127,11 @@ def with_closures(scene: s.Scene, rng: Generator, types: list[str]) -> s.Scene:
         body_a, body_b = rng.permutation(names[1:] if i else names)[:2]
         bodies = {body.name: list(rest_frames(body)) for body in scene.bodies} | {"ground": ["origin"]}
         node = {name: str(rng.choice(bodies[name])) for name in (body_a, body_b)}
+        axis = trees.direction(rng) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0)
         guess = s.Closure(
             name=f"c{i}", type=kind, body_a=str(body_a), node_a=node[body_a], body_b=str(body_b), node_b=node[body_b],
             position_a_m=tuple(trees.vector(rng, 0.3)), quaternion_a=tuple(trees.quaternion(rng)),
-            axis=tuple(trees.direction(rng)),
+            axis=tuple(axis),
         )  # fmt: skip
         B = relative_frame(dense, guess, still)
         R, p = B.rotation.value[0, 0], B.position.value[0, 0]

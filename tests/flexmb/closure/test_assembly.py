@@ -174,6 +174,20 @@ def test_stabilisation_holds_a_drift_that_projection_does_not_have():
     assert drift[0.0] < 1e-12 < drift[20.0] < 1e-5
 
 
+def test_a_step_allocates_nothing():
+    """However many steps a run takes, it allocates as much."""
+    from numba.core.runtime import rtsys
+
+    system = flexmb.compile(m.four_bar(modes=2))
+    system.route("articulated", 0.0)
+    counts = []
+    for steps in (10, 10, 1000):
+        before = rtsys.get_allocation_stats().alloc
+        flexmb.simulate(system, 0.01, "rk4", step=0.01 / steps, samples=2)
+        counts.append(rtsys.get_allocation_stats().alloc - before)
+    assert counts[1] == counts[2]
+
+
 def test_stabilisation_needs_closures_and_a_rate():
     with pytest.raises(ValueError, match="no closures"):
         flexmb.simulate(msgspec.structs.replace(m.four_bar(), closures=()), 1.0, stabilise=1.0)

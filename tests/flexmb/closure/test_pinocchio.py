@@ -77,8 +77,9 @@ class Peer:
         return np.array(rates), loads
 
 
-CASES = [(types, seed) for types in (("weld",), ("spherical",), ("spherical", "spherical"), ("weld", "spherical"))
-         for seed in (1, 2, 3)]  # fmt: skip
+# Loops without redundant rows: Pinocchio's loads of others are not the least.
+TYPES = (("weld",), ("spherical",), ("spherical", "spherical"), ("weld", "spherical"))
+CASES = [(types, seed) for types in TYPES for seed in (2, 3)]
 
 
 @pytest.mark.parametrize(("types", "seed"), CASES, ids=str)
@@ -88,7 +89,7 @@ def test_accelerations_and_loads(types, seed):
     start = flexmb.System(scene).initial_state
     state = system.state(start.q, chains.consistent_speeds(scene, start.q, start.u))
     ours = system.evaluate(0.0, state.q, state.u)
-    assert not np.any(system.closures.null_loads()), "loads are not unique: Pinocchio's are others"
+    assert system.closures.null_loads().shape[1] == 0
     peer = Peer(scene)
     rates, loads = peer.solve(peer.speeds(system, state.u))
     found = peer.speeds(system, ours.accelerations)
