@@ -11,24 +11,34 @@ SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left
 def cholesky_rows(U, n):
     """Upper factor of U' U in place of the upper triangle of U[:n,:n]; returns -1.
 
-    Where the matrix is not positive definite to round-off, or not finite, the row of the pivot that shows it. Four
-    rows are finished and then taken off all rows below at once. The first column below the diagonal is scratch: it
-    keeps the diagonal, which tells what a pivot lost.
+    Where the matrix is not positive definite to round-off, or not finite, the row of the pivot that shows it. Two rows
+    are made at a time, four rows above taken off both at once: what is loaded serves eight products.
     """
-    for m in range(1, n):
-        U[m, 0] = U[m, m]
-    for m in range(n):
-        row, first = U[m], m // 4 * 4
-        floor = SINGULAR * row[0]
-        for j in range(first, m):
-            _subtract(U[j, m], U[j], row, m, n)
-        if not row[m] > floor:
+    for m in range(0, n, 2):
+        d, floor = U[m, m], SINGULAR * U[m, m]
+        for j in range(m):
+            d -= U[j, m] * U[j, m]
+        if not d > floor:
             return m
-        s = 1.0 / sqrt(row[m])
-        for i in range(m, n):
-            row[i] *= s
-        if m == first + 3:
-            _subtract_rows(U, first, n)
+        d = sqrt(d)
+        U[m, m] = d
+        if m + 1 == n:
+            return -1
+        first, second = U[m, m + 1 : n], U[m + 1, m + 1 : n]
+        floor = SINGULAR * second[0]
+        j = 0
+        while j + 3 < m:
+            _subtract_four(U[j : j + 4], m, n, first, second)
+            j += 4
+        while j < m:
+            _subtract(U[j, m], U[j, m + 1 : n], first)
+            _subtract(U[j, m + 1], U[j, m + 1 : n], second)
+            j += 1
+        _scale(1.0 / d, first)
+        _subtract(first[0], first, second)
+        if not second[0] > floor:
+            return m + 1
+        _scale(1.0 / sqrt(second[0]), second)
     return -1
 
 
@@ -37,7 +47,7 @@ def cholesky_solve(U, x, n):
     """Solve U' U x = b; x[:n] holds b and receives the solution."""
     for m in range(n):
         x[m] /= U[m, m]
-        _subtract(x[m], U[m], x, m + 1, n)
+        _subtract(x[m], U[m, m + 1 : n], x[m + 1 : n])
     for m in range(n - 1, -1, -1):
         row, s = U[m], x[m]
         for i in range(m + 1, n):
@@ -46,20 +56,27 @@ def cholesky_solve(U, x, n):
 
 
 @helper
-def _subtract(s, a, y, start, stop):
-    """y -= s a from start to stop; nothing to do between branches of a tree."""
-    if s != 0.0:
-        for i in range(start, stop):
-            y[i] -= s * a[i]
+def _scale(s, y):
+    """y *= s."""
+    for i in range(y.shape[0]):
+        y[i] *= s
 
 
 @helper
-def _subtract_rows(U, first, n):
-    """Take rows first .. first + 3 of the factor off all rows below them."""
-    a, b, c, d = U[first], U[first + 1], U[first + 2], U[first + 3]
-    for r in range(first + 4, n):
-        row = U[r]
-        s, t, u, v = a[r], b[r], c[r], d[r]
-        if s != 0.0 or t != 0.0 or u != 0.0 or v != 0.0:
-            for i in range(r, n):
-                row[i] -= s * a[i] + t * b[i] + u * c[i] + v * d[i]
+def _subtract(s, a, y):
+    """y -= s a."""
+    for i in range(y.shape[0]):
+        y[i] -= s * a[i]
+
+
+@helper
+def _subtract_four(rows, m, n, y, z):
+    """Four finished rows off rows y (m) and z (m + 1), from column m + 1 on; branches have nothing in common."""
+    s0, s1, s2, s3 = rows[0, m], rows[1, m], rows[2, m], rows[3, m]
+    t0, t1, t2, t3 = rows[0, m + 1], rows[1, m + 1], rows[2, m + 1], rows[3, m + 1]
+    if s0 == 0.0 and s1 == 0.0 and s2 == 0.0 and s3 == 0.0 and t0 == 0.0 and t1 == 0.0 and t2 == 0.0 and t3 == 0.0:
+        return
+    a, b, c, d = rows[0, m + 1 : n], rows[1, m + 1 : n], rows[2, m + 1 : n], rows[3, m + 1 : n]
+    for i in range(y.shape[0]):
+        y[i] -= s0 * a[i] + s1 * b[i] + s2 * c[i] + s3 * d[i]
+        z[i] -= t0 * a[i] + t1 * b[i] + t2 * c[i] + t3 * d[i]
