@@ -61,7 +61,8 @@ def _moving(closures: Closures, t: float, y: Real) -> Real:
     for _ in range(3):
         if largest <= CLOSED:
             break
-        y = closures.pushed(t, y, -np.linalg.lstsq(closures.responses(), rates, rcond=DEPENDENT)[0])
+        x = -np.linalg.lstsq(closures.responses(), rates, rcond=DEPENDENT)[0]
+        y = closures.pushed(t, y, x.astype(np.float64, copy=False))
         rates, largest = closures.rates()
     if not largest <= MOVING_APART:
         where = closures.worst(rates, rates=True)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.arrays import Constants, Real, Workspace
+from flexmb.arrays import Constants, Index, Real, Workspace
 from flexmb.closure import dynamics
 from flexmb.closure.tables import ROTATION, ClosureConstants, ClosureWorkspace, workspace
 from flexmb.scene.schema import Closure
@@ -30,7 +30,7 @@ class ClosedWorkspace(NamedTuple):
     closures: ClosureWorkspace
 
     @property
-    def fault(self) -> Real:
+    def fault(self) -> Index:
         """(1,) body or closure where an evaluation failed."""
         return self.tree.fault
 
@@ -68,7 +68,8 @@ class Closures:
     def workspace(self, tree: Workspace, rate: float = 0.0) -> ClosedWorkspace:
         """A fresh workspace of the closures beside one of the tree; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
-        own = workspace(cc, *c.mode.shape, len(c.speed))
+        bodies, modes = c.mode.shape
+        own = workspace(cc, bodies, modes, len(c.speed))
         own.rank[0], own.gain[:] = self.rank, (2.0 * rate, rate * rate)
         return ClosedWorkspace(tree, own)
 

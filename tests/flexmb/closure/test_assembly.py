@@ -7,6 +7,7 @@ from dataclasses import replace
 import msgspec
 import numpy as np
 import pytest
+from numba.core.runtime import _nrt_python, rtsys
 
 import flexmb
 from flexmb.scene import schema as s
@@ -176,16 +177,19 @@ def test_stabilisation_holds_a_drift_that_projection_does_not_have():
 
 def test_a_step_allocates_nothing():
     """However many steps a run takes, it allocates as much."""
-    from numba.core.runtime import rtsys
-
     system = flexmb.compile(m.four_bar(modes=2))
-    system.route("articulated", 0.0)
+    flexmb.simulate(system, 0.01, "rk4", step=0.001, samples=2)
     counts = []
-    for steps in (10, 10, 1000):
-        before = rtsys.get_allocation_stats().alloc
-        flexmb.simulate(system, 0.01, "rk4", step=0.01 / steps, samples=2)
-        counts.append(rtsys.get_allocation_stats().alloc - before)
-    assert counts[1] == counts[2]
+    _nrt_python.memsys_enable_stats()
+    try:
+        for steps in (10, 1000):
+            before = rtsys.get_allocation_stats().alloc
+            run = flexmb.simulate(system, 0.01, "rk4", step=0.01 / steps, samples=2)
+            counts.append(rtsys.get_allocation_stats().alloc - before)
+            assert run.statistics.accepted_steps == steps
+    finally:
+        _nrt_python.memsys_disable_stats()
+    assert 0 < counts[0] == counts[1]
 
 
 def test_stabilisation_needs_closures_and_a_rate():
