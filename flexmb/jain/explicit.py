@@ -138,20 +138,35 @@ def refer_rigid(c, w, k):
 @helper
 def to_parent(c, w, k, p, tau, f):
     """P_R^+ and z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
-    inertia_to_parent(c, w, k, p)
-    force_to_parent(c, w, w, k, tau, f)
+    R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
+    gamma = shift_inertia(rotate_inertia(R, p), arm)
+    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    _add_inertia(c, w, k, gamma)
+    _add_force(c, w, w, k, tau, f)
 
 
 @helper
 def inertia_to_parent(c, w, k, p):
-    """Gamma = P_R^+ in parent axes at the parent's reference; P += A Gamma A' with A = [Pi'; phi]."""
+    """P += A Gamma A' of the parent, Gamma = P_R^+ in its axes at its reference."""
+    _add_inertia(c, w, k, shift_inertia(rotate_inertia(mat3(w.body[k].rotation, 0), p), vec3(w.body[k].arm, 0)))
+
+
+@helper
+def force_to_parent(c, w, z, k, tau, f):
+    """A [tau; f] added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+    R = mat3(w.body[k].rotation, 0)
+    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
+    _add_force(c, w, z, k, tau, f)
+
+
+@helper
+def _add_inertia(c, w, k, gamma):
+    """P += A Gamma A' with A = [Pi'; phi] of body k's inboard port on the parent."""
     parent = c.body[k].parent
-    gamma = shift_inertia(rotate_inertia(mat3(w.body[k].rotation, 0), p), vec3(w.body[k].arm, 0))
     i = c.body[k].inboard_port
     if i >= 0:
         r = vec3(w.port[i].r, 0)
-        nm = c.body[parent].modes
-        for n in range(nm):
+        for n in range(c.body[parent].modes):
             angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
             tau_n, f_n = inertia_times(gamma, angular, linear)
             for m in range(n + 1):
@@ -167,11 +182,9 @@ def inertia_to_parent(c, w, k, p):
 
 
 @helper
-def force_to_parent(c, w, z, k, tau, f):
-    """A [tau; f] added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+def _add_force(c, w, z, k, tau, f):
+    """z += A [tau; f] with A = [Pi'; phi] of body k's inboard port on the parent."""
     parent = c.body[k].parent
-    R = mat3(w.body[k].rotation, 0)
-    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
     i = c.body[k].inboard_port
     if i >= 0:
         for n in range(c.body[parent].modes):

@@ -8,6 +8,8 @@ RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, no
 @helper
 def is_out_of_range(c, w, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
+    if c.body[k].modes == 0:
+        return False
     body = c.body[k].rigid
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
     diagonal = 0.0
