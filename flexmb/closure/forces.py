@@ -6,8 +6,7 @@ from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pivot
 from flexmb.jain.kinematics import pose_sweep
-from flexmb.jain.sweeps import SINGLE, forward_dynamics
-from flexmb.jain.sweeps import _outward as outward
+from flexmb.jain.sweeps import SINGLE, forward_dynamics, outward
 from flexmb.kernel import helper
 from flexmb.spatial.vector import add3, scale, vec3
 from flexmb.status import CLOSURE_SINGULAR, OK

@@ -10,9 +10,10 @@ A wheel is one more speed of its body, whose force is the torque I q on its node
 
 from flexmb.coordinates import hinge_forces
 from flexmb.jain import inverse
+from flexmb.jain.explicit import inertia_to_parent, refer_to_hinge
 from flexmb.jain.kinematics import motion_column, velocity_sweep
-from flexmb.jain.sweeps import body_inertia, inertia_to_parent, refer_to_hinge
 from flexmb.kernel import helper
+from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
 from flexmb.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.inertia import inertia_times, load_inertia

@@ -17,10 +17,12 @@ F is the Cholesky factor of M in the order tip to base, of each body its wheels,
 from math import log, sqrt
 
 from flexmb.hinges.catalogue import REVOLUTE
+from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import wheel_forces
 from flexmb.jain.kinematics import carried_acceleration, motion_column, store_origin_acceleration, velocity_sweep
-from flexmb.jain.sweeps import SINGLE, body_inertia, force_to_parent, inward
+from flexmb.jain.sweeps import SINGLE, inward
 from flexmb.kernel import helper
+from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import shift_force
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, times, vec3
 

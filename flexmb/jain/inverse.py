@@ -4,6 +4,7 @@ tau holds inertia, gravity, elasticity and node loads; hinge springs and motors 
 vanish where the accelerations are consistent with an undriven structure.
 """
 
+from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import (
     acceleration_sweep,
@@ -14,8 +15,8 @@ from flexmb.jain.kinematics import (
     pose_sweep,
     velocity_sweep,
 )
-from flexmb.jain.sweeps import body_inertia, force_to_parent
 from flexmb.kernel import helper
+from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia, shift_force
 from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, store3, times, vec3
 

@@ -8,9 +8,6 @@ enters as acceleration -g of the ground.
 from flexmb.coordinates import hinge_forces
 from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
 from flexmb.jain.explicit import cholesky
-from flexmb.jain.explicit import force_to_parent as force_to_parent
-from flexmb.jain.explicit import inertia_to_parent as inertia_to_parent
-from flexmb.jain.explicit import refer_to_hinge as refer_to_hinge
 from flexmb.jain.forces import elastic_forces, node_loads, wheel_forces
 from flexmb.jain.kinematics import (
     inboard_acceleration,
@@ -22,7 +19,6 @@ from flexmb.jain.kinematics import (
 )
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations, to_parent
 from flexmb.kernel import helper
-from flexmb.levels.body import body_inertia as body_inertia
 from flexmb.levels.range import is_out_of_range
 from flexmb.spatial.inertia import (
     add_inertia,
@@ -230,6 +226,3 @@ def wheel_acceleration(c, w, k, i):
     axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
     alpha, _ = port_acceleration(c, w, k, port)
     w.speed[j].acceleration = w.speed[j].applied / c.wheel[i].axial - dot(axis, alpha)
-
-
-_outward = outward
