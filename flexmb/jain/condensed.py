@@ -160,7 +160,7 @@ def _to_orthonormal(c, w, k):
     row = c.compliance[c.body[k].reduced]
     for n in range(c.body[k].modes - 1, -1, -1):
         s = 0.0
-        for i in range(n + 1):
+        for i in range(n if c.body[k].orthogonal else 0, n + 1):
             s += row[n, i] * w.mode[k, i].zf
         w.mode[k, n].zf = s
 
@@ -203,7 +203,7 @@ def modal_accelerations(c, w, k, alpha, a):
         w.mode[k, n].etadd = -s
     for n in range(c.body[k].modes):
         s = 0.0
-        for i in range(n, c.body[k].modes):
+        for i in range(n, n + 1 if c.body[k].orthogonal else c.body[k].modes):
             s += c.compliance[r, i, n] * w.mode[k, i].etadd
         w.mode[k, n].etadd = s
         w.speed[c.body[k].etad_index + n].acceleration = s

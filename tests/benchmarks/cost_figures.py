@@ -75,7 +75,7 @@ def of_modes(axes: tuple[Axes, Axes]) -> None:
     left.set_title("Operations, ten bodies")
     right.set_title("How much more composite bodies cost")
     for panel in axes:
-        panel.legend(fontsize=8)
+        panel.legend(fontsize=8, loc="upper left")
 
 
 def of_bodies(axes: tuple[Axes, Axes]) -> None:
@@ -89,7 +89,7 @@ def of_bodies(axes: tuple[Axes, Axes]) -> None:
             panel.loglog(BODIES[: len(times)], times, f"{colour}o", ms=4, label=f"{route}, measured")
         panel.set(xlabel="bodies in a chain", ylabel="cost per body, articulated body of ten = 1")
         panel.set_title(f"{modes} modes each" if modes else "Rigid bodies")
-        panel.legend(fontsize=8)
+        panel.legend(fontsize=8, loc="upper left")
 
 
 def _relative_time(route: str, bodies: int, modes: int) -> float:

@@ -9,10 +9,12 @@ import pytest
 import flexmb
 from flexmb.counting import Operations, count
 from flexmb.jain import cost
-from flexmb.jain.forces import elastic_forces
-from flexmb.levels.range import is_out_of_range
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.schema import ModalNode, Scene
 from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.benchmarks.routes import articulated, composite_body
+from tests.trees import matrix
 
 
 @pytest.mark.parametrize("n", range(21))
@@ -163,21 +165,30 @@ def test_composite_bodies_agree_with_the_paper_in_the_highest_terms():
         assert np.any(np.diff(difference, 2, axis=0))
 
 
-# Beams of 4 to 8 modes: their tips move along and turn about the same axes, so that Omega keeps its rank.
-SAME_RANK = range(4, 9)
-
-
-@pytest.mark.parametrize(("elimination", "expected"), [("woodbury", 2)])
-def test_degree_of_each_elimination_in_modes(elimination, expected):
-    """(63) by (B3); less elastic forces and check of range, which are quadratic in modes."""
-    totals = []
-    for n in SAME_RANK:
-        system = flexmb.compile(flexible_chain(3, n, "ruthless"), elimination)
-        assert set(system.elimination.values()) == {elimination}
-        constants, workspace = system.recursion_constants, system.recursion_workspace()
-        quadratic = sum(
-            (count(kernel, constants, workspace, k).operations for kernel in (elastic_forces, is_out_of_range)
-             for k in range(3)), Operations(),
+def particles(bodies: int, modes: int) -> Scene:
+    """Chain of clamped bodies whose mode n moves particle n alone: modal masses and stiffness are exactly diagonal."""
+    rng = np.random.default_rng(modes)
+    scene = SceneBuilder("particles", gravity=(0.0, 0.0, -9.81))
+    for k in range(bodies):
+        shapes = np.eye(modes)[:, None] * rng.normal(size=(modes, 3, 1))
+        points = inertia_points(rng.uniform(0.5, 1.0, modes), rng.uniform(-1.0, 1.0, (modes, 3)), shapes)
+        tip = ModalNode(
+            name="tip", position_m=(1.0, 0.0, 0.0), translation_modes=matrix(rng.normal(size=(modes, 3))),
+            rotation_modes=matrix(rng.normal(size=(modes, 3))),
         )  # fmt: skip
-        totals.append((articulated(system).operations() - quadratic).total)
-    assert degree(totals) == expected
+        scene.modal_body(f"b{k}", points=points, stiffness=np.eye(modes), damping=np.eye(modes), level="ruthless",
+                         boundary="clamped-free", nodes=[tip])  # fmt: skip
+        at = ("ground", {}) if k == 0 else (f"b{k - 1}", {"parent_node": "tip"})
+        scene.revolute(f"h{k}", at[0], f"b{k}", axis=(0.0, 0.6, 0.8), angle=0.3, rate=0.2, **at[1])
+    return scene.scene()
+
+
+@pytest.mark.parametrize(("elimination", "expected"), [("explicit", 3), ("woodbury", 2), ("condensed", 1)])
+def test_degree_of_each_elimination_in_modes(elimination, expected):
+    """(63), (64) by a factor of D_f, by (B3), and condensed: with modal masses and stiffness that are diagonal.
+
+    From 6 modes on, when the tip moves in all directions and Omega has its full rank.
+    """
+    systems = [flexmb.compile(particles(3, n), elimination) for n in range(6, 13)]
+    assert all(set(system.elimination.values()) == {elimination} for system in systems)
+    assert degree([articulated(system).operations().total for system in systems]) == expected
