@@ -6,14 +6,11 @@ symmetric matrix, and the constraint loads, which do no work in any motion S des
 (138), only q' and h' stand on the left.
 """
 
-from math import sqrt
-
 from flexmb.frisch.tables import ONE_SIDED
 from flexmb.kernel import helper
+from flexmb.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.vector import store3, vec3
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
-
-SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
 
 
 @helper
@@ -93,10 +90,12 @@ def solve(c, w):
             w.factor[a, b] = w.M[i, w.free[b]]
         for b in range(free, nu):
             w.solution[a] -= w.M[i, w.free[b]] * w.speed[w.free[b]].acceleration
-    failed = _eliminate(w, free) if one_sided else _cholesky(w, free)
+    failed = _eliminate(w, free) if one_sided else cholesky_rows(w.factor, free)
     if failed >= 0:
         w.fault[0] = c.column[w.free[failed]].body
         return NOT_POSITIVE_DEFINITE
+    if not one_sided:
+        cholesky_solve(w.factor, w.solution, free)
     for a in range(free):
         w.speed[w.free[a]].acceleration = w.solution[a]
     for b in range(free, nu):
@@ -149,42 +148,6 @@ def _axpy(s, x, y):
     if s != 0.0:
         for r in range(y.shape[0]):
             y[r] += s * x[r]
-
-
-@helper
-def _cholesky(w, n):
-    """Solve with w.factor = U' U, row by row; the place of a pivot that is not positive to round-off, else -1."""
-    U, x = w.factor, w.solution
-    for m in range(n):
-        row, floor = U[m, m:n], SINGULAR * U[m, m]
-        j = 0
-        while j + 3 < m:  # four rows above at a time: the row stays in registers
-            _axpy4(U[j : j + 4, m], U[j, m:n], U[j + 1, m:n], U[j + 2, m:n], U[j + 3, m:n], row)
-            j += 4
-        while j < m:
-            _axpy(-U[j, m], U[j, m:n], row)
-            j += 1
-        if not row[0] > floor:
-            return m
-        d = 1.0 / sqrt(row[0])
-        for i in range(row.shape[0]):
-            row[i] *= d
-        for j in range(m):
-            x[m] -= U[j, m] * x[j]
-        x[m] *= d
-    for m in range(n - 1, -1, -1):
-        for i in range(m + 1, n):
-            x[m] -= U[m, i] * x[i]
-        x[m] /= U[m, m]
-    return -1
-
-
-@helper
-def _axpy4(s, a, b, c, d, y):
-    """y -= s0 a + s1 b + s2 c + s3 d."""
-    s0, s1, s2, s3 = s[0], s[1], s[2], s[3]
-    for i in range(y.shape[0]):
-        y[i] -= s0 * a[i] + s1 * b[i] + s2 * c[i] + s3 * d[i]
 
 
 @helper
