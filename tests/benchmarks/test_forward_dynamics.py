@@ -8,7 +8,7 @@ import pytest
 
 import flexmb as fm
 from crosscheck.engines.links import links
-from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
+from tests.benchmarks.rivals import interleaved, record, rigid_chain
 
 
 def evaluation(scene):
@@ -54,14 +54,3 @@ def test_cost_of_each_body(benchmark, bodies):
     native = evaluation(rigid_chain(bodies))
     record(benchmark, interleaved(native)[0])
     benchmark.pedantic(native, rounds=20, iterations=10)
-
-
-@pytest.mark.parametrize("level", ["ruthless", "full"])
-@pytest.mark.parametrize("modes", [2, 5, 10])
-def test_flexible_chain(benchmark, modes, level):
-    """Recursion against mass matrix and Cholesky of the same system."""
-    system = fm.compile(flexible_chain(10, modes, level))
-    state = system.initial_state
-    times = interleaved(lambda: system.accelerations(state), lambda: system.accelerations(state, algorithm="composite"))
-    record(benchmark, times[0], composite=times[1])
-    benchmark.pedantic(lambda: system.accelerations(state), rounds=20, iterations=10)
