@@ -36,14 +36,15 @@ def chain(bodies: int, modes: int, ends: Ends) -> fm.System:
 def operations(route: str, bodies: int, modes: int, ends: Ends) -> int:
     """Executed by one evaluation, from counts of small chains: tests/flexmb/jain/test_cost.py holds the polynomials.
 
-    Articulated bodies are linear in bodies, composite ones cubic in bodies and in modes.
+    Articulated bodies are linear in bodies, composite ones cubic in pairs of bodies and in modes.
     """
     if route == "articulated":
         return _continued([_counted(route, n, modes, ends) for n in (2, 3)], bodies - 2)
-    if modes == 0:
-        return _continued([_counted(route, n, 0, ends) for n in range(2, 6)], bodies - 2)
-    by_modes = [_continued([_counted(route, n, m, ends) for n in range(2, 6)], bodies - 2) for m in range(1, 5)]
-    return _continued(by_modes, modes - 1)
+    by_modes = [
+        _continued([_counted(route, n, m, ends) for n in range(2, 9, 2)], bodies // 2 - 1)
+        for m in (range(1, 5) if modes else [0])
+    ]
+    return _continued(by_modes, max(modes - 1, 0))
 
 
 @cache
