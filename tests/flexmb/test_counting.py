@@ -9,7 +9,7 @@ import flexmb
 from flexmb import dynamics
 from flexmb.counting import Counted, Operations, count
 from flexmb.functions import evaluate
-from flexmb.jain.sweeps import cholesky
+from flexmb.jain.explicit import cholesky
 from flexmb.spatial.inertia import inertia_times, outer_inertia, shift_force
 from flexmb.spatial.rotation import rotation_z
 from flexmb.spatial.vector import axpy, cross, matmul, sym_times, times, transpose
