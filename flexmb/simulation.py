@@ -150,7 +150,8 @@ def _route(system: System, algorithm: Algorithm, stabilise: float) -> _Route:
             system.constants, system.composite_workspace, composite_runs.run_dop853, composite_runs.run_rk4
         )
     if algorithm not in ERRATA:
-        raise ValueError(f"algorithm is {algorithm!r}: runs use one of {', '.join(map(repr, get_args(Algorithm)))}")
+        routes = [each for each in get_args(Algorithm) if each != "unsplit"]  # a reference for single states
+        raise ValueError(f"algorithm is {algorithm!r}: runs use one of {', '.join(map(repr, routes))}")
     nested = system.nested(algorithm)
     return _Route(nested.constants, nested.workspace, nested_propagation.run_dop853, nested_propagation.run_rk4)
 
