@@ -61,10 +61,12 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 
 
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
-    """Whether condensing body k was measured to be faster than a Cholesky factor of D_f: tests/benchmarks.
+    """Whether condensing body k is taken to be faster than a Cholesky factor of D_f.
 
-    With constant tables from 10 modes a node on; with tables made anew at each evaluation later, and only where the
-    modal masses are diagonal. A tip counts as one node: it would gain earlier, but not what compiling costs.
+    Measured (tests/benchmarks/test_elimination.py): chains of ruthless clamped beams, one node each, gain from 9 to 10
+    modes on; tables made anew at each evaluation with full modal masses never gain up to 40 modes. Estimated from
+    operation counts, not measured: the threshold with diagonal modal masses, and its growth with the nodes. A tip
+    counts as one node: it would gain earlier, but not what compiling costs.
     """
     body = c.body[k]
     constant = body["level"] == a.RUTHLESS
