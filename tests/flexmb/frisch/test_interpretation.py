@@ -29,7 +29,7 @@ def over_elements(body: FlexibleModel, a, adot, w, path, frame_rate) -> np.ndarr
     return total
 
 
-@pytest.mark.parametrize(("body", "share"), zip(BODIES, [0.016, 0.145, 0.071, 0.0], strict=True))
+@pytest.mark.parametrize(("body", "share"), list(zip(BODIES, [0.016, 0.145, 0.071, 0.0], strict=True)))
 def test_terms_of_rates_over_elements(body, share):
     """(183), (185): the torque on an element is w x J (w + theta'); the print's w x J theta' misses w.J_n.w.
 

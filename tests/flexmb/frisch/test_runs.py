@@ -63,10 +63,11 @@ def test_print_runs_away_with_a_flexible_body_inside():
     assert "stopped at" in printed.message
 
 
-def test_composite_is_for_points_not_for_runs():
+def test_a_check_of_one_state_is_not_for_runs():
+    """The unsplit recursion is there to be compared with at a state; a run names what it can be done by."""
     system = flexmb.compile(scene("three-wheel gyrostat with a flexible appendage"))
     with pytest.raises(ValueError, match="frisch"):
-        flexmb.simulate(system, 1.0, algorithm="composite")
+        flexmb.simulate(system, 1.0, algorithm="unsplit")
 
 
 def test_print_refuses_modes_that_are_not_clamped():
