@@ -120,9 +120,9 @@ def wheel_terms(c, w, k, i):
     store3(wheel.rate, 0, rate)
     at = c.column[c.wheel[i].u_index].start
     store3(w.S, at, axis)  # partition h of (133)
-    if c.wheel_entry[i].entry >= 0:
+    if c.wheel_entry[i] >= 0:
         for n in range(c.body[k].modes):  # partition phiR_W (121) of (126)
-            start = c.column[c.body[k].etad_index + n].start + c.wheel_entry[i].entry
+            start = c.column[c.body[k].etad_index + n].start + c.wheel_entry[i]
             store3(w.S, start, vec3(w.port_mode[c.wheel[i].port, n].W, 0))
     store6(w.nest[k].inertia, 0, sym_add(sym6(w.nest[k].inertia, 0), inertia))
     add3(w.nest[k].torque, 0, scale(-1.0, rate))

@@ -96,14 +96,14 @@ def _six(tensors: a.Real) -> a.Real:
 
 def _places(
     c: a.Constants, element: a.Record, null_partitions: bool
-) -> tuple[a.Record, a.Index, a.Record]:
+) -> tuple[a.Record, a.Index, a.Index]:
     """Columns of S and their expanded rows; completes `element`."""
     bodies, wheels = len(c.body), len(c.wheel)
     modes = int(np.sum(c.body["modes"]))
     hinges = 3 * bodies + 3 * wheels + modes
     element["mode_row"] = 3 * bodies + 3 * wheels + np.cumsum(c.body["modes"]) - c.body["modes"]
     element["inboard_entry"] = element["outboard_entry"] = -1
-    wheel_entry = np.zeros(wheels, t.WHEEL_ENTRY)
+    wheel_entry = np.full(wheels, -1, np.int64)
     own: dict[int, list[int]] = {}
     modal: dict[int, list[int]] = {}
     body_of = np.zeros(len(c.speed), np.int64)
@@ -126,7 +126,7 @@ def _places(
             own[int(c.wheel["u_index"][i])], modal[int(c.wheel["u_index"][i])] = wheel_rows, []
             body_of[c.wheel["u_index"][i]] = k
             turns = null_partitions or np.any(c.port_mode["rotation"][c.wheel["port"][i]])
-            wheel_entry[i] = (k, 1 + len(moved) if turns else -1)
+            wheel_entry[i] = 1 + len(moved) if turns else -1
             moved = moved + (wheel_rows if turns else [])
         for n in range(body["modes"]):
             j = int(body["etad_index"]) + n

@@ -42,7 +42,6 @@ ELEMENT_PAIR = _record(  # modes m, n of a body
     ("A1", _F, (3,)),  # dA_n/da_m
     ("Q1", _F, (3,)),  # dQ_n/da_m
 )
-WHEEL_ENTRY = _record(("body", _I), ("entry", _I))  # its body; place of its rows in a column of the body's modes, or -1
 SPEED_COLUMN = _record(  # a column of S: its entries start .. stop
     ("start", _I),
     ("own", _I),  # entries start .. own are those of (133), own .. stop those of the modal partitions of (126)
@@ -62,7 +61,7 @@ class NestedConstants(Constants):
     element_mode: Record  # (N,m) ELEMENT_MODE
     element_pair: Record  # (N,m,m) ELEMENT_PAIR, first index m, second n
     M1_slope: Real  # (B,m,m,m) dM1_mn/da_k as [k,m,n], for the bodies that have one
-    wheel_entry: Record  # (W,) WHEEL_ENTRY
+    wheel_entry: Index  # (W,) place of a wheel's rows in a column of its body's modes; -1 where its node is at rest
     column: Record  # (nu,) SPEED_COLUMN
     entry_row: Index  # (nnz,) expanded row of each entry of S
     printed: Index  # (5,) 1 where the defect of the print is kept
