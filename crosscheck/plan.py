@@ -10,7 +10,6 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck import surrogate
 from crosscheck.case import Control, Refined, RunFile, Variant
 from crosscheck.controls import mutate
 from crosscheck.drawing import draw, levels
@@ -21,6 +20,7 @@ from crosscheck.selection import select
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.surrogate import finite_segments, modal_points, rigidify
 
 Array = NDArray[np.float64]
 MAIN, REFINED = "main", "refined"
@@ -86,11 +86,11 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         scene = _on_beams(scene, elements=refined.elements)
     match variant.transform:
         case "rigidify":
-            return surrogate.rigidify(scene)
+            return rigidify(scene)
         case "modal_points":
-            return surrogate.modal_points(scene)
+            return modal_points(scene)
         case "segments":
-            return surrogate.finite_segments(scene, body=variant.segment_body, n=variant.segments)
+            return finite_segments(scene, body=variant.segment_body, n=variant.segments)
     return scene
 
 

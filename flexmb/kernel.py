@@ -28,7 +28,7 @@ _SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", 
 
 
 # Folders whose sources no kernel can depend on (held by a test): editing them recompiles nothing.
-WITHOUT_KERNELS = ("scene", "modal", "dense")
+WITHOUT_KERNELS = ("scene", "modal", "dense", "surrogate")
 
 
 _PACKAGE = Path(__file__).parent

@@ -19,7 +19,6 @@ from crosscheck.engines.conventions import (
     offset_frame,
     outboard_frame,
 )
-from crosscheck.engines.lumping import Inertia, combine, inertia_of, rigid_equivalent
 from flexmb.scene.bodies import ZERO
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
@@ -46,6 +45,7 @@ from flexmb.scene.schema import (
     Wheel,
 )
 from flexmb.scene.tree import GROUND, coordinates, ordered
+from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
 
 Array = NDArray[np.float64]
 Kind = Literal["body", "wheel", "point mass"]

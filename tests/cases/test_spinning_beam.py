@@ -16,11 +16,11 @@ from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
 from crosscheck.library import load_case
 from crosscheck.report import write_all
-from crosscheck.surrogate import finite_segments
 from crosscheck.sweep import sweep
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
 from flexmb.simulation import simulate
+from flexmb.surrogate import finite_segments
 from flexmb.system import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "spinning_beam"

@@ -15,7 +15,6 @@ from crosscheck.engines.exudyn.joints import Link, Port
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, Motion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
-from crosscheck.engines.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Cylindrical,
@@ -32,6 +31,7 @@ from flexmb.scene.hinges import (
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
+from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 
 X, Y, Z = np.eye(3)
 CROSS_ARM = 0.01

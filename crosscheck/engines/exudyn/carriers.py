@@ -19,7 +19,7 @@ from crosscheck.engines.exudyn.library import load, matrix
 from crosscheck.engines.exudyn.modal import ModalIntegrals, gravity_force
 from crosscheck.engines.exudyn.motion import Motion
 from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, turn_and_rate_map
-from crosscheck.engines.lumping import Inertia, steiner
+from flexmb.surrogate.lumping import Inertia, steiner
 
 
 @dataclass(frozen=True)

@@ -13,10 +13,10 @@ from crosscheck.engines.exudyn import ExudynEngine
 from crosscheck.engines.exudyn.model import ExudynModel
 from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.randomise import randomise
-from crosscheck.surrogate import modal_points
 from flexmb.scene import schema as s
 from flexmb.scene.functions import Constant, Sine, SpinUp
 from flexmb.scene.modal_data import modal_arrays
+from flexmb.surrogate import modal_points
 
 EVERY_FAMILY = ("axial", "torsion", "bending_y", "bending_z")
 

@@ -16,8 +16,8 @@ import flexmb
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, MarkerSnapshot, Run, Snapshot
 from crosscheck.engines.randomise import randomise
 from crosscheck.engines.registry import engine
-from crosscheck.surrogate import finite_segments, modal_points, rigidify
 from flexmb.scene import schema as s
+from flexmb.surrogate import finite_segments, modal_points, rigidify
 from tests import trees
 
 CASES = sorted((Path(__file__).parents[3] / "cases").glob("*/*/scene.toml"))

@@ -67,7 +67,7 @@ def in_exudyn(scene: s.Scene, markers: dict[str, flexmb.system.MarkerMotion], *,
     """The scene of rigid bodies, revolute and ball joints at the state of its markers; `closed` with its closures."""
     from crosscheck.engines.exudyn.carriers import Workshop
     from crosscheck.engines.exudyn.motion import Motion
-    from crosscheck.engines.lumping import Inertia
+    from flexmb.surrogate.lumping import Inertia
 
     loop = Loop(Workshop(np.array(scene.gravity_m_s2), explicit=False))
     for body in scene.bodies:

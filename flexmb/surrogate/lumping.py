@@ -116,9 +116,10 @@ def rigid_equivalent(body: Body) -> RigidBody:
 
 def rigid_body(name: str, inertia: Inertia, nodes: tuple[Node, ...]) -> RigidBody:
     """A `RigidBody` from arrays."""
+    x, y, z = inertia.inertia
     return RigidBody(
-        name=name, mass_kg=float(inertia.mass), com_m=_vector(inertia.com),
-        inertia_kg_m2=tuple(_vector(row) for row in inertia.inertia), nodes=nodes,
+        name=name, mass_kg=float(inertia.mass), com_m=vector(inertia.com),
+        inertia_kg_m2=(vector(x), vector(y), vector(z)), nodes=nodes,
     )  # fmt: skip
 
 
@@ -127,6 +128,7 @@ def inertia_of(body: RigidBody) -> Inertia:
     return Inertia(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2))
 
 
-def _vector(values: Array) -> Vector:
+def vector(values: Array) -> Vector:
+    """Three numbers of an array as a scene has them."""
     x, y, z = (float(value) for value in values)
-    return (x, y, z)
+    return x, y, z

@@ -1,41 +1,30 @@
-"""Scene to scene: flexible bodies as chains of rigid segments, as rigid bodies, or as raw points and modes.
-
-A surrogate is given to every engine alike, so that lumping is never mistaken for a difference between engines.
-"""
+"""Beams as chains of rigid segments joined by sprung hinges."""
 
 from __future__ import annotations
 
 import dataclasses
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
-from msgspec.structs import replace
-from numpy.typing import NDArray
 
-from crosscheck.engines.lumping import beam_piece, quadrature, rigid_body, rigid_equivalent, section_properties
 from flexmb.modal import flexible_model
-from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import (
     AngularCoordinate,
     BeamBody,
-    Body,
     Gimbal,
     Hinge,
     LinearCoordinate,
-    ModalBody,
-    ModalNode,
     Node,
     Prismatic,
     Revolute,
     RigidBody,
     Scene,
-    SidBody,
     Vector,
 )
 from flexmb.scene.tree import rest_frames
-
-Array = NDArray[np.float64]
+from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at
+from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
 _X: Vector = (1.0, 0.0, 0.0)
 # A family of motion that turns sections: axis letter, its vector, station stiffness. Order of the successive turns.
@@ -66,78 +55,23 @@ def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
     hinges `<beam>.h01` ... (slides `<beam>.a01` ...) from the root. Modal damping becomes proportional to stiffness,
     exact for the first mode. Raises ValueError for what segments cannot carry: Timoshenko shear, initial modal states.
     """
-    beams = [each for each in scene.bodies if isinstance(each, BeamBody) and body in (None, each.name)]
-    if body is not None and not beams:
-        raise ValueError(f'scene "{scene.name}" has no beam "{body}"')
-    for beam in beams:
+    for beam in beams_named(scene, body):
         scene = _segmented(scene, beam, n)
     return scene
-
-
-def rigidify(scene: Scene) -> Scene:
-    """Every flexible body replaced by the rigid body with the same inertia and nodes; modal states are dropped."""
-    bodies = tuple(each if isinstance(each, SidBody) else rigid_equivalent(each) for each in scene.bodies)
-    return replace(scene, bodies=bodies, modal_states=())
-
-
-def modal_points(scene: Scene) -> Scene:
-    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same."""
-    return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
-
-
-def _modal(beam: BeamBody) -> ModalBody:
-    model = flexible_model(beam)
-    quaternions = {name: frame.quaternion for name, frame in rest_frames(beam).items()}
-    free = beam.modes.boundary == "free-free"
-    nodes = tuple(
-        ModalNode(
-            name=name, position_m=_vector(node.position), quaternion=quaternions[name],
-            translation_modes=tuple(map(_vector, node.translation.T)),
-            rotation_modes=tuple(map(_vector, node.rotation_modes.T)),
-        )
-        for name, node in model.nodes.items()
-        if free or name != "origin"
-    )  # fmt: skip
-    return ModalBody(
-        name=beam.name, nodes=nodes, boundary=beam.modes.boundary, level=beam.level,
-        points=inertia_points(
-            model.mass, model.position, model.translation, model.rotation, model.inertia, model.com_offset
-        ),
-        stiffness=tuple(map(_floats, model.stiffness)), damping=tuple(map(_floats, model.damping)),
-    )  # fmt: skip
 
 
 def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
     if beam.theory == "timoshenko":
         raise ValueError(f'beam "{beam.name}": finite segments carry no shear; use theory "euler-bernoulli"')
-    if any(state.body == beam.name for state in scene.modal_states):
-        raise ValueError(f'beam "{beam.name}": finite segments start undeformed; leave out its modal state')
     cuts = _cuts(beam, n)
     ends = [0.0, *(cut.x for cut in cuts), beam.length_m]
-    places = {name: (_piece_at(ends, frame.position[0]), name) for name, frame in rest_frames(beam).items()}
-    inboard = next(hinge for hinge in scene.hinges if hinge.child == beam.name)
-    root = places[inboard.child_node][0]
-
-    def moved(item: Any, body_key: str, node_key: str) -> Any:
-        """The same hinge, wheel, load ... on the segment that carries its node."""
-        if getattr(item, body_key) != beam.name:
-            return item
-        piece, node = places[getattr(item, node_key)]
-        return replace(item, **{body_key: _segment_name(beam, piece), node_key: node})
-
-    hinges = []
-    for hinge in scene.hinges:
-        hinges.append(moved(moved(hinge, "child", "child_node"), "parent", "parent_node"))
-        if hinge is inboard:
-            hinges += _hinges(beam, cuts, ends, root)
-    bodies: list[Body] = []
-    for each in scene.bodies:
-        bodies += _segments(beam, ends, places) if each is beam else [each]
-    on_bodies = {
-        key: tuple(moved(item, "body", "node") for item in getattr(scene, key))
-        for key in ("wheels", "point_masses", "loads", "markers")
-    }
-    return replace(scene, bodies=tuple(bodies), hinges=tuple(hinges), **on_bodies)
+    places = {}
+    for name, frame in rest_frames(beam).items():
+        piece = piece_at(ends, frame.position[0])
+        places[name] = Place(piece, _segment_name(beam, piece), name)
+    root = places[inboard_hinge(scene, beam).child_node].piece
+    joints = outward(_hinges(beam, cuts, ends, root), root)
+    return in_pieces(scene, beam, _segments(beam, ends, places), joints, places)
 
 
 def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
@@ -160,7 +94,7 @@ def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
     return sorted(cuts, key=lambda cut: cut.x)
 
 
-def _segments(beam: BeamBody, ends: list[float], places: dict[str, tuple[int, str]]) -> list[RigidBody]:
+def _segments(beam: BeamBody, ends: list[float], places: dict[str, Place]) -> list[RigidBody]:
     """Rigid pieces between the cuts; each frame at its root end with the beam's axes."""
     frames = rest_frames(beam)
     segments = []
@@ -169,15 +103,15 @@ def _segments(beam: BeamBody, ends: list[float], places: dict[str, tuple[int, st
         own = dataclasses.replace(inertia, com=inertia.com - [start, 0.0, 0.0])
         nodes = tuple(
             Node(name=name, position_m=(frames[name].position[0] - start, 0.0, 0.0), quaternion=frames[name].quaternion)
-            for name, (where, _) in places.items()
-            if where == piece and name != "origin"
+            for name, place in places.items()
+            if place.piece == piece and name != "origin"
         )
         segments.append(rigid_body(_segment_name(beam, piece), own, nodes))
     return segments
 
 
 def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> list[Hinge]:
-    """The hinges of the chain, outward from the segment `root` that carries the beam's inboard hinge."""
+    """The hinges along the beam; `root` is the segment that carries the beam's inboard hinge."""
     lag = _stiffness_damping(beam)
     count = {"turn": 0, "axial": 0}
     hinges = []
@@ -191,8 +125,7 @@ def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> l
         else:
             placement = {"name": name, "parent": outer, "child": inner, "child_position_m": at_end}
         hinges.append(_slide(beam, cut, lag, placement) if cut.kind == "axial" else _turn(beam, cut, lag, placement))
-    # From the root outward on the tip side, then on the root side: parents come before their children.
-    return hinges[root:] + hinges[:root][::-1]
+    return hinges
 
 
 def _slide(beam: BeamBody, cut: _Cut, lag: float, placement: dict) -> Hinge:
@@ -231,17 +164,3 @@ def _stiffness_damping(beam: BeamBody) -> float:
 
 def _segment_name(beam: BeamBody, piece: int) -> str:
     return f"{beam.name}.seg{piece:02d}"
-
-
-def _piece_at(ends: list[float], x: float) -> int:
-    """The piece that holds x; on a cut, the one toward the tip."""
-    return min(int(np.searchsorted(ends, x, side="right")) - 1, len(ends) - 2)
-
-
-def _floats(values: Array) -> tuple[float, ...]:
-    return tuple(float(value) for value in values)
-
-
-def _vector(values: Array) -> Vector:
-    x, y, z = (float(value) for value in values)
-    return x, y, z

@@ -5,15 +5,15 @@ import pytest
 from msgspec.structs import replace
 
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.engines.lumping import beam_piece, combine, inertia_of, rigid_equivalent
 from crosscheck.engines.registry import engines
-from crosscheck.surrogate import finite_segments, modal_points, rigidify
 from flexmb.modal import flexible_model
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Constant
-from flexmb.scene.schema import BeamStation, Gimbal, Modes, Prismatic, Revolute, TipMass
+from flexmb.scene.schema import BeamStation, Closure, Gimbal, Modes, Prismatic, Revolute, TipMass
 from flexmb.scene.tree import node_frame, ordered
+from flexmb.surrogate import finite_segments, modal_points, rigidify
+from flexmb.surrogate.lumping import beam_piece, combine, inertia_of, rigid_equivalent
 
 LENGTH = 2.0
 SECTION = BeamStation(
@@ -75,6 +75,12 @@ def test_segments_make_a_sound_scene_with_every_item_at_its_place(families, chil
     assert len(ordered(chain)) == len(chain.bodies)
     for name, position in rest_positions(whole).items():
         assert rest_positions(chain)[name] == pytest.approx(position, abs=1e-15 * LENGTH * 10)
+
+
+def test_closures_go_with_their_nodes():
+    closure = Closure(name="tie", type="spherical", body_a="boom", node_a="middle", body_b="boom", node_b="tip")
+    (moved,) = finite_segments(replace(beam_scene(), closures=(closure,)), "boom", 4).closures
+    assert (moved.body_a, moved.node_a, moved.body_b, moved.node_b) == ("boom.seg02", "middle", "boom.seg04", "tip")
 
 
 def test_names_and_kinds_of_hinges():
@@ -173,7 +179,9 @@ def test_damping_is_that_of_the_first_mode():
 
 
 def test_refusals():
-    with pytest.raises(ValueError, match="no beam"):
+    with pytest.raises(ValueError, match='no beam "rod"'):
+        finite_segments(beam_scene(), "rod", 4)
+    with pytest.raises(ValueError, match='"panel" is no beam .kind "rigid"'):
         finite_segments(beam_scene(), "panel", 4)
     with pytest.raises(ValueError, match="at least 2"):
         finite_segments(beam_scene(), "boom", 1)

@@ -1,0 +1,46 @@
+"""Beams as the raw inertia points and modes that they are made of."""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from flexmb.modal import flexible_model
+from flexmb.scene.modal_data import inertia_points
+from flexmb.scene.schema import BeamBody, ModalBody, ModalNode, Scene
+from flexmb.scene.tree import rest_frames
+from flexmb.surrogate.lumping import vector
+
+Array = NDArray[np.float64]
+
+
+def modal_points(scene: Scene) -> Scene:
+    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same."""
+    return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
+
+
+def _modal(beam: BeamBody) -> ModalBody:
+    model = flexible_model(beam)
+    quaternions = {name: frame.quaternion for name, frame in rest_frames(beam).items()}
+    free = beam.modes.boundary == "free-free"
+    nodes = tuple(
+        ModalNode(
+            name=name, position_m=vector(node.position), quaternion=quaternions[name],
+            translation_modes=tuple(map(vector, node.translation.T)),
+            rotation_modes=tuple(map(vector, node.rotation_modes.T)),
+        )
+        for name, node in model.nodes.items()
+        if free or name != "origin"
+    )  # fmt: skip
+    return ModalBody(
+        name=beam.name, nodes=nodes, boundary=beam.modes.boundary, level=beam.level,
+        points=inertia_points(
+            model.mass, model.position, model.translation, model.rotation, model.inertia, model.com_offset
+        ),
+        stiffness=tuple(map(_floats, model.stiffness)), damping=tuple(map(_floats, model.damping)),
+    )  # fmt: skip
+
+
+def _floats(values: Array) -> tuple[float, ...]:
+    return tuple(float(value) for value in values)
