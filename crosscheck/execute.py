@@ -10,10 +10,10 @@ from pathlib import Path
 
 import msgspec
 
-from crosscheck.channels import channels_of
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
 from crosscheck.plan import Job
 from crosscheck.records import RunRecord, RunStatus, pack
+from flexmb.channels import channels_of
 
 Emit = Callable[[RunRecord | str], None]
 FULLY_STORED = 3  # the finest efforts, which the uncertainty needs in every channel

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from crosscheck.case import Comparison, Conservation, Control, Side
-from crosscheck.channels import matches
 from crosscheck.results import CaseResults, Result
 from crosscheck.verdict import Finding, Status, Verdict, compare, conserve
+from flexmb.channels import matches
 
 MISSING: tuple[Status, ...] = ("did not run", "refused", "failed")
 MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}

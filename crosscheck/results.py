@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.channels import family, magnitude, signal_range
 from crosscheck.records import CaseRecord, Environment, Packed, Record, RunRecord, unpack
 from crosscheck.uncertainty import Rung, Uncertainty, estimate, spatial
 from crosscheck.verdict import Signal
+from flexmb.channels import family, magnitude, signal_range
 
 Array = NDArray[np.float64]
 Key = tuple[str, str, str]  # variant, engine, role

@@ -33,7 +33,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from crosscheck.channels import distance
+from flexmb.channels import distance
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.channels import distance, family, signal_range
 from crosscheck.uncertainty import Uncertainty
+from flexmb.channels import distance, family, signal_range
 
 Array = NDArray[np.float64]
 Status = Literal["agree", "differ", "unresolved", "refused", "failed", "did not run"]

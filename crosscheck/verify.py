@@ -12,7 +12,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.case import RunFile, Variant
-from crosscheck.channels import matches, signal_range
 from crosscheck.execute import execute
 from crosscheck.library import Case
 from crosscheck.plan import MAIN, plan, sample_times, variant_scene
@@ -22,6 +21,7 @@ from crosscheck.results import Result, collect
 from crosscheck.sweep import PROVIDER
 from crosscheck.uncertainty import Rung, Uncertainty, estimate
 from crosscheck.verdict import Finding, Signal, Verdict, compare
+from flexmb.channels import matches, signal_range
 
 Array = NDArray[np.float64]
 MARKER_GROUPS = {

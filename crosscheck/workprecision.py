@@ -14,9 +14,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from crosscheck.case import Chart
-from crosscheck.channels import distance, signal_range
 from crosscheck.records import RunRecord
 from crosscheck.results import CaseResults, Result
+from flexmb.channels import distance, signal_range
 
 RESOLVED = 2.0  # estimates of U are no better than that
 

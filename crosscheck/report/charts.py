@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.channels import distance, family, matches, signal_range, unit
 from crosscheck.judge import energy_drift
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.results import CaseResults, Result
 from crosscheck.verdict import Verdict
 from crosscheck.workprecision import WorkPrecision, work_precision
+from flexmb.channels import distance, family, matches, signal_range, unit
 
 Array = NDArray[np.float64]
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}

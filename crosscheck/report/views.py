@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.channels import family
 from crosscheck.report.summary import pair
 from crosscheck.verdict import Verdict
+from flexmb.channels import family
 
 SYMBOLS = {"agree": "✓", "differ": "≠", "unresolved": "?", "refused": "⊘", "failed": "✕", "did not run": "–"}
 GRAVITY = ("did not run", "failed", "refused", "differ", "unresolved", "agree")

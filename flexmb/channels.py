@@ -2,14 +2,45 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from fnmatch import fnmatchcase
+from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.engines.contract import Trajectory
-
 Array = NDArray[np.float64]
+
+
+class Path(Protocol):
+    """A marker in World axes: position (T,3) m, quaternion (T,4) scalar first, velocity (T,6) [angular; linear]."""
+
+    @property
+    def position(self) -> Array: ...
+    @property
+    def quaternion(self) -> Array: ...
+    @property
+    def velocity(self) -> Array: ...
+
+
+class Run(Protocol):
+    """A trajectory, ours or another code's: loads (T,6), drives (T,k), energies (T,), momentum (T,6), work (T,)."""
+
+    @property
+    def markers(self) -> Mapping[str, Path]: ...
+    @property
+    def loads(self) -> Mapping[str, Array]: ...
+    @property
+    def wheel_loads(self) -> Mapping[str, Array]: ...
+    @property
+    def drives(self) -> Mapping[str, Array]: ...
+    @property
+    def energy(self) -> Mapping[str, Array]: ...
+    @property
+    def momentum(self) -> Array | None: ...
+    @property
+    def work(self) -> Array | None: ...
+
 
 UNITS = {
     ".position": "m",
@@ -23,7 +54,7 @@ UNITS = {
 }
 
 
-def channels_of(trajectory: Trajectory) -> dict[str, Array]:
+def channels_of(trajectory: Run) -> dict[str, Array]:
     """All signals of a trajectory, each (T, k), in World axes.
 
     Torque and force, angular and linear parts are channels of their own: a norm never mixes units. The total energy is
@@ -45,7 +76,7 @@ def channels_of(trajectory: Trajectory) -> dict[str, Array]:
         found["momentum.linear"] = trajectory.momentum[:, 3:]
     found |= {f"energy.{kind}": energy[:, None] for kind, energy in trajectory.energy.items()}
     if trajectory.energy:
-        found["energy.total"] = sum(energy[:, None] for energy in trajectory.energy.values())
+        found["energy.total"] = np.sum([energy[:, None] for energy in trajectory.energy.values()], axis=0)
     if trajectory.work is not None:
         found["work"] = trajectory.work[:, None]
     return found

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from crosscheck.channels import channels_of, distance, family, matches, signal_range
 from crosscheck.engines.contract import MarkerPath, Trajectory
+from flexmb.channels import channels_of, distance, family, matches, signal_range
 
 T = 5
 
