@@ -16,6 +16,7 @@ class Status(IntEnum):
     OUT_OF_RANGE = 5
     CLOSURE_SINGULAR = 6
     CLOSURE_OPEN = 7
+    NOT_CONVERGED = 8
 
     @property
     def advice(self) -> str:
@@ -50,6 +51,10 @@ _ADVICE = {
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
+    Status.NOT_CONVERGED: (
+        "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
+        'adapts its step, "radau5"'
+    ),
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
 }
 
@@ -61,3 +66,4 @@ MAX_STEPS = int(Status.MAX_STEPS)
 OUT_OF_RANGE = int(Status.OUT_OF_RANGE)
 CLOSURE_SINGULAR = int(Status.CLOSURE_SINGULAR)
 CLOSURE_OPEN = int(Status.CLOSURE_OPEN)
+NOT_CONVERGED = int(Status.NOT_CONVERGED)
