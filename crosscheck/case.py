@@ -73,7 +73,7 @@ import msgspec
 from flexmb.scene.schema import Level
 
 Expectation = Literal["agree", "differ", "unresolved", "refused", "failed"]
-Transform = Literal["none", "rigidify", "modal_points", "segments"]
+Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
 MutationKind = Literal[
     "mass",
     "inertia",
@@ -105,12 +105,14 @@ class Side(_Strict, frozen=True, kw_only=True):
 
 
 class Refined(_Strict, frozen=True, kw_only=True):
-    """A finer spatial discretisation of the same variant: more segments per beam, or more elements per beam.
+    """A finer spatial discretisation of the same variant: more segments, pieces or elements per beam.
 
-    `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment).
+    `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment
+    and for pieces of level "full").
     """
 
     segments: int | None = None
+    pieces: int | None = None
     elements: int | None = None
     order: float = 2.0
 
@@ -127,17 +129,19 @@ class EffortLadder(_Strict, frozen=True, kw_only=True):
 class Variant(_Strict, frozen=True, kw_only=True):
     """A model of the case: a scene file, a transformation, and the engines that run the result.
 
-    `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes) or "segments" (every
-    flexible body, or `segment_body` only, as `segments` rigid segments). `level` replaces the level of every flexible
-    body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
-    names them. `duration_s` and `samples` replace the case's. `note` is shown in the report.
+    `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes), "segments" (every
+    beam, or `split_body` only, as `segments` rigid segments) or "substructures" (likewise as `pieces` flexible pieces
+    welded together). `level` replaces the level of every flexible body. `engines` are compared engine by engine; those
+    in `also` run the variant too, for its charts and for what names them. `duration_s` and `samples` replace the
+    case's. `note` is shown in the report.
     """
 
     name: str
     scene: str = "scene.toml"
     transform: Transform = "none"
     segments: int | None = None
-    segment_body: str | None = None
+    pieces: int | None = None
+    split_body: str | None = None
     level: Level | None = None
     refined: Refined | None = None
     engines: tuple[str, ...]
@@ -273,9 +277,13 @@ def _check_variant(variant: Variant, where: str) -> None:
     _require(bool(variant.engines), f"{where}.engines", "name at least one engine")
     twice = set(variant.engines) & set(variant.also)
     _require(not twice, f"{where}.also", f"{', '.join(sorted(twice))} is among the engines already")
-    segmented = variant.transform == "segments"
-    given = variant.segments is not None
-    _require(segmented == given, f"{where}.segments", 'give it exactly with transform = "segments"')
+    for key, transform in (("segments", "segments"), ("pieces", "substructures")):
+        given = getattr(variant, key) is not None
+        _require(given == (variant.transform == transform), f"{where}.{key}", f'give it exactly with "{transform}"')
+        finer = variant.refined is not None and getattr(variant.refined, key) is not None
+        _require(given or not finer, f"{where}.refined.{key}", f'give it with "{transform}" only')
+    split = variant.transform in ("segments", "substructures")
+    _require(split or variant.split_body is None, f"{where}.split_body", 'give it with "segments" or "substructures"')
     for i, ladder in enumerate(variant.efforts):
         _require(len(ladder.values) >= 2, f"{where}.efforts[{i}].values", "an uncertainty needs at least two efforts")
         falling = all(a > b for a, b in zip(ladder.values, ladder.values[1:], strict=False))

@@ -20,7 +20,7 @@ from crosscheck.selection import select
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
-from flexmb.surrogate import finite_segments, modal_points, rigidify
+from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
 
 Array = NDArray[np.float64]
 MAIN, REFINED = "main", "refined"
@@ -90,13 +90,16 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "modal_points":
             return modal_points(scene)
         case "segments":
-            return finite_segments(scene, body=variant.segment_body, n=variant.segments)
+            return finite_segments(scene, variant.split_body, variant.segments)
+        case "substructures":
+            return substructured(scene, variant.split_body, variant.pieces)
     return scene
 
 
 def refine(variant: Variant, refined: Refined) -> Variant:
-    """The variant with its refined number of segments."""
-    return variant if refined.segments is None else msgspec.structs.replace(variant, segments=refined.segments)
+    """The variant with its refined number of segments or pieces."""
+    counts = {key: getattr(refined, key) for key in ("segments", "pieces") if getattr(refined, key) is not None}
+    return msgspec.structs.replace(variant, **counts)
 
 
 def sample_times(run: RunFile, variant: Variant) -> Array:

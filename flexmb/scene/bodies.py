@@ -80,7 +80,8 @@ class BeamNode(_Strict, frozen=True, kw_only=True):
 class Modes(_Strict, frozen=True, kw_only=True):
     """Which modes represent the body: the `count` lowest of the wanted families, clamped at the root or free-free.
 
-    `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes.
+    `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes; with `count` 0
+    they stand alone.
     """
 
     count: int

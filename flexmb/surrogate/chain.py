@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from msgspec.structs import replace
 
+from flexmb.modal import flexible_model
 from flexmb.scene.schema import BeamBody, Body, Hinge, Scene
 
 
@@ -75,6 +76,14 @@ def piece_at(ends: Sequence[float], x: float) -> int:
 def outward(joints: Sequence[Hinge], root: int) -> list[Hinge]:
     """Joints listed along the beam, from the piece `root` outward: to the tip first, so that parents come first."""
     return [*joints[root:], *joints[:root][::-1]]
+
+
+def stiffness_damping(beam: BeamBody) -> float:
+    """Damping over stiffness (s) of every part: 2 zeta/omega of the first mode, whose damping it reproduces."""
+    if not np.any(beam.modes.damping_ratio):
+        return 0.0
+    model = flexible_model(beam)
+    return float(model.damping[0, 0] / model.stiffness[0, 0])
 
 
 def _no_beam(scene: Scene, name: str) -> str:

@@ -8,7 +8,6 @@ from typing import Literal
 
 import numpy as np
 
-from flexmb.modal import flexible_model
 from flexmb.scene.schema import (
     AngularCoordinate,
     BeamBody,
@@ -23,7 +22,7 @@ from flexmb.scene.schema import (
     Vector,
 )
 from flexmb.scene.tree import rest_frames
-from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at
+from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at, stiffness_damping
 from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
 _X: Vector = (1.0, 0.0, 0.0)
@@ -112,7 +111,7 @@ def _segments(beam: BeamBody, ends: list[float], places: dict[str, Place]) -> li
 
 def _hinges(beam: BeamBody, cuts: list[_Cut], ends: list[float], root: int) -> list[Hinge]:
     """The hinges along the beam; `root` is the segment that carries the beam's inboard hinge."""
-    lag = _stiffness_damping(beam)
+    lag = stiffness_damping(beam)
     count = {"turn": 0, "axial": 0}
     hinges = []
     for piece, cut in enumerate(cuts):
@@ -152,14 +151,6 @@ def _spring(beam: BeamBody, key: str, cut: _Cut) -> float:
     x, weight = quadrature(beam, (cut.start, cut.end))
     (section,) = section_properties(beam, x, key)
     return float(1.0 / np.sum(weight / section))
-
-
-def _stiffness_damping(beam: BeamBody) -> float:
-    """c/k (s) of every spring: 2 zeta/omega of the first mode, whose damping it reproduces."""
-    if not np.any(beam.modes.damping_ratio):
-        return 0.0
-    model = flexible_model(beam)
-    return float(model.damping[0, 0] / model.stiffness[0, 0])
 
 
 def _segment_name(beam: BeamBody, piece: int) -> str:

@@ -10,10 +10,12 @@ import msgspec
 import pytest
 
 from crosscheck import case as case_module
-from crosscheck.case import CaseError, Comparison, RunFile, Side, check_run_file
+from crosscheck.case import CaseError, Comparison, Refined, RunFile, Side, Variant, check_run_file
 from crosscheck.library import load_case, resolve
+from crosscheck.plan import refine, variant_scene
 from crosscheck.selection import select
 from tests.crosscheck.sessions import CASE, copy_case
+from tests.flexmb.surrogate.beams import beam_scene
 
 EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
 
@@ -38,6 +40,10 @@ def test_the_documented_example_is_valid() -> None:
         ('reason = "above the critical speed the unstiffened body diverges"', "", "needs a reason"),
         ("segments = 16", "", r"\$.variant\[2\].segments"),
         ('transform = "segments"', "", r"\$.variant\[2\].segments"),
+        ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments: give it exactly"),
+        ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces: give it exactly"),
+        ("refined = { segments = 32 }", "refined = { pieces = 32 }", r"\$.variant\[2\].refined.pieces"),
+        ('scene = "flexible.toml"', 'split_body = "a"', r"\$.variant\[1\].split_body"),
         ('engines = ["native"]', "engines = []", "name at least one engine"),
         ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also: native is among the engines already"),
         ('name = "full"', 'name = "rigid"', "two variants have the same name"),
@@ -142,3 +148,18 @@ def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
     run = msgspec.structs.replace(run, comparisons=(*run.comparisons, named))
     check_run_file(run)
     assert pairs(select(run, ())) == {("native", "mujoco"), ("native", "exudyn")}
+
+
+def test_a_variant_of_pieces_is_refined_by_more_pieces() -> None:
+    scene = beam_scene()
+    variant = Variant(
+        name="pieces", transform="substructures", pieces=2, refined=Refined(pieces=3), level="linear",
+        engines=("native",),
+    )  # fmt: skip
+    coarse, fine = (variant_scene(scene, each) for each in (variant, refine(variant, variant.refined)))
+    assert [body.name for body in coarse.bodies] == ["boom.p00", "boom.p01", "panel"]
+    assert [body.name for body in fine.bodies] == ["boom.p00", "boom.p01", "boom.p02", "panel"]
+    assert fine.bodies[0].level == "linear"
+    elsewhere = msgspec.structs.replace(variant, split_body="panel")
+    with pytest.raises(ValueError, match="no beam"):
+        variant_scene(scene, elsewhere)

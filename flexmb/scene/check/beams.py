@@ -106,8 +106,9 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Problem]:
     modes = body.modes
     if not modes.families or len(set(modes.families)) < len(modes.families):
         yield Problem(str(place.key("families")), f"the families are {modes.families}", "list each wanted family once")
-    if modes.count < 1:
-        yield Problem(str(place.key("count")), f"{modes.count} modes", 'give one at least, or make the level "rigid"')
+    if modes.count < 0 or mode_count(body) < 1:
+        remedy = 'give one at least, or "static" ones, or make the level "rigid"'
+        yield Problem(str(place.key("count")), f"{modes.count} modes", remedy)
     elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
         yield Problem(str(place.key("count")), what, "use more elements, more families, or fewer modes")
@@ -125,7 +126,7 @@ def _damping(place: Place, modes: Modes, count: int) -> Iterator[Problem]:
 
 def _attachments(body: BeamBody) -> int:
     """Unit tip loads: one for axial and torsion, force and moment for each bending plane."""
-    counts = {"axial": 1, "torsion": 1 if _twisting_points(body) else 0, "bending_y": 2, "bending_z": 2}
+    counts = {"axial": 1, "torsion": 1 if twisting_points(body) else 0, "bending_y": 2, "bending_z": 2}
     return sum(counts[family] for family in body.modes.families)
 
 
@@ -135,11 +136,11 @@ def _available(body: BeamBody) -> int:
     A free-free beam has the root's in addition, but as many rigid motions, which are no modes.
     """
     bending = body.elements if body.mass == "lumped" and not _has_rotary(body) else 2 * body.elements
-    counts = {"axial": body.elements, "torsion": _twisting_points(body), "bending_y": bending, "bending_z": bending}
+    counts = {"axial": body.elements, "torsion": twisting_points(body), "bending_y": bending, "bending_z": bending}
     return sum(counts[family] for family in body.modes.families)
 
 
-def _twisting_points(body: BeamBody) -> int:
+def twisting_points(body: BeamBody) -> int:
     """Coordinates of torsion with inertia: every element's, or without rotary inertia those of lumps off the axis."""
     if _has_rotary(body):
         return body.elements

@@ -1,0 +1,133 @@
+"""A beam as a chain of flexible pieces welded to one another: finite deflection from modes of small deflection.
+
+Each piece deforms little in its own frame, which turns with the section at its root, so that the chain converges to the
+geometrically exact beam as the pieces become short. That needs attachment modes: a piece bends under the forces and
+moments of its neighbours, which the eigenmodes of a free tip cannot follow however many pieces there are.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left, bisect_right
+
+import numpy as np
+from msgspec.structs import replace
+
+from flexmb.modal import flexible_model
+from flexmb.scene.check.beams import twisting_points
+from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, Weld
+from flexmb.scene.tree import rest_frames
+from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at, stiffness_damping
+
+_NUMBERS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
+
+
+def substructured(
+    scene: Scene, body: str | None, pieces: int, *, level: Level | None = None, eigenmodes: int = 0
+) -> Scene:
+    """The beam `body` (all beams if None) as `pieces` equal flexible pieces, welded section to section.
+
+    A piece has the attachment modes of its beam's mode families (unit forces and moments at its tip: one mode for axial
+    motion, one for torsion, two for each plane of bending), clamped at its own root, and as many `eigenmodes` of the
+    clamped piece besides. Its level is the beam's unless `level` is given. With it the chain converges to the
+    geometrically exact beam, at level "full" by the square of the length of a piece. Sections, theory, tip masses and
+    the choice of inertia points stay; modal damping becomes proportional to stiffness, exact for the beam's first mode.
+
+    Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node on a cut, or a tip mass, belongs
+    to the piece toward the tip. Raises ValueError for a body that is no beam or is rigid, for fewer than one piece, for
+    an initial modal state, and for torsion of pieces without rotary inertia.
+    """
+    if pieces < 1:
+        raise ValueError(f"a beam is split into one piece at least, got {pieces}")
+    if eigenmodes < 0:
+        raise ValueError(f"a piece has no fewer than zero eigenmodes, got {eigenmodes}")
+    for beam in beams_named(scene, body):
+        scene = _split(scene, beam, pieces, level or beam.level, eigenmodes)
+    return scene
+
+
+def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: int) -> Scene:
+    if level == "rigid":
+        raise ValueError(f'beam "{beam.name}" is rigid: pieces need a level at which they deform, such as "full"')
+    ends = [float(x) for x in np.linspace(0.0, beam.length_m, count + 1)]
+    places = {}
+    for name, frame in rest_frames(beam).items():
+        piece = piece_at(ends, frame.position[0])
+        # A piece has a root and a tip of its own, where those of the beam are.
+        places[name] = Place(piece, _piece_name(beam, piece), name)
+    lag = stiffness_damping(beam)
+    parts = [_piece(beam, i, ends, places, replace(beam.modes, count=eigenmodes), level, lag) for i in range(count)]
+    root = places[inboard_hinge(scene, beam).child_node].piece
+    return in_pieces(scene, beam, parts, outward(_welds(beam, count, root), root), places)
+
+
+def _piece(
+    beam: BeamBody, number: int, ends: list[float], places: dict[str, Place], modes: Modes, level: Level, lag: float
+) -> BeamBody:
+    """Piece `number` between two of the `ends` (m), `lag` (s) its damping over its stiffness."""
+    start, end = ends[number], ends[number + 1]
+    last = end == beam.length_m
+    piece = replace(
+        beam,
+        name=_piece_name(beam, number),
+        length_m=end - start,
+        # Two elements bear every attachment mode with lumped masses too; an eigenmode more has half a wave more.
+        elements=max(-(-beam.elements // (len(ends) - 1)), 2 + modes.count),
+        stations=_sections(beam, start, end),
+        modes=replace(modes, boundary="clamped-free", static=True, damping_ratio=0.0),
+        level=level,
+        tip_masses=tuple(
+            replace(lump, x_m=lump.x_m - start)
+            for lump in beam.tip_masses
+            if start <= lump.x_m < end or (last and lump.x_m == end)
+        ),
+        nodes=tuple(
+            replace(node, x_m=node.x_m - start) for node in beam.nodes if places[node.name].piece == number
+        ),
+    )
+    if "torsion" in modes.families and twisting_points(beam) and not twisting_points(piece):
+        raise ValueError(
+            f'beam "{beam.name}": its pieces cannot be twisted, as nothing in them has inertia about the axis; give '
+            'sections rotary inertia and choose points "section" or "rotary", or leave "torsion" out of the families'
+        )
+    if lag == 0.0:
+        return piece
+    frequencies = np.sqrt(np.diag(flexible_model(piece).stiffness))
+    ratios = tuple(float(0.5 * lag * omega) for omega in frequencies)
+    return replace(piece, modes=replace(piece.modes, damping_ratio=ratios))
+
+
+def _sections(beam: BeamBody, start: float, end: float) -> tuple[BeamStation, ...]:
+    """The stations from `start` to `end` (m), measured from `start`; of two at one place the piece has its own."""
+    stations = sorted(beam.stations, key=lambda station: station.x_m)
+    xs = [station.x_m for station in stations]
+    inside = [station for station in stations if start < station.x_m < end]
+    first = _between(stations, bisect_right(xs, start), start)
+    last = _between(stations, bisect_left(xs, end), end)
+    return tuple(replace(station, x_m=station.x_m - start) for station in (first, *inside, last))
+
+
+def _between(stations: list[BeamStation], right: int, x: float) -> BeamStation:
+    """The section at x between the stations `right` - 1 and `right`, constant beyond the outer ones."""
+    a, b = stations[max(right - 1, 0)], stations[min(right, len(stations) - 1)]
+    share = (x - a.x_m) / (b.x_m - a.x_m) if b.x_m > a.x_m else 0.0
+    values = {}
+    for key in _NUMBERS:
+        at_a, at_b = getattr(a, key), getattr(b, key)
+        values[key] = at_a if share == 0.0 or None in (at_a, at_b) else at_a + share * (at_b - at_a)
+    return replace(a, x_m=x, **values)
+
+
+def _welds(beam: BeamBody, count: int, root: int) -> list[Hinge]:
+    """The welds along the beam, each from the piece nearer to piece `root`."""
+    welds: list[Hinge] = []
+    for i in range(count - 1):
+        name, near, far = f"{beam.name}.w{i + 1:02d}", _piece_name(beam, i), _piece_name(beam, i + 1)
+        if i < root:
+            welds.append(Weld(name=name, parent=far, parent_node="root", child=near, child_node="tip"))
+        else:
+            welds.append(Weld(name=name, parent=near, parent_node="tip", child=far, child_node="root"))
+    return welds
+
+
+def _piece_name(beam: BeamBody, piece: int) -> str:
+    return f"{beam.name}.p{piece:02d}"
