@@ -22,7 +22,7 @@ from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
-from flexmb.scene.hinges import Hinge, Revolute, Weld
+from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
 
@@ -31,7 +31,7 @@ STEPS = (1e-2, 5e-3, 2.5e-3)
 
 
 class ExudynBeamEngine:
-    """A single beam on a hinge about World z, or clamped, as a planar beam of finite deflection."""
+    """One beam in World's x-y plane, free, on a hinge about z, or clamped, as a planar beam of finite deflection."""
 
     name = "exudyn-beam"
     summary = "one planar beam of finite deflection, by beam elements"
@@ -60,8 +60,13 @@ def _refusals(scene: Scene) -> Iterator[str]:
         yield "it takes scenes with one beam and nothing else"
         return
     beam, hinge = scene.bodies[0], scene.hinges[0]
-    if scene.wheels or scene.point_masses or scene.loads or scene.closures or beam.tip_masses:
-        yield "it takes a bare beam: no wheels, point masses, tip masses, loads or closures"
+    if scene.wheels or scene.point_masses or scene.closures or beam.tip_masses:
+        yield "it takes a bare beam: no wheels, point masses, tip masses or closures"
+    for load in scene.loads:
+        if load.frame != "world":
+            yield f'load "{load.name}" turns with its node: it takes loads in World axes'
+        elif any(load.direction[:2]) if load.type == "torque" else load.direction[2]:
+            yield f'load "{load.name}" acts out of the plane'
     if scene.modal_states:
         yield "initial modal coordinates have no meaning here"
     if any(scene.gravity_m_s2):
@@ -78,8 +83,8 @@ def _refusals(scene: Scene) -> Iterator[str]:
 
 
 def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:
-    if hinge.parent != GROUND or not isinstance(hinge, Revolute | Weld):
-        yield "the beam must be hinged (revolute) or welded to the ground"
+    if hinge.parent != GROUND or not isinstance(hinge, Revolute | Weld | Planar):
+        yield "the beam must be hinged (revolute, planar) or welded to the ground"
         return
     if node_frame(beam, hinge.child_node).position[0] != 0.0 or any(hinge.child_position_m):
         yield "the hinge must be at the root of the beam"
@@ -87,11 +92,18 @@ def _hinge_refusals(beam: BeamBody, hinge: Hinge) -> Iterator[str]:
         yield "the beam's x-y plane must be World's x-y plane"
     if isinstance(hinge, Revolute):
         turned = root_frame(beam, hinge).rotation @ np.array(hinge.axis)
-        c = hinge.rotation
         if abs(abs(turned[2]) - 1.0) > 1e-12:
             yield "the hinge axis must be World z"
-        if c.stiffness_Nm_rad or c.damping_Nms_rad or c.torque_Nm is not None:
+        if not _bare(hinge.rotation, "prescribed_rad"):
             yield "the hinge may be free or prescribed, without spring, damper or motor"
+    if isinstance(hinge, Planar) and not all(map(_bare, (hinge.x, hinge.y, hinge.rotation))):
+        yield "a beam that moves in the plane must do so without spring, damper, motor or prescribed motion"
+
+
+def _bare(coordinate: AngularCoordinate | LinearCoordinate, *given: str) -> bool:
+    """Whether nothing but its initial value and rate, or the keys `given`, is set."""
+    keys = set(coordinate.__struct_fields__) - {"angle_rad", "rate_rad_s", "position_m", "rate_m_s", *given}
+    return all(getattr(coordinate, key) == getattr(type(coordinate)(), key) for key in keys)
 
 
 class BeamModel:

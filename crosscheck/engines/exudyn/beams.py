@@ -1,8 +1,8 @@
-"""A planar beam of geometrically exact or absolute-nodal elements, turning about World z: large deflections, no modes.
+"""A planar beam of geometrically exact or absolute-nodal elements in World's x-y plane: large deflections, no modes.
 
 Shear-rigid beams are cable elements of the absolute nodal coordinate formulation, shear-flexible ones quadratic
 geometrically exact elements. The root is clamped to a massless hub whose coordinates carry the constraints, so that
-their multipliers are the load across the hinge.
+their multipliers are the load across the hinge; a beam that moves freely in the plane has no hub.
 """
 
 from __future__ import annotations
@@ -17,17 +17,20 @@ from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import Frame, frame
 from crosscheck.engines.exudyn.carriers import Workshop
 from crosscheck.engines.exudyn.motion import initial
-from crosscheck.engines.functions_of_time import Profile, profile
-from flexmb.scene.hinges import Hinge, Revolute
-from flexmb.scene.schema import BeamBody, Scene
+from crosscheck.engines.functions_of_time import Profile, breaks, profile
+from flexmb.scene.functions import Function
+from flexmb.scene.hinges import Hinge, Planar, Revolute
+from flexmb.scene.schema import BeamBody, Load, Scene
 from flexmb.scene.tree import node_frame
 
 SECTION_KEYS = ("EA_N", "EIz_Nm2", "mass_per_length_kg_m", "rotary_z_kg_m")
+JUMP_WINDOW = 1e-9
+"""Relative distance in time at which a step's end and a jump of a load are the same."""
 
 
 @dataclass(frozen=True)
 class PlanarBeam:
-    """The assembled beam: `stations` (n,) m along it with their Exudyn `nodes`; `holds` the constraints on the hub.
+    """The assembled beam: `stations` (n,) m along it with their Exudyn `nodes`; `holds` the constraints on a hub.
 
     `sheared`: nodes hold [x, y, angle], else [x, y, slope x, slope y].
     """
@@ -51,22 +54,21 @@ def assemble_beam(scene: Scene, elements: int) -> PlanarBeam:
     """Build the one beam of a scene that the engine supports, with at least `elements` elements."""
     beam, hinge = scene.bodies[0], scene.hinges[0]
     shop = Workshop(np.zeros(3), explicit=False)
-    base, angle, rate = _pose(beam, hinge)
-    hub = _hub(shop, base.position, angle, rate)
-    holds, prescribed = _hold(shop, hub, hinge)
+    root = _root(beam, hinge)
     sheared = beam.theory == "timoshenko"
     stations = _stations(scene, beam, elements)
     add = _geometrically_exact if sheared else _cable
-    nodes = add(shop, beam, stations, base.position, angle, rate)
-    markers = [shop.mbs.AddMarker(shop.items.MarkerNodeRigid(nodeNumber=node)) for node in (hub, nodes[0])]
-    shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 0, 0, 0, 1]))
+    nodes = add(shop, beam, stations, root)
+    holds, prescribed = ((), []) if isinstance(hinge, Planar) else _clamp(shop, nodes[0], root, hinge)
+    for load in scene.loads:
+        _load(shop, nodes[_nearest(stations, beam, load.node)], load)
     sampler = shop.mbs.AddSensor(
         shop.items.SensorUserFunction(
             sensorUserFunction=lambda mbs, t, sensors, factors, configuration: [0.0], storeInternal=True
         )
     )
     shop.mbs.Assemble()
-    return PlanarBeam(scene, shop, sheared, stations, nodes, holds, prescribed, base.position[2], sampler)
+    return PlanarBeam(scene, shop, sheared, stations, nodes, holds, prescribed, root.position[2], sampler)
 
 
 def root_frame(beam: BeamBody, hinge: Hinge) -> Frame:
@@ -75,13 +77,35 @@ def root_frame(beam: BeamBody, hinge: Hinge) -> Frame:
     return frame(hinge.parent_position_m, hinge.parent_quaternion) @ outboard.inverse()
 
 
-def _pose(beam: BeamBody, hinge: Hinge) -> tuple[Frame, float, float]:
-    """Root frame, and the angle (rad) of the beam axis against World x and its rate at t = 0."""
+@dataclass(frozen=True)
+class _Root:
+    """The root at t = 0: position (3,) m, velocity (2,) m/s, angle (rad) of the axis against World x, its rate."""
+
+    position: Array
+    velocity: Array
+    angle: float
+    rate: float
+
+    def moved(self, x: float) -> tuple[Array, Array, Array, Array]:
+        """Position, velocity, axis and rate of the axis, each (2,), of the section at x (m) of the straight beam."""
+        along, across = np.array([cos(self.angle), sin(self.angle)]), np.array([-sin(self.angle), cos(self.angle)])
+        return (
+            self.position[:2] + x * along, self.velocity + self.rate * x * across, along, self.rate * across,
+        )  # fmt: skip
+
+
+def _root(beam: BeamBody, hinge: Hinge) -> _Root:
     base = root_frame(beam, hinge)
-    angle, rate = initial(hinge.rotation) if isinstance(hinge, Revolute) else (0.0, 0.0)
+    rest = float(np.arctan2(base.rotation[1, 0], base.rotation[0, 0]))
+    position, velocity, angle, rate = base.position, np.zeros(2), 0.0, 0.0
+    if isinstance(hinge, Revolute | Planar):
+        angle, rate = initial(hinge.rotation)
+    if isinstance(hinge, Planar):
+        inboard = frame(hinge.parent_position_m, hinge.parent_quaternion).rotation[:, :2]
+        (x, x_rate), (y, y_rate) = initial(hinge.x), initial(hinge.y)
+        position, velocity = position + inboard @ [x, y], inboard[:2] @ [x_rate, y_rate]
     sign = axis_sign(hinge)
-    rest = np.arctan2(base.rotation[1, 0], base.rotation[0, 0])
-    return base, rest + sign * angle, sign * rate
+    return _Root(position, velocity, rest + sign * angle, sign * rate)
 
 
 def axis_sign(hinge: Hinge) -> float:
@@ -89,12 +113,19 @@ def axis_sign(hinge: Hinge) -> float:
     return float(np.sign(hinge.axis[2])) if isinstance(hinge, Revolute) else 1.0
 
 
-def _hub(shop: Workshop, position: Array, angle: float, rate: float) -> int:
-    node = shop.mbs.AddNode(
-        shop.items.NodeRigidBody2D(referenceCoordinates=[*position[:2], angle], initialVelocities=[0.0, 0.0, rate])
+def _clamp(
+    shop: Workshop, node: int, root: _Root, hinge: Hinge
+) -> tuple[tuple[int, ...], list[tuple[int, Callable[[float], Profile]]]]:
+    """Clamp the beam's first node to a massless hub, and hold that as the hinge says."""
+    hub = shop.mbs.AddNode(
+        shop.items.NodeRigidBody2D(
+            referenceCoordinates=[*root.position[:2], root.angle], initialVelocities=[0.0, 0.0, root.rate]
+        )
     )
-    shop.mbs.AddObject(shop.items.ObjectRigidBody2D(nodeNumber=node, mass=0.0, inertia=0.0))
-    return node
+    shop.mbs.AddObject(shop.items.ObjectRigidBody2D(nodeNumber=hub, mass=0.0, inertia=0.0))
+    markers = [shop.mbs.AddMarker(shop.items.MarkerNodeRigid(nodeNumber=each)) for each in (hub, node)]
+    shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1, 1, 0, 0, 0, 1]))
+    return _hold(shop, hub, hinge)
 
 
 def _hold(
@@ -127,12 +158,46 @@ def _constrain(shop: Workshop, node: int, coordinate: int, **motion: Callable) -
     )
 
 
+def _load(shop: Workshop, node: int, load: Load) -> None:
+    """A force or torque in World axes at a node of the mesh."""
+    marker = shop.mbs.AddMarker(shop.items.MarkerNodeRigid(nodeNumber=node))
+    kind = shop.items.LoadForceVector if load.type == "force" else shop.items.LoadTorqueVector
+    f, direction = _halved_at_jumps(load.function), np.array(load.direction)
+    shop.mbs.AddLoad(
+        kind(
+            markerNumber=marker, loadVector=list(direction),
+            loadVectorUserFunction=lambda mbs, t, unit: f(t) * direction,
+        )
+    )  # fmt: skip
+
+
+def _halved_at_jumps(function: Function) -> Callable[[float], float]:
+    """The function, and where it jumps inside a run the mean of both sides.
+
+    Fixed steps see only the values at their ends: with the mean, a jump at the end of a step keeps their order.
+    """
+    f, jumps = profile(function), [t for t in breaks(function) if t > 0.0]
+
+    def value(t: float) -> float:
+        for jump in jumps:
+            if abs(t - jump) < JUMP_WINDOW * jump:
+                return 0.5 * (f(jump * (1.0 - JUMP_WINDOW)).value + f(jump * (1.0 + JUMP_WINDOW)).value)
+        return f(t).value
+
+    return value
+
+
+def _nearest(stations: Array, beam: BeamBody, node: str) -> int:
+    """The station (number) of a node of the beam."""
+    return int(np.argmin(np.abs(stations - node_frame(beam, node).position[0])))
+
+
 def _stations(scene: Scene, beam: BeamBody, elements: int) -> Array:
-    """Ends of the elements: a uniform grid, and wherever a marker is."""
-    marked = [node_frame(beam, marker.node).position[0] for marker in scene.markers]
+    """Ends of the elements: a uniform grid, and wherever a marker or a load is."""
+    marked = [node_frame(beam, item.node).position[0] for item in (*scene.markers, *scene.loads)]
     grid = np.linspace(0.0, beam.length_m, elements + 1)
-    extra = [x for x in marked if np.min(np.abs(grid - x)) > 1e-9 * beam.length_m]
-    return np.sort(np.concatenate([grid, extra]))
+    extra = {x for x in marked if np.min(np.abs(grid - x)) > 1e-9 * beam.length_m}
+    return np.sort(np.concatenate([grid, sorted(extra)]))
 
 
 def section(beam: BeamBody, x: float, key: str) -> float:
@@ -140,17 +205,17 @@ def section(beam: BeamBody, x: float, key: str) -> float:
     return float(np.interp(x, [s.x_m for s in beam.stations], [getattr(s, key) for s in beam.stations]))
 
 
-def _cable(shop: Workshop, beam: BeamBody, stations: Array, base: Array, angle: float, rate: float) -> tuple[int, ...]:
-    along, across = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
-    nodes = [
-        shop.mbs.AddNode(
-            shop.items.NodePoint2DSlope1(
-                referenceCoordinates=[*(base[:2] + x * along), *along],
-                initialVelocities=[*(rate * x * across), *(rate * across)],
+def _cable(shop: Workshop, beam: BeamBody, stations: Array, root: _Root) -> tuple[int, ...]:
+    nodes = []
+    for x in stations:
+        position, velocity, along, turning = root.moved(x)
+        nodes.append(
+            shop.mbs.AddNode(
+                shop.items.NodePoint2DSlope1(
+                    referenceCoordinates=[*position, *along], initialVelocities=[*velocity, *turning]
+                )
             )
         )
-        for x in stations
-    ]
     for k, (left, right) in enumerate(zip(stations, stations[1:], strict=False)):
         EA, EI, mass, _ = (section(beam, (left + right) / 2.0, key) for key in SECTION_KEYS)
         shop.mbs.AddObject(
@@ -162,15 +227,12 @@ def _cable(shop: Workshop, beam: BeamBody, stations: Array, base: Array, angle: 
     return tuple(nodes)
 
 
-def _geometrically_exact(
-    shop: Workshop, beam: BeamBody, stations: Array, base: Array, angle: float, rate: float
-) -> tuple[int, ...]:
-    along, across = np.array([cos(angle), sin(angle)]), np.array([-sin(angle), cos(angle)])
-
+def _geometrically_exact(shop: Workshop, beam: BeamBody, stations: Array, root: _Root) -> tuple[int, ...]:
     def node(x: float) -> int:
+        position, velocity, _, _ = root.moved(x)
         return shop.mbs.AddNode(
             shop.items.NodeRigidBody2D(
-                referenceCoordinates=[*(base[:2] + x * along), angle], initialVelocities=[*(rate * x * across), rate]
+                referenceCoordinates=[*position, root.angle], initialVelocities=[*velocity, root.rate]
             )
         )
 

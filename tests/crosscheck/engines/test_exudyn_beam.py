@@ -92,6 +92,45 @@ def test_free_stiff_beam_turns_at_its_rate():
     assert np.arctan2(y, x) == pytest.approx(0.3 + 2.0, abs=2e-3)
 
 
+@pytest.mark.parametrize("theory", ["euler-bernoulli", "timoshenko"])
+def test_a_free_stiff_beam_is_thrown_by_its_loads(theory):
+    """The mass centre follows Newton's law through the end of a pulse; the turn follows Euler's under a torque.
+
+    The loads jump at the end of a step: a step that saw only one side would be out by its whole impulse.
+    """
+    data, L, T = dict(BEAM_K, EA=5e8, EI=5e7, GA=5e7, rotary=1e-3), 8.0, 0.5
+    mass, step = data["mass"] * L, 2e-3
+    inertia = mass * L**2 / 12 + data["rotary"] * L * (theory == "timoshenko")  # cables have no rotary inertia
+    beam = spin_up(data, theory, 4).bodies[0]
+    beam = replace(beam, nodes=(s.BeamNode(name="middle", x_m=L / 2),))
+    free = s.Planar(
+        name="free", parent="ground", child="beam", parent_position_m=(1.0, 2.0, 3.0),
+        x=s.LinearCoordinate(position_m=0.5, rate_m_s=-1.0), y=s.LinearCoordinate(rate_m_s=2.0),
+        rotation=s.AngularCoordinate(angle_rad=0.3),
+    )  # fmt: skip
+    push = s.Load(name="push", body="beam", node="middle", type="force", direction=(0.6, 0.8, 0.0),
+                  function=s.Pulse(value=10.0, start_s=0.0, duration_s=T))  # fmt: skip
+    twist = s.Load(name="twist", body="beam", node="middle", type="torque", direction=(0.0, 0.0, -1.0),
+                   function=s.Pulse(value=4.0, start_s=0.0, duration_s=T))  # fmt: skip
+    scene = s.Scene(
+        name="thrown", bodies=(beam,), hinges=(free,), loads=(push, twist),
+        markers=(s.Marker(name="middle", body="beam", node="middle"),),
+    )  # fmt: skip
+    assert ExudynBeamEngine().supports(scene).kind == "surrogate"
+    times = np.linspace(0.0, 1.0, 11)
+    run = ExudynBeamEngine().compile(scene).simulate(Run(times), Effort("step", step, "TrapezoidalIndex2"))
+    assert run.status == "finished" and not run.loads["free"].any()
+    grown = np.where(times < T, times**2 / 2, T * times - T**2 / 2)  # of a unit acceleration that lasts T
+    middle = np.array([1.5 + 4.0 * np.cos(0.3), 2.0 + 4.0 * np.sin(0.3)])
+    expected = middle + np.outer(times, [-1.0, 2.0]) + 10.0 / mass * np.outer(grown, [0.6, 0.8])
+    path = run.markers["middle"]
+    turn = 2.0 * np.unwrap(np.arctan2(path.quaternion[:, 3], path.quaternion[:, 0]), period=np.pi)
+    impulse = 10.0 * T / mass * step  # what one step at the jump would be worth
+    assert np.abs(path.position[:, :2] - expected).max() < 0.1 * impulse
+    assert np.abs(path.position[:, 2] - 3.0).max() == 0.0
+    assert np.abs(turn - 0.3 + 4.0 / inertia * grown).max() < 0.1 * 4.0 * T / inertia * step
+
+
 def test_refusals_name_their_reason():
     scene = spin_up(BEAM_K, "euler-bernoulli", 4)
     engine = ExudynBeamEngine()
@@ -99,7 +138,14 @@ def test_refusals_name_their_reason():
     assert len(engine.efforts(scene)) >= 3
     every_family = replace(scene.bodies[0], modes=s.Modes(count=3))
     tilted = replace(scene.hinges[0], axis=(0.0, 1.0, 0.0))
+    push = s.Load(name="push", body="beam", node="tip", type="force", direction=(0.0, 0.0, 1.0),
+                  function=s.Constant(value=1.0))  # fmt: skip
+    sprung = s.Planar(name="hub", parent="ground", child="beam", x=s.LinearCoordinate(stiffness_N_m=1.0))
     for changed, word in (
+        (replace(scene, loads=(push,)), 'load "push" acts out of the plane'),
+        (replace(scene, loads=(replace(push, type="torque", direction=(1.0, 0.0, 0.0)),)), "out of the plane"),
+        (replace(scene, loads=(replace(push, direction=(0.0, 1.0, 0.0), frame="node"),)), "World axes"),
+        (replace(scene, hinges=(sprung,)), "without spring"),
         (replace(scene, gravity_m_s2=(0.0, -9.8, 0.0)), "gravity"),
         (replace(scene, bodies=(every_family,)), "planar"),
         (replace(scene, hinges=(tilted,)), "World z"),
