@@ -7,6 +7,7 @@ from flexmb.functions import evaluate
 from flexmb.hinges import catalogue
 from flexmb.kernel import helper, kernel
 from flexmb.spatial.rotation import rotation_vector
+from flexmb.spatial.scalar import sqrt
 
 
 @helper
@@ -39,7 +40,7 @@ def normalise_quaternions(q, c):
         start = catalogue.quaternion_offset(c.body[k].hinge_kind)
         if start >= 0:
             i = c.body[k].q_index + start
-            s = 1.0 / (q[i] * q[i] + q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3]) ** 0.5
+            s = 1.0 / sqrt(q[i] * q[i] + q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3])
             for n in range(4):
                 q[i + n] *= s
 

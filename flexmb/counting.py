@@ -150,6 +150,8 @@ class _Interpreter:
         if hasattr(thing, "variants"):  # flexmb.kernel.by_bundle
             array, having, lacking = map(self, thing.variants)
             return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
+        if hasattr(thing, "of_reals"):  # flexmb.kernel.by_number
+            return self(thing.of_reals)
         if isinstance(thing, ModuleType) and thing.__name__.startswith(f"{__package__}."):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import cos, pi, sin
+from math import pi
 
 import numpy as np
 
 from flexmb.arrays import FUNCTION, Real, Record
 from flexmb.kernel import helper
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.spatial.scalar import cos, sin
 
 _CONSTANT, _RAMP, _SINE, _SMOOTH_STEP, _SPIN_UP, _PULSE, _TABLE = range(7)
 
@@ -49,9 +50,9 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
 @helper
 def _smooth_step(a, b, begin, duration, t):
     x = (t - begin) / duration
-    if x <= 0.0:
+    if x.real <= 0.0:
         return a, 0.0, 0.0
-    if x >= 1.0:
+    if x.real >= 1.0:
         return b, 0.0, 0.0
     x2 = x * x
     x3 = x2 * x
@@ -64,7 +65,7 @@ def _smooth_step(a, b, begin, duration, t):
 
 @helper
 def _spin_up(rate, duration, t):
-    if t >= duration:
+    if t.real >= duration:
         return rate * (t - 0.5 * duration), rate, 0.0
     k = 2.0 * pi / duration
     c = cos(k * t)
@@ -75,7 +76,7 @@ def _spin_up(rate, duration, t):
 @helper
 def _spline(table, first, last, t):
     row = first
-    while row + 1 < last and t >= table[row + 1, 0]:
+    while row + 1 < last and t.real >= table[row + 1, 0]:
         row += 1
     x = t - table[row, 0]
     value = 0.0
@@ -102,7 +103,7 @@ def evaluate(kind, data, first, last, table, t):
     if kind == _SPIN_UP:
         return _spin_up(data[0], data[1], t)
     if kind == _PULSE:
-        if data[1] <= t < data[2]:
+        if data[1] <= t.real < data[2]:
             return data[0], 0.0, 0.0
         return 0.0, 0.0, 0.0
     if kind == _TABLE:

@@ -19,7 +19,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba import config, njit
+from numba import config, njit, types
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
@@ -133,4 +133,26 @@ def by_bundle(array: str, having: Callable[..., Any], lacking: Callable[..., Any
         return call
 
     choose.variants = (array, having, lacking)  # type: ignore[attr-defined]  # for who interprets kernels
+    return choose
+
+
+def by_number(real: Callable[..., Any], tangent: Callable[..., Any]) -> Callable[..., Any]:
+    """One function for two kinds of numbers: `tangent` where an argument is complex, `real` where none is.
+
+    Decided by type, while the caller is compiled, like `by_bundle`.
+    """
+
+    def choose(*args: Any) -> Any:
+        return (tangent if any(isinstance(x, complex) for x in args) else real)(*args)
+
+    @overload(choose, jit_options=_SEMANTICS)
+    def _typed(*args):
+        choice = tangent if any(isinstance(kind, types.Complex) for kind in args) else real
+
+        def call(*args):
+            return choice(*args)
+
+        return call
+
+    choose.of_reals = real  # type: ignore[attr-defined]  # for who interprets kernels
     return choose

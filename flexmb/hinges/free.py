@@ -2,6 +2,7 @@
 
 from flexmb.kernel import helper
 from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
+from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import cross, times
 
 NQ, NV = 7, 6
@@ -31,7 +32,7 @@ def motion(q, i, u, j, sequence, H):
 def rate(q, i, u, j, sequence, dq):
     """The quaternion enters the position rate normalised, so that scaling it scales only its own rate."""
     n2 = q[i + 3] * q[i + 3] + q[i + 4] * q[i + 4] + q[i + 5] * q[i + 5] + q[i + 6] * q[i + 6]
-    s = 1.0 / n2**0.5
+    s = 1.0 / sqrt(n2)
     r = quaternion_matrix(s * q[i + 3], s * q[i + 4], s * q[i + 5], s * q[i + 6])
     velocity = times(r, (u[j + 3], u[j + 4], u[j + 5]))
     for n in range(3):

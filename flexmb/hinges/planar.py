@@ -1,9 +1,8 @@
 """Planar: translation in the x-y plane of O+, then rotation about z; q = [x, y, angle]."""
 
-from math import cos, sin
-
 from flexmb.kernel import helper
 from flexmb.spatial.rotation import rotation_z
+from flexmb.spatial.scalar import cos, sin
 
 NQ, NV = 3, 3
 

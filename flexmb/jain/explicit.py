@@ -3,8 +3,6 @@
 After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
 """
 
-from math import sqrt
-
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import (
     add_inertia,
@@ -16,6 +14,7 @@ from flexmb.spatial.inertia import (
     shift_inertia,
     store_inertia,
 )
+from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import add3, cross, dot, mat3, scale, store3, sub, times, vec3
 
 SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
@@ -59,7 +58,7 @@ def cholesky(a, n):
         floor = SINGULAR * d
         for i in range(j):
             d -= a[j, i] * a[j, i]
-        if not d > floor:
+        if not d.real > floor.real:
             return False
         d = sqrt(d)
         a[j, j] = d

@@ -94,7 +94,7 @@ def _eliminate_hinge(c, w, k):
         row = 2 if kind == REVOLUTE else 5
         u_angular, u_linear = inertia_column(p, row)
         d = u_angular[2] if kind == REVOLUTE else u_linear[2]
-        if not d > 0.0:
+        if not d.real > 0.0:
             return False
         epsilon = w.speed[j].applied - (tau[2] if kind == REVOLUTE else f[2])
         s = 1.0 / d

@@ -15,10 +15,10 @@ def is_out_of_range(c, w, k):
     diagonal = 0.0
     for n in range(c.body[k].modes):
         diagonal += w.mode[k, n].eta * c.pair[k, n, n].mff * w.mode[k, n].eta
-    if c.body[k].modes * diagonal <= limit:  # Cauchy and Schwarz: the sum below is no larger
+    if c.body[k].modes * diagonal.real <= limit:  # Cauchy and Schwarz: the sum below is no larger
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    return squares > limit
+    return squares.real > limit

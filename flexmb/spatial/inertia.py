@@ -6,10 +6,12 @@ Stored as 21 numbers: A (6, symmetric), B (9), C (6, symmetric). With V = [w; v]
 from flexmb.kernel import helper
 from flexmb.spatial.vector import (
     add,
+    add9,
     cross,
     mat3,
     rotate_mat,
     rotate_sym,
+    store9,
     sym6,
     sym_add,
     sym_times,
@@ -29,8 +31,7 @@ def store_inertia(a, i, p):
     for n in range(6):
         a[i + n] = p[0][n]
         a[i + 15 + n] = p[2][n]
-    for n in range(9):
-        a[i + 6 + n] = p[1][n]
+    store9(a, i + 6, p[1])
 
 
 @helper
@@ -38,8 +39,7 @@ def add_inertia(a, i, p):
     for n in range(6):
         a[i + n] += p[0][n]
         a[i + 15 + n] += p[2][n]
-    for n in range(9):
-        a[i + 6 + n] += p[1][n]
+    add9(a, i + 6, p[1])
 
 
 @helper

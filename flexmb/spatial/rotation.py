@@ -1,8 +1,7 @@
 """Rotations: quaternions, rotation vectors, their rates. R_AB maps components in B to components in A."""
 
-from math import atan2, cos, sin, sqrt
-
 from flexmb.kernel import helper
+from flexmb.spatial.scalar import atan2, cos, sin, sqrt
 from flexmb.spatial.vector import add, cross, dot, scale
 
 
@@ -58,8 +57,8 @@ def quaternion_rate(w, x, y, z, omega):
 def rotation_vector(w, x, y, z):
     """Rotation vector of a unit quaternion, angle in [0, pi]."""
     s = sqrt(x * x + y * y + z * z)
-    sign = 1.0 if w >= 0.0 else -1.0
-    if s < 1e-8:
+    sign = 1.0 if w.real >= 0.0 else -1.0
+    if s.real < 1e-8:
         # 2 atan(s)/s -> 2 (1 - s^2/3): the correction is below round-off here
         return scale(2.0 * sign, (x, y, z))
     return scale(2.0 * sign * atan2(s, sign * w) / s, (x, y, z))
@@ -72,7 +71,7 @@ def exponential_coefficients(t2):
     Below t = 0.5 by series (the closed forms cancel there; the first term left out is below 1e-14 of the value
     for b2, b3 and below 1e-17 for the others), above it in closed form.
     """
-    if t2 < 0.25:
+    if t2.real < 0.25:
         a1 = 1.0
         a2 = 1.0
         a3 = 1.0

@@ -167,5 +167,26 @@ def add3(a, i, v):
 
 @helper
 def store9(a, i, m):
-    for n in range(9):
-        a[i + n] = m[n]
+    # written out: elements may be of different types, which a loop over a tuple does not allow
+    a[i] = m[0]
+    a[i + 1] = m[1]
+    a[i + 2] = m[2]
+    a[i + 3] = m[3]
+    a[i + 4] = m[4]
+    a[i + 5] = m[5]
+    a[i + 6] = m[6]
+    a[i + 7] = m[7]
+    a[i + 8] = m[8]
+
+
+@helper
+def add9(a, i, m):
+    a[i] += m[0]
+    a[i + 1] += m[1]
+    a[i + 2] += m[2]
+    a[i + 3] += m[3]
+    a[i + 4] += m[4]
+    a[i + 5] += m[5]
+    a[i + 6] += m[6]
+    a[i + 7] += m[7]
+    a[i + 8] += m[8]
