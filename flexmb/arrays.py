@@ -20,7 +20,7 @@ Real = NDArray[np.float64]
 Index = NDArray[np.int64]
 Record = NDArray[np.void]
 
-RIGID, RUTHLESS, FULL, LINEAR = range(4)
+RIGID, RUTHLESS, FULL, LINEAR, STIFFENED = range(5)
 EXPLICIT, WOODBURY, CONDENSED = range(3)
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
@@ -34,7 +34,7 @@ def _record(*fields: tuple) -> np.dtype:
 
 BODY = _record(
     ("parent", _I),  # -1 for ground
-    ("level", _I),  # RIGID, RUTHLESS, FULL or LINEAR
+    ("level", _I),  # RIGID, RUTHLESS, FULL, LINEAR or STIFFENED
     ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
@@ -53,10 +53,11 @@ BODY = _record(
     ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
     ("placement_position", _F, (3,)),  # O+ in the parent's frame
     ("placement_rotation", _F, (9,)),  # R_parent_O+
-    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear: without the
-    # summed points
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full, linear and
+    # stiffened: without the summed points
     ("rigid", _F, (10,)),
     ("slope", _I),  # level linear: row of `slope`
+    ("second", _I),  # level stiffened: row of `second_moment`
     ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
     ("ball_spring", _F),  # stiffness of a spherical hinge
     ("point_start", _I),
@@ -75,7 +76,7 @@ MODE = _record(  # mode n of a body
 )
 PAIR = _record(  # modes n, i of a body
     ("mff", _F),  # modal mass matrix
-    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'
+    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'; level stiffened: sum m (phi_n phi_i' + G_ni r')
     ("stiffness", _F),
     ("damping", _F),
 )
@@ -89,11 +90,13 @@ POINT = _record(  # summed at run time: points with rotating inertia or an offse
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # mass centre from the point, in point axes
     ("inertia", _F, (6,)),  # about the mass centre
+    ("second", _I),  # level stiffened: row of `second_shape`, else -1
 )
 PORT = _record(
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # in node axes (parallel to the body's at rest)
     ("frame", _F, (9,)),  # rotation port -> node axes
+    ("second", _I),  # level stiffened: row of `second_shape`, else -1
 )
 SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # mode shape at a port or point
 WHEEL = _record(
@@ -142,6 +145,8 @@ class Constants:
     point_mode: Record  # (S,m) SHAPE
     port: Record  # (P,) PORT
     port_mode: Record  # (P,m) SHAPE
+    second_moment: Real  # (bodies of level stiffened,m,m,3) sum m G_ni
+    second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD
     speed: Record  # (nu,) SPEED

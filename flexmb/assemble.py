@@ -7,7 +7,7 @@ import numpy as np
 from flexmb import arrays as a
 from flexmb.functions import pack
 from flexmb.hinges import catalogue
-from flexmb.inertia_arrays import group, inertia_arrays, shape_records
+from flexmb.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
 from flexmb.links import Link, Port, closure_sides, port
 from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
@@ -89,7 +89,9 @@ def assemble(
     ]
 
     m = max((link.model.mode_count for link in chain), default=0)
-    inertia, points = inertia_arrays(chain, m)
+    inertia, points, of_points = inertia_arrays(chain, m)
+    port_rows, of_ports = second_order_rows([at.node.second for at in ports.all()], 0, m)
+    points["point"]["second"], second_shape = second_order_rows(of_points, len(of_ports), m)
     body = inertia.pop("body")
     body["parent"] = [index.get(link.parent, -1) for link in chain]
     body["level"] = [link.level for link in chain]
@@ -114,8 +116,9 @@ def assemble(
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
-        port=_ports(ports),
+        port=_ports(ports, port_rows),
         port_mode=shape_records([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
+        second_shape=np.concatenate([of_ports, second_shape]),
         wheel=_wheels(wheels, [ports.number(at) for at in wheel_ports], numbering),
         load=load,
         speed=speed,
@@ -136,8 +139,9 @@ def _moved(inboard: Port, parent: Link) -> Port:
     return Port(inboard.node.seen_from(origin, back), back @ inboard.offset, back @ inboard.frame)
 
 
-def _ports(ports: Ports) -> a.Record:
+def _ports(ports: Ports, second: list[int]) -> a.Record:
     out = np.zeros(len(ports.all()), a.PORT)
+    out["second"] = second
     for row, at in zip(out, ports.all(), strict=True):
         row["position"], row["offset"], row["frame"] = at.node.position, at.offset, at.frame.ravel()
     return out

@@ -13,7 +13,7 @@ from flexmb import arrays as a
 from flexmb.links import Link
 from flexmb.modal.first_order import FirstOrder, first_order, inertia_slope
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.model import FlexibleModel, SecondOrder
 
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
@@ -28,10 +28,14 @@ class _Body:
     slope: a.Record | None
     mass_slope: a.Real | None
     summed: TurningPoints | None
+    second_moment: a.Real | None = None
 
 
-def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict[str, a.Record]]:
-    """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time."""
+def inertia_arrays(
+    chain: list[Link], m: int
+) -> tuple[dict[str, a.Record], dict[str, a.Record], list[SecondOrder | None]]:
+    """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
+    second-order field of each."""
     bodies = [_tables(link) for link in chain]
     body = np.zeros(len(chain), a.BODY)
     mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
@@ -44,6 +48,7 @@ def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict
     mass_slopes = [each.mass_slope for each in bodies]
     body["slope"], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
     body["mass_slope"], mass_slope = _rows(mass_slopes, np.zeros((m, m, m)))
+    body["second"], second_moment = _rows([each.second_moment for each in bodies], np.zeros((m, m, 3)))
     turning = [(p, i) for p in (each.summed for each in bodies) if p is not None for i in range(len(p.mass))]
     group(body, "point", [0 if each.summed is None else len(each.summed.mass) for each in bodies])
     point = np.zeros(len(turning), a.POINT)
@@ -51,8 +56,12 @@ def inertia_arrays(chain: list[Link], m: int) -> tuple[dict[str, a.Record], dict
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
         row["inertia"] = six(p.inertia[i])
     shapes = shape_records([(p.translation[i], p.rotation[i]) for p, i in turning], m)
-    tables = {"body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope}
-    return tables, {"point": point, "point_mode": shapes}
+    tables = {
+        "body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope,
+        "second_moment": second_moment,
+    }  # fmt: skip
+    seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
+    return tables, {"point": point, "point_mode": shapes}, seconds
 
 
 def _is_diagonal(m: a.Real) -> bool:
@@ -85,6 +94,18 @@ def shape_records(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Record:
     return out
 
 
+def second_order_rows(fields: list[SecondOrder | None], first: int, m: int) -> tuple[list[int], a.Record]:
+    """By field the number of its row, counted from `first`, -1 for none; and the rows, SHAPE records (...,m,m)."""
+    numbers, rows = [], np.zeros((sum(field is not None for field in fields), m, m), a.SHAPE)
+    for field in fields:
+        numbers.append(-1 if field is None else first + sum(number >= 0 for number in numbers))
+        if field is not None:
+            n = field.translation.shape[-1]
+            row = rows[numbers[-1] - first, :n, :n]
+            row["translation"], row["rotation"] = (np.moveaxis(G, 0, -1) for G in (field.translation, field.rotation))
+    return numbers, rows
+
+
 def six(m: a.Real) -> list[float]:
     """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
     return [float(m[i, j]) for i, j in _SIX]
@@ -104,6 +125,8 @@ def _tables(link: Link) -> _Body:
     integrals = modal_integrals(link.model)
     if link.level == a.FULL:
         return _full(integrals, mode, pair)
+    if link.level == a.STIFFENED:
+        return _stiffened(integrals, mode, pair)
     return _at_rest(link, integrals, mode, pair)
 
 
@@ -113,6 +136,13 @@ def _full(i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
     mode["moment"] = _from_cross_products(i.J1).reshape(-1, 9)
     pair["product"] = _from_cross_products(i.J2).reshape(*pair.shape, 9)
     return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, None, None, i.turning)
+
+
+def _stiffened(i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
+    """That of level full with the integrals of the second-order field."""
+    full = _full(i, mode, pair)
+    pair["product"] += i.Q.reshape(*pair.shape, 9)  # type: ignore[union-attr]  # the level asks for a field
+    return replace(full, second_moment=i.Z)
 
 
 def _at_rest(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:

@@ -11,15 +11,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.arrays import FULL, LINEAR, RIGID, RUTHLESS, Real
+from flexmb.arrays import FULL, LINEAR, RIGID, RUTHLESS, STIFFENED, Real
 from flexmb.hinges import catalogue
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.model import FlexibleModel, ModalNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
 
-LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "linear": LINEAR, "full": FULL}
+LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "linear": LINEAR, "full": FULL, "stiffened": STIFFENED}
 
 
 @dataclass(frozen=True)
@@ -38,7 +38,9 @@ class Port:
     @property
     def deforms(self) -> bool:
         """Whether modes move the node: those that are clamped there do not, Jain & Rodriguez (1)."""
-        return bool(np.any(self.node.translation) or np.any(self.node.rotation_modes))
+        second = self.node.second
+        curved = second is not None and bool(np.any(second.translation) or np.any(second.rotation))
+        return curved or bool(np.any(self.node.translation) or np.any(self.node.rotation_modes))
 
 
 @dataclass(frozen=True)
@@ -160,11 +162,6 @@ def _model(body: s.Body) -> FlexibleModel:
         return _rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
     if isinstance(body, s.SidBody):
         raise NotImplementedError(f'body "{body.name}": SID files are not supported yet; use kind = "modal"')
-    if body.level not in LEVELS:
-        raise NotImplementedError(
-            f'body "{body.name}": level "{body.level}" is not supported yet; '
-            'use "rigid", "ruthless", "linear" or "full"'
-        )
     model = flexible_model(body)
     return _without_modes(model) if body.level == "rigid" else model
 
@@ -197,6 +194,7 @@ def _with_wheel(model: FlexibleModel, wheel: s.Wheel) -> FlexibleModel:
         inertia=np.concatenate([model.inertia, inertia[None]]),
         translation=np.concatenate([model.translation, node.translation[None]]),
         rotation=np.concatenate([model.rotation, node.rotation_modes[None]]),
+        second=with_node(model, node),
     )
 
 
@@ -274,6 +272,7 @@ def _in_hinge_frame(link: Link) -> Link:
         inertia=back @ m.inertia @ back.T,
         translation=back @ m.translation,
         rotation=back @ m.rotation,
+        second=None if m.second is None else m.second.turned(back),
         nodes={name: node.seen_from(origin, back) for name, node in m.nodes.items()},
     )
     return replace(link, model=model)

@@ -293,7 +293,7 @@ def compile(scene: s.Scene, elimination: Elimination = "fastest") -> System:  # 
     All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen.
 
     Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
-    supported yet (SID files, level "stiffened").
+    supported yet (SID files).
     """
     check_scene(scene)
     return assembled(scene, elimination)

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
+from flexmb.scene.convert import plain
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
 
@@ -52,6 +53,8 @@ RIGID = Recipe(carriers=("rigid",))
 FULL = Recipe()
 RUTHLESS = Recipe(levels=("ruthless",))
 LINEAR = Recipe(levels=("linear",))
+# Where the field of arbitrary modes is as large as the modes, a mass matrix that is cut off may be indefinite.
+STIFFENED = Recipe(levels=("stiffened", "full", "stiffened"), deformation=0.05)
 MIXED = Recipe(levels=("full", "ruthless", "rigid"))
 EVERY_LEVEL = Recipe(levels=("linear", "full", "linear", "ruthless", "rigid"))
 CONSERVATIVE = Recipe(conservative=True, prescribed=False)
@@ -156,11 +159,14 @@ def _modal(
     """Points with mass and, if `rotary`, offset mass centres and turning tensors, moved by arbitrary assumed modes."""
     n = 5
     masses = rng.uniform(0.1, 0.4, n)
+    # drawn apart, so that a scene is the same at every level
+    curving = np.random.default_rng(sum(name.encode())) if level == "stiffened" else None
     points = inertia_points(
         masses, rng.uniform(-0.6, 0.6, (n, 3)), rng.uniform(-1.0, 1.0, (n, 3, modes)),
         rotation_modes=rng.uniform(-2.0, 2.0, (n, 3, modes)),
         inertia=rotary * np.array([inertia(rng, m, 0.3) for m in masses]),
         com_offset=rotary * rng.uniform(-0.1, 0.1, (n, 3)),
+        **({} if curving is None else _curved(curving, (n,), modes)),
     )  # fmt: skip
     root = rng.normal(size=(modes, modes))
     loss = rng.normal(size=(modes, modes)) * (not lossless)
@@ -169,6 +175,8 @@ def _modal(
             name=node, position_m=tuple(vector(rng, 0.5)), quaternion=tuple(quaternion(rng)),
             translation_modes=matrix(rng.uniform(-1.0, 1.0, (modes, 3))),
             rotation_modes=matrix(rng.uniform(-2.0, 2.0, (modes, 3))),
+            **({} if curving is None else {key: plain(np.moveaxis(G, 0, -1))
+                                           for key, G in _curved(curving, (), modes).items()}),
         )
         for node in ("a", "b")
     ]  # fmt: skip
@@ -176,6 +184,12 @@ def _modal(
         name, points=points, stiffness=300.0 * (root @ root.T + np.eye(modes)), damping=0.2 * loss @ loss.T,
         boundary="free-free" if floating else "clamped-free", level=level, nodes=nodes,
     )  # fmt: skip
+
+
+def _curved(rng: Generator, points: tuple[int, ...], modes: int) -> dict[str, np.ndarray]:
+    """A second-order field (points,3,m,m) of no symmetry but its own; only the symmetric part acts."""
+    shape = (*points, 3, modes, modes)
+    return {"second_translation": rng.uniform(-0.5, 0.5, shape), "second_rotation": rng.uniform(-0.5, 0.5, shape)}
 
 
 def matrix(rows: np.ndarray) -> tuple[tuple[float, ...], ...]:

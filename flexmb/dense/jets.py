@@ -115,6 +115,11 @@ def scale(factor: Jet, matrix: Jet) -> Jet:
     return product(lambda s, A: s[..., None, None] * A, factor, matrix)
 
 
+def quadratic(G: Array, x: Jet) -> Jet:
+    """1/2 x' G x for vectors x (...,m): G (...,m,m), symmetric."""
+    return product(lambda a, b: 0.5 * np.einsum("...m,...mn,...n->...", a, G, b), x, x)
+
+
 def chain(f: Array, df: Array, d2f: Array, x: Jet) -> Jet:
     """f(x) from f, f' and f'' at x.value."""
     return Jet(f, df * x.rate, d2f * x.rate**2 + df * x.acceleration)

@@ -7,7 +7,18 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.dense.jets import Frame, Jet, constant, join, product, rotation_about, rotation_exponential, skew, turn
+from flexmb.dense.jets import (
+    Frame,
+    Jet,
+    constant,
+    join,
+    product,
+    quadratic,
+    rotation_about,
+    rotation_exponential,
+    skew,
+    turn,
+)
 from flexmb.dense.tree import Member, Rotor, Seat, Tree
 from flexmb.scene import schema as s
 
@@ -143,16 +154,27 @@ def _attitude(quaternion: Array, w: Array, w_rate: Array) -> Jet:
 
 
 def on_body(seat: Seat, eta: Jet) -> Frame:
-    """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset."""
+    """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset.
+
+    At level stiffened phi eta and psi eta have their second-order parts beside them.
+    """
     node = seat.node
-    moved = constant(node.position) + eta.map(lambda x: x @ node.translation.T)
-    turned = rotation_exponential(eta.map(lambda x: x @ node.rotation_modes.T)) @ constant(node.rotation)
-    return Frame(moved, turned).carry(Frame(constant(seat.offset), constant(seat.rotation)))
+    moved = eta.map(lambda x: x @ node.translation.T)
+    turned = eta.map(lambda x: x @ node.rotation_modes.T)
+    if node.second is not None:
+        moved = moved + quadratic(node.second.translation, eta[..., None, :])
+        turned = turned + quadratic(node.second.rotation, eta[..., None, :])
+    rotation = rotation_exponential(turned) @ constant(node.rotation)
+    return Frame(constant(node.position) + moved, rotation).carry(Frame(constant(seat.offset), constant(seat.rotation)))
 
 
 def field(member: Member, motion: Motion) -> Frame:
     """Mass centres and axes of a member's inertia points seen from its body: Jain & Rodriguez (2), turned exactly."""
     model, eta = member.model, motion.modes(member)[:, 0]
-    rotation = rotation_exponential(eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x)))
-    point = constant(model.position) + eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
-    return Frame(point + turn(rotation, constant(model.com_offset)), rotation)
+    moved = eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
+    turned = eta.map(lambda x: np.einsum("pam,bm->bpa", model.rotation, x))
+    if model.second is not None:
+        moved = moved + quadratic(model.second.translation, eta[:, None, None])
+        turned = turned + quadratic(model.second.rotation, eta[:, None, None])
+    rotation = rotation_exponential(turned)
+    return Frame(constant(model.position) + moved + turn(rotation, constant(model.com_offset)), rotation)

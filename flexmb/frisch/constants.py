@@ -27,7 +27,8 @@ def nested_constants(
     Null partitions phiR_H, phiT_H, phiR_W of hinges and wheels at nodes that do not deform are skipped, unless
     `null_partitions` keeps those that the constants have ports for.
 
-    ValueError where a body has modes that are not clamped at its origin and the print is to be followed.
+    ValueError where a body is of level stiffened, or has modes that are not clamped at its origin and the print is to
+    be followed.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mode.shape[1])
@@ -48,6 +49,11 @@ def nested_constants(
 def _parameters(link: Link, errata: Set[Erratum]) -> ModeParameters:
     """(48)-(72) of one body; the tensors of its despun wheels are left to I_W (26), their masses are elements."""
     model = link.model
+    if link.level == a.STIFFENED:
+        raise ValueError(
+            f'body "{link.name}": these equations are of first order in the deformation and know no geometric '
+            'stiffness, for which level "stiffened" stands; use level "linear" or "full", or algorithm "articulated"'
+        )
     first_wheel = len(model.mass) - link.wheels
     inertia = np.where((np.arange(len(model.mass)) < first_wheel)[:, None, None], model.inertia, 0.0)
     model = replace(model, inertia=inertia)

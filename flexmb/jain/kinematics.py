@@ -7,7 +7,7 @@ accelerations are classical (of the hinge point), not spatial; the body order is
 from flexmb.arrays import RUTHLESS
 from flexmb.hinges import catalogue
 from flexmb.kernel import helper
-from flexmb.levels.field import field_motion
+from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.vector import (
     add,
     add3,
@@ -47,14 +47,17 @@ def _move_port(c, w, k, i):
     """Pose and relative motion of port i of body k."""
     if c.body[k].modes == 0:
         return  # set once in the workspace
-    r, R, w_rel, v_rel, alpha, a = field_motion(
-        vec3(c.port[i].position, 0),
-        vec3(c.port[i].offset, 0),
-        c.port_mode[i],
-        w.mode[k],
-        c.body[k].modes,
-        w.port_mode[i],
-    )
+    x = vec3(c.port[i].position, 0)
+    offset = vec3(c.port[i].offset, 0)
+    row = c.port[i].second
+    if row >= 0:
+        r, R, w_rel, v_rel, alpha, a = second_order_motion(
+            x, offset, c.port_mode[i], c.second_shape[row], w.mode[k], c.body[k].modes, w.port_mode[i]
+        )
+    else:
+        r, R, w_rel, v_rel, alpha, a = field_motion(
+            x, offset, c.port_mode[i], w.mode[k], c.body[k].modes, w.port_mode[i]
+        )
     store3(w.port[i].r, 0, r)
     store9(w.port[i].R, 0, matmul(R, mat3(c.port[i].frame, 0)))
     store3(w.port[i].v, 0, w_rel)

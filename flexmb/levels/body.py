@@ -1,8 +1,8 @@
 """M_m and b_m of a body, whatever its level."""
 
-from flexmb.arrays import FULL, LINEAR, RUTHLESS
+from flexmb.arrays import FULL, LINEAR, RUTHLESS, STIFFENED
 from flexmb.kernel import helper
-from flexmb.levels import full, linear, rigid, ruthless
+from flexmb.levels import full, linear, rigid, ruthless, stiffened
 
 
 @helper
@@ -14,5 +14,7 @@ def body_inertia(c, w, k):
         ruthless.inertia_and_bias(c, w, k)
     elif c.body[k].level == LINEAR:
         linear.inertia_and_bias(c, w, k)
+    elif c.body[k].level == STIFFENED:
+        stiffened.inertia_and_bias(c, w, k)
     else:
         rigid.inertia_and_bias(c, w, k)

@@ -4,7 +4,7 @@ Angular momentum and force follow the point's exact motion; nothing is truncated
 """
 
 from flexmb.kernel import helper
-from flexmb.levels.field import field_motion
+from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.inertia import add_inertia, rigid_inertia
 from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3
 
@@ -15,14 +15,17 @@ def add_point(c, w, k, j):
     nm = c.body[k].modes
     omega = vec3(w.body[k].velocity, 0)
     mass = c.point[j].mass
-    r, rotation, w_rel, v_rel, alpha_rel, a_rel = field_motion(
-        vec3(c.point[j].position, 0),
-        vec3(c.point[j].offset, 0),
-        c.point_mode[j],
-        w.mode[k],
-        nm,
-        w.point_mode,
-    )
+    x = vec3(c.point[j].position, 0)
+    offset = vec3(c.point[j].offset, 0)
+    row = c.point[j].second
+    if row >= 0:
+        r, rotation, w_rel, v_rel, alpha_rel, a_rel = second_order_motion(
+            x, offset, c.point_mode[j], c.second_shape[row], w.mode[k], nm, w.point_mode
+        )
+    else:
+        r, rotation, w_rel, v_rel, alpha_rel, a_rel = field_motion(
+            x, offset, c.point_mode[j], w.mode[k], nm, w.point_mode
+        )
     inertia = rotate_sym(rotation, sym6(c.point[j].inertia, 0))
     # about the body origin: the mass mu at r, and the central inertia
     s = scale(mass, r)

@@ -80,6 +80,20 @@ class BeamElements:
                 moved[:, rotation] = sign * (rows.rotation @ part)
         return moved
 
+    def strain(self, x: Array, coefficients: Array) -> tuple[Array, Array]:
+        """At x (n,) for coordinate columns (size, m): [stretch; shears] (n,3,m), [twist; curvatures] (n,3,m) 1/m."""
+        stretch, turn = np.zeros((2, len(x), 3, coefficients.shape[1]))
+        for name, field in self.fields.items():
+            part = coefficients[self.coordinates(name)]
+            if isinstance(field, LineField):
+                (stretch if name == "axial" else turn)[:, 0] = field.at(x).slope @ part
+            else:
+                translation, rotation, sign = _BENDING_ROWS[name]
+                rows = field.at(x)
+                stretch[:, translation] = rows.shear @ part
+                turn[:, rotation - 3] = sign * (rows.curvature @ part)
+        return stretch, turn
+
     def stiffness(self) -> Array:
         """Stiffness matrix (size, size): the sum of EA e^2, GJ twist^2, EI curvature^2 and GA shear^2 over the beam."""
         x, weight = quadrature(self.mesh, self.table)

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
-from flexmb.modal.model import FlexibleModel, ModalNode
-from flexmb.modal.points import Points, axis_points, join, massy_lump, section_points, turning_lump
+from flexmb.modal.model import FlexibleModel, ModalNode, SecondOrder, undeforming_node
+from flexmb.modal.points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.raw import raw_model
 from flexmb.modal.reduce import beam_modes, damping_matrix
+from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.stations import Lump, Stations, inertia_stations, lumps
 from flexmb.scene.bodies import IDENTITY, BeamBody, ModalBody, Quaternion
 
@@ -52,6 +53,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
         damping=damping,
         nodes=_nodes(body, elements, modes.columns),
         clamped=body.modes.boundary == "clamped-free",
+        second=_second_order(body, elements, modes.columns, points.x, points.position - on_axis(points.x)),
     )
 
 
@@ -63,10 +65,17 @@ def _points(
     return join([along(elements, columns, stations), *(at_lump(elements, columns, lump) for lump in rigid_lumps)])
 
 
+def _second_order(
+    body: BeamBody, elements: BeamElements, columns: Array, x: Array, offset: Array
+) -> SecondOrder | None:
+    """Of points at `offset` (n,3) from the axis points x (n,); as large as all pairs of modes, so only where needed."""
+    return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None
+
+
 def _nodes(body: BeamBody, elements: BeamElements, columns: Array) -> dict[str, ModalNode]:
     """Nodes by name: origin, root, tip and the listed ones."""
     modes = columns.shape[1]
-    nodes = {"origin": ModalNode(np.zeros(3), np.eye(3), np.zeros((3, modes)), np.zeros((3, modes)))}
+    nodes = {"origin": undeforming_node(modes)}
     listed: list[tuple[str, float, Quaternion]] = [("root", 0.0, IDENTITY), ("tip", body.length_m, IDENTITY)]
     listed += [(node.name, node.x_m, node.quaternion) for node in body.nodes]
     for name, x, quaternion in listed:
@@ -74,5 +83,7 @@ def _nodes(body: BeamBody, elements: BeamElements, columns: Array) -> dict[str, 
             raise ValueError(f"beam '{body.name}': node '{name}' at x = {x:g} m is not on [0, {body.length_m:g}] m")
         moved = elements.motion(np.array([x]), columns)[0]
         turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
-        nodes[name] = ModalNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:])
+        second = _second_order(body, elements, columns, np.array([x]), np.zeros((1, 3)))
+        of_node = None if second is None else second.map(lambda G: G[0])
+        nodes[name] = ModalNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:], of_node)
     return nodes

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.model import FlexibleModel, SecondOrder
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,8 @@ class TurningPoints:
     """Inertia that turns with its point by exp(skew(theta)), theta = rotation eta; k points, m modes.
 
     mass (k,) kg, zero where the mass is already in the polynomial integrals; position (k,3) m; com_offset (k,3) m and
-    inertia (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m).
+    inertia (k,3,3) kg m^2 about the mass centre, both in point axes; translation and rotation mode shapes (k,3,m);
+    second-order field (k,3,m,m), where the body has one.
     """
 
     mass: Array
@@ -36,6 +37,7 @@ class TurningPoints:
     inertia: Array
     translation: Array
     rotation: Array
+    second: SecondOrder | None = None
 
 
 @dataclass(frozen=True)
@@ -55,6 +57,7 @@ class ModalIntegrals:
     spatial_mass   (m+6,m+6)   mass matrix at eta = 0 of the whole body, turning points included,
                                order [modes; angular; linear] about the body origin
     stiffness, damping (m,m)   as in the model
+    Z, Q           (m,m,3)     sum m G_nk, and (m,m,3,3) sum m G_nk r', of the second-order field; None without one
     """
 
     mass: float
@@ -70,6 +73,8 @@ class ModalIntegrals:
     spatial_mass: Array
     stiffness: Array
     damping: Array
+    Z: Array | None = None
+    Q: Array | None = None
 
     @property
     def mode_count(self) -> int:
@@ -82,6 +87,7 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
     m = np.where(offset, 0.0, model.mass)
     r, phi = model.position, model.translation
     r_cross, phi_cross = cross_matrix(r), cross_matrix(np.swapaxes(phi, 1, 2))
+    G = None if model.second is None else model.second.translation
     return ModalIntegrals(
         mass=float(m.sum()),
         s0=m @ r,
@@ -96,6 +102,8 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
         spatial_mass=_spatial_mass(model),
         stiffness=model.stiffness,
         damping=model.damping,
+        Z=None if G is None else np.einsum("p,pank->nka", m, G),
+        Q=None if G is None else np.einsum("p,pank,pb->nkab", m, G, r, optimize=True),
     )
 
 
@@ -109,6 +117,7 @@ def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
         inertia=model.inertia[kept],
         translation=model.translation[kept],
         rotation=model.rotation[kept],
+        second=None if model.second is None else model.second.map(lambda G: G[kept]),
     )
 
 

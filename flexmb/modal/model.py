@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,13 +12,37 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
+class SecondOrder:
+    """What moves with the squares of the modal coordinates: 1/2 eta' G eta, symmetric in the last two axes.
+
+    translation (...,3,m,m): added to the displacement phi eta of a point (m); rotation (...,3,m,m): added to its
+    rotation vector psi eta. Leading axes: points, or none for a node.
+    """
+
+    translation: Array
+    rotation: Array
+
+    def turned(self, turn: Array) -> SecondOrder:
+        """The same in axes R_new_old = `turn`."""
+        return self.map(lambda G: np.einsum("ab,...bmn->...amn", turn, G))
+
+    def map(self, linear: Callable[[Array], Array]) -> SecondOrder:
+        """The same operation on both fields."""
+        return SecondOrder(linear(self.translation), linear(self.rotation))
+
+
+@dataclass(frozen=True)
 class ModalNode:
-    """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m)."""
+    """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m).
+
+    `second` (3,m,m): its second-order field, where the body has one.
+    """
 
     position: Array
     rotation: Array
     translation: Array
     rotation_modes: Array
+    second: SecondOrder | None = None
 
     def seen_from(self, origin: Array, turn: Array) -> ModalNode:
         """The same node in axes R_new_old = `turn` about `origin` (3,), old axes."""
@@ -26,7 +51,14 @@ class ModalNode:
             turn @ self.rotation,
             turn @ self.translation,
             turn @ self.rotation_modes,
+            None if self.second is None else self.second.turned(turn),
         )
+
+
+def undeforming_node(modes: int) -> ModalNode:
+    """The body frame as a node: no mode moves it."""
+    none = np.zeros((3, modes))
+    return ModalNode(np.zeros(3), np.eye(3), none, none)
 
 
 @dataclass(frozen=True)
@@ -35,7 +67,8 @@ class FlexibleModel:
 
     mass (n,) kg; position (n,3) m; com_offset (n,3) m, in point axes, turning with the point; inertia (n,3,3) kg m^2
     about the point's mass centre, turning with the point; translation and rotation mode shapes (n,3,m); stiffness and
-    damping (m,m); `nodes` by name, always with "origin". `clamped`: the modes vanish at the body origin.
+    damping (m,m); `nodes` by name, always with "origin". `clamped`: the modes vanish at the body origin. `second`: the
+    second-order field of the points (n,3,m,m), of bodies of level `stiffened`.
     """
 
     mass: Array
@@ -48,7 +81,23 @@ class FlexibleModel:
     damping: Array
     nodes: dict[str, ModalNode]
     clamped: bool
+    second: SecondOrder | None = None
 
     @property
     def mode_count(self) -> int:
         return self.translation.shape[2]
+
+
+def with_node(model: FlexibleModel, node: ModalNode) -> SecondOrder | None:
+    """The second-order field of the points of `model` and, as one more point, of `node`; None where it has none.
+
+    A node without one does not deform.
+    """
+    if model.second is None:
+        return None
+    m = model.mode_count
+    last = node.second or SecondOrder(np.zeros((3, m, m)), np.zeros((3, m, m)))
+    return SecondOrder(
+        np.concatenate([model.second.translation, last.translation[None]]),
+        np.concatenate([model.second.rotation, last.rotation[None]]),
+    )

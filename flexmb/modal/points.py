@@ -15,8 +15,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Points:
-    """Inertia points with modes; the arrays of `FlexibleModel` (which says units and frames) of the same names."""
+    """Inertia points with modes; the arrays of `FlexibleModel` (which says units and frames) of the same names.
 
+    x (n,) m: the axis point with which each moves.
+    """
+
+    x: Array
     mass: Array
     position: Array
     com_offset: Array
@@ -38,7 +42,7 @@ def axis_points(elements: BeamElements, columns: Array, stations: Stations) -> P
     inertia[:, 1, 1] = stations.inertia_y
     inertia[:, 2, 2] = stations.inertia_z
     offset = np.zeros((len(stations.x), 3))
-    return Points(stations.mass, _on_axis(stations.x), offset, inertia, moved[:, :3], moved[:, 3:])
+    return Points(stations.x, stations.mass, on_axis(stations.x), offset, inertia, moved[:, :3], moved[:, 3:])
 
 
 def section_points(elements: BeamElements, columns: Array, stations: Stations) -> Points:
@@ -61,7 +65,7 @@ def turning_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
     x = np.array([lump.x])
     moved = elements.motion(x, columns)
     mass = np.array([lump.mass])
-    return Points(mass, _on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:])
+    return Points(x, mass, on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:])
 
 
 def massy_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
@@ -89,9 +93,9 @@ def _massy(elements: BeamElements, columns: Array, x: Array, offset: Array, mass
     moved = elements.motion(x, columns)
     translation = moved[:, :3] + np.cross(moved[:, 3:], offset[:, :, None], axis=1)
     nothing = np.zeros((len(x), 3))
-    return Points(mass, _on_axis(x) + offset, nothing, np.zeros((len(x), 3, 3)), translation, moved[:, 3:])
+    return Points(x, mass, on_axis(x) + offset, nothing, np.zeros((len(x), 3, 3)), translation, moved[:, 3:])
 
 
-def _on_axis(x: Array) -> Array:
+def on_axis(x: Array) -> Array:
     """Positions (n,3) of axis points."""
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])

@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.model import FlexibleModel, ModalNode, undeforming_node
+from flexmb.modal.raw_second_order import node_second_order, second_order
 from flexmb.scene.bodies import ModalBody, Vector
 from flexmb.scene.modal_data import modal_arrays
 
@@ -28,6 +29,10 @@ def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
     except ValueError as error:
         raise ValueError(f"modal body '{body.name}': {error}") from error
     modes = arrays.translation_modes.shape[2]
+    try:
+        second = second_order(arrays) if body.level == "stiffened" else None
+    except ValueError as error:
+        raise ValueError(f"modal body '{body.name}': {error}") from error
     return FlexibleModel(
         mass=arrays.mass,
         position=arrays.position,
@@ -39,12 +44,13 @@ def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
         damping=arrays.damping,
         nodes=_nodes(body, modes),
         clamped=body.boundary == "clamped-free",
+        second=second,
     )
 
 
 def _nodes(body: ModalBody, modes: int) -> dict[str, ModalNode]:
     """Nodes by name, with "origin": the body frame, which does not deform."""
-    nodes = {"origin": ModalNode(np.zeros(3), np.eye(3), np.zeros((3, modes)), np.zeros((3, modes)))}
+    nodes = {"origin": undeforming_node(modes)}
     for node in body.nodes:
         if len(node.translation_modes) != modes or len(node.rotation_modes) != modes:
             raise ValueError(
@@ -56,6 +62,7 @@ def _nodes(body: ModalBody, modes: int) -> dict[str, ModalNode]:
             Rotation.from_quat(node.quaternion, scalar_first=True).as_matrix(),
             _columns(node.translation_modes),
             _columns(node.rotation_modes),
+            node_second_order(node) if body.level == "stiffened" else None,
         )
     return nodes
 

@@ -10,6 +10,8 @@ Vector = tuple[float, float, float]
 Matrix3 = tuple[Vector, Vector, Vector]
 Quaternion = tuple[float, float, float, float]
 Level = Literal["rigid", "ruthless", "linear", "full", "stiffened"]
+Square = tuple[tuple[float, ...], ...]
+VectorSquare = tuple[tuple[Vector, ...], ...]
 
 IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -121,7 +123,9 @@ class InertiaPoint(_Strict, frozen=True, kw_only=True):
     """One inertia point of a raw modal body (FORMULATION of the modal field: docs/notation.md).
 
     `translation_modes[n]` and `rotation_modes[n]` are the point's displacement and rotation for unit modal
-    coordinate n. `com_offset_m` is the mass centre's offset from the point, turning with it.
+    coordinate n. `com_offset_m` is the mass centre's offset from the point, turning with it. `second_translation[n][k]`
+    and `second_rotation[n][k]`, m x m vectors G_nk, add 1/2 sum G_nk eta_n eta_k to displacement and rotation vector at
+    level "stiffened"; only their symmetric part acts.
     """
 
     mass_kg: float
@@ -130,16 +134,25 @@ class InertiaPoint(_Strict, frozen=True, kw_only=True):
     rotation_modes: tuple[Vector, ...] = ()
     inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
     com_offset_m: Vector = ZERO
+    second_translation: VectorSquare = ()
+    second_rotation: VectorSquare = ()
 
 
 class ModalNode(_Strict, frozen=True, kw_only=True):
-    """A node of a raw modal body with its mode shapes."""
+    """A node of a raw modal body with its mode shapes.
+
+    For level "stiffened" its second-order field too: `second_translation` and `second_rotation` as at an InertiaPoint,
+    or `force_stiffness`, the three geometric stiffness matrices (m x m) under a unit force at the node along x, y, z.
+    """
 
     name: str
     position_m: Vector
     translation_modes: tuple[Vector, ...]
     rotation_modes: tuple[Vector, ...]
     quaternion: Quaternion = IDENTITY
+    second_translation: VectorSquare = ()
+    second_rotation: VectorSquare = ()
+    force_stiffness: tuple[Square, ...] = ()
 
 
 class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
@@ -148,6 +161,13 @@ class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind
     The `.npz` holds mass (n,), position (n,3), translation_modes (n,3,m), and optionally rotation_modes (n,3,m),
     inertia (n,3,3), com_offset (n,3), stiffness (m,m), damping (m,m).
     `boundary` "clamped-free" asserts that the modes vanish at the body origin.
+
+    Level "stiffened" needs the second-order field of the points (`second_translation` of each, in the `.npz`
+    second_translation and optionally second_rotation (n,3,m,m)), or instead geometric stiffness matrices (m x m), here
+    or in the `.npz`: `gravity_stiffness[a]` (3,m,m) under the forces mass times unit acceleration along axis a on all
+    points, and `gradient_stiffness[a][b]` (3,3,m,m) under mass times the points' coordinate b along axis a. What a
+    finite-element code gives for spin about z is gradient_stiffness [x][x] + [y][y], for angular acceleration about z
+    [x][y] - [y][x]. Matrices are positive where the load stiffens.
     """
 
     name: str
@@ -155,6 +175,8 @@ class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind
     file: str | None = None
     stiffness: tuple[tuple[float, ...], ...] = ()
     damping: tuple[tuple[float, ...], ...] = ()
+    gravity_stiffness: tuple[Square, ...] = ()
+    gradient_stiffness: tuple[tuple[Square, ...], ...] = ()
     boundary: Literal["clamped-free", "free-free"] = "clamped-free"
     level: Level = "full"
     nodes: tuple[ModalNode, ...] = ()

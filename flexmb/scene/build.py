@@ -178,15 +178,16 @@ class SceneBuilder:
         self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
         stiffness: ArrayLike = (), damping: ArrayLike = (),
         boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
-        nodes: Sequence[s.ModalNode] = (),
+        nodes: Sequence[s.ModalNode] = (), gravity_stiffness: ArrayLike = (), gradient_stiffness: ArrayLike = (),
     ) -> Self:  # fmt: skip
         """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
 
-        `stiffness`, `damping`: modal matrices (m,m), if the file does not hold them.
+        `stiffness`, `damping`: modal matrices (m,m), if the file does not hold them. `gravity_stiffness` (3,m,m) and
+        `gradient_stiffness` (3,3,m,m): geometric stiffness under unit loads (see ModalBody).
         """
         return self._append(
             s.ModalBody, name=name, points=points, file=file, stiffness=stiffness, damping=damping, boundary=boundary,
-            level=level, nodes=nodes,
+            level=level, nodes=nodes, gravity_stiffness=gravity_stiffness, gradient_stiffness=gradient_stiffness,
         )  # fmt: skip
 
     def sid_body(self, name: str, *, file: str, level: s.Level = "full") -> Self:

@@ -8,7 +8,7 @@ from zipfile import BadZipFile
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.scene.bodies import InertiaPoint, ModalBody
+from flexmb.scene.bodies import InertiaPoint, ModalBody, ModalNode
 from flexmb.scene.convert import plain, to_struct
 
 Array = NDArray[np.float64]
@@ -16,7 +16,11 @@ Array = NDArray[np.float64]
 
 class ModalArrays(NamedTuple):
     """n points, m modes: mass (n,) kg, position (n,3) m, translation_modes and rotation_modes (n,3,m), inertia (n,3,3)
-    kg m² about the point's mass centre, com_offset (n,3) m, stiffness and damping (m,m)."""
+    kg m² about the point's mass centre, com_offset (n,3) m, stiffness and damping (m,m).
+
+    For level "stiffened", None where not given: second_translation and second_rotation (n,3,m,m), or geometric
+    stiffness under unit loads, gravity_stiffness (3,m,m) and gradient_stiffness (3,3,m,m).
+    """
 
     mass: Array
     position: Array
@@ -26,8 +30,18 @@ class ModalArrays(NamedTuple):
     com_offset: Array
     stiffness: Array
     damping: Array
+    second_translation: Array | None = None
+    second_rotation: Array | None = None
+    gravity_stiffness: Array | None = None
+    gradient_stiffness: Array | None = None
+
+    @property
+    def given(self) -> dict[str, Array]:
+        """By name, those that are there."""
+        return {name: array for name, array in self._asdict().items() if array is not None}
 
 
+OF_BODY = ("stiffness", "damping", "gravity_stiffness", "gradient_stiffness")
 REQUIRED = ("mass", "position", "translation_modes")
 
 
@@ -37,12 +51,28 @@ def modal_arrays(body: ModalBody) -> ModalArrays:
     Raises OSError where the file cannot be read, and ValueError naming an array that is missing or has a wrong shape.
     """
     given = _from_file(body.file) if body.file is not None else _from_points(body.points)
-    for name, matrix in (("stiffness", body.stiffness), ("damping", body.damping)):
-        if matrix:
+    for name in OF_BODY:
+        if matrix := getattr(body, name):
             if name in given:
                 raise ValueError(f'"{name}" is given in the scene and in "{body.file}"')
             given[name] = _array(name, matrix)
     return _shaped(given)
+
+
+def node_arrays(node: ModalNode) -> dict[str, Array]:
+    """The second-order data that a node has: second_translation, second_rotation (3,m,m), force_stiffness (3,m,m).
+
+    ValueError names one with a wrong shape.
+    """
+    m, given = len(node.translation_modes), {}
+    for name in ("second_translation", "second_rotation", "force_stiffness"):
+        if value := getattr(node, name):
+            array = _array(name, value)
+            array = np.moveaxis(array, -1, 0) if name != "force_stiffness" else array
+            if array.shape != (3, m, m):
+                raise ValueError(f'node "{node.name}": "{name}" has shape {array.shape}, expected {(3, m, m)}')
+            given[name] = array
+    return given
 
 
 def inertia_points(
@@ -52,12 +82,17 @@ def inertia_points(
     rotation_modes: ArrayLike | None = None,
     inertia: ArrayLike | None = None,
     com_offset: ArrayLike | None = None,
+    second_translation: ArrayLike | None = None,
+    second_rotation: ArrayLike | None = None,
 ) -> tuple[InertiaPoint, ...]:
     """Inertia points of a scene from arrays in the layout of the `.npz` (see ModalArrays).
 
     ValueError names an array with a wrong shape.
     """
-    optional = {"rotation_modes": rotation_modes, "inertia": inertia, "com_offset": com_offset}
+    optional = {
+        "rotation_modes": rotation_modes, "inertia": inertia, "com_offset": com_offset,
+        "second_translation": second_translation, "second_rotation": second_rotation,
+    }  # fmt: skip
     given = {"mass": mass, "position": position, "translation_modes": translation_modes}
     given |= {name: value for name, value in optional.items() if value is not None}
     arrays = _shaped({name: _array(name, value) for name, value in given.items()})
@@ -71,6 +106,9 @@ def inertia_points(
             "inertia_kg_m2": arrays.inertia[j],
             "com_offset_m": arrays.com_offset[j],
         }
+        for name in ("second_translation", "second_rotation"):
+            if name in given:
+                point[name] = np.moveaxis(getattr(arrays, name)[j], 0, -1)
         points.append(to_struct(plain(point), InertiaPoint))
     return tuple(points)
 
@@ -99,6 +137,10 @@ def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Array]:
     if any(p.rotation_modes for p in points):
         none = ((0.0, 0.0, 0.0),) * given["translation_modes"].shape[2]
         given["rotation_modes"] = _modes("rotation_modes", [p.rotation_modes or none for p in points])
+    for name in ("second_translation", "second_rotation"):
+        fields = [getattr(p, name) for p in points]
+        if any(fields):
+            given[name] = np.moveaxis(_array(name, fields), -1, 1)
     return given
 
 
@@ -127,10 +169,15 @@ def _shaped(given: dict[str, Array]) -> ModalArrays:
         "mass": (n,), "position": (n, 3), "translation_modes": (n, 3, m), "rotation_modes": (n, 3, m),
         "inertia": (n, 3, 3), "com_offset": (n, 3), "stiffness": (m, m), "damping": (m, m),
     }  # fmt: skip
-    unknown = sorted(given.keys() - shapes.keys())
+    second = {
+        "second_translation": (n, 3, m, m), "second_rotation": (n, 3, m, m), "gravity_stiffness": (3, m, m),
+        "gradient_stiffness": (3, 3, m, m),
+    }  # fmt: skip
+    known = shapes | second
+    unknown = sorted(given.keys() - known.keys())
     if unknown:
-        raise ValueError(f'"{unknown[0]}" is not one of {", ".join(shapes)}')
+        raise ValueError(f'"{unknown[0]}" is not one of {", ".join(known)}')
     for name, array in given.items():
-        if array.shape != shapes[name]:
-            raise ValueError(f'"{name}" has shape {array.shape}, expected {shapes[name]} (n={n} points, m={m} modes)')
-    return ModalArrays(*(given.get(name, np.zeros(shape)) for name, shape in shapes.items()))
+        if array.shape != known[name]:
+            raise ValueError(f'"{name}" has shape {array.shape}, expected {known[name]} (n={n} points, m={m} modes)')
+    return ModalArrays(**{name: np.zeros(shape) for name, shape in shapes.items()} | given)

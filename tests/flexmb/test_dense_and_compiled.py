@@ -20,7 +20,7 @@ from tests.bounds import algebra, backward_error, gamma
 
 RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "mixed": trees.MIXED,
-    "linear": trees.LINEAR, "every level": trees.EVERY_LEVEL, "free-flying": trees.FREE_FLYING,
+    "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL, "free-flying": trees.FREE_FLYING,
     "conservative": trees.CONSERVATIVE,
 }  # fmt: skip
 SEEDS = range(2)

@@ -12,6 +12,7 @@ from scipy.linalg import eigh
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.beams import mode_count
+from flexmb.scene.check.second_order import second_order
 from flexmb.scene.check.walk import entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Place, Problem
@@ -34,6 +35,7 @@ def modal_bodies(scene: Scene) -> Iterator[Problem]:
                 yield from _points(place, body, arrays)
                 yield from _matrices(place, body, arrays)
                 yield from _shapes(place, body, arrays)
+                yield from second_order(place, body, arrays)
 
 
 def modal_states(scene: Scene) -> Iterator[Problem]:
@@ -75,9 +77,9 @@ def _read(place: Place, body: ModalBody) -> Generator[Problem, None, ModalArrays
     except ValueError as error:
         yield Problem(str(spot), str(error), "give arrays of the shapes that the reference of ModalBody lists")
     else:
-        if all(np.all(np.isfinite(array)) for array in arrays):
+        broken = next((name for name, array in arrays.given.items() if not np.all(np.isfinite(array))), None)
+        if broken is None:
             return arrays
-        broken = next(name for name, array in arrays._asdict().items() if not np.all(np.isfinite(array)))
         yield Problem(str(spot), f'"{broken}" holds a NaN or an infinity', "give finite numbers")
     return None
 

@@ -1,0 +1,68 @@
+"""Second-order field of a raw modal body: as the user gives it, or from geometric stiffness under unit loads.
+
+A load F_j on the points does the work sum F_j . u_2j = 1/2 eta' (sum F_j . G_j) eta on the second-order field, which is
+minus half the geometric stiffness it brings: K_g = -sum F_j . G_j. Of the field of the points the kinetic energy needs
+nothing but sum m G and sum m r x' G, hence the stiffness under mass forces that are uniform or grow with the
+coordinates. Every field with these integrals is as good as the true one; the one that is affine in the place is taken.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.model import SecondOrder
+from flexmb.scene.bodies import ModalNode
+from flexmb.scene.modal_data import ModalArrays, node_arrays
+
+Array = NDArray[np.float64]
+
+EXTENT = 1e-9  # share of the mass' extent below which points lie in a plane or on a line
+
+
+def second_order(arrays: ModalArrays) -> SecondOrder | None:
+    """Field of the points (n,3,m,m), None without data.
+
+    ValueError where gradient_stiffness has a load that no mass feels.
+    """
+    if arrays.second_translation is not None:
+        G, H = arrays.second_translation, arrays.second_rotation
+        return SecondOrder(G, np.zeros_like(G) if H is None else H).map(_symmetric)
+    if arrays.gravity_stiffness is None or arrays.gradient_stiffness is None:
+        return None
+    G = _affine(arrays, _symmetric(-arrays.gravity_stiffness), _symmetric(-arrays.gradient_stiffness))
+    return SecondOrder(G, np.zeros_like(G))
+
+
+def node_second_order(node: ModalNode) -> SecondOrder | None:
+    """Field of a node (3,m,m), None without data."""
+    given = node_arrays(node)
+    if not given:
+        return None
+    m = len(node.translation_modes)
+    translation = given.get("second_translation", -given.get("force_stiffness", np.zeros((3, m, m))))
+    return SecondOrder(translation, given.get("second_rotation", np.zeros((3, m, m)))).map(_symmetric)
+
+
+def _affine(arrays: ModalArrays, Z: Array, X: Array) -> Array:
+    """G (n,3,m,m), affine in the mass centres at rest p, with sum m G_a = Z_a and sum m p_b G_a = X_ab."""
+    p = arrays.position + arrays.com_offset
+    size = np.max(np.abs(p), initial=0.0) or 1.0
+    rows = np.column_stack([np.ones(len(p)), p / size])
+    moments = (rows.T * arrays.mass) @ rows
+    wanted = np.concatenate([Z[:, None], X / size], axis=1)
+    parameters = np.einsum("bc,acnk->abnk", np.linalg.pinv(moments, rcond=EXTENT, hermitian=True), wanted)
+    left = wanted - np.einsum("bc,acnk->abnk", moments, parameters)
+    largest = np.max(np.abs(left[:, 1:]), axis=(2, 3))
+    if np.max(largest) > np.sqrt(EXTENT) * np.max(np.abs(wanted)):
+        along, axis = ("xyz"[i] for i in np.unravel_index(np.argmax(largest), largest.shape))
+        raise ValueError(
+            f'"gradient_stiffness" says that mass forces along {along} that grow with {axis} stiffen the body, but its '
+            f"points have no extent along {axis}; correct the matrices, or the points"
+        )
+    return np.einsum("pb,abnk->pank", rows, parameters)
+
+
+def _symmetric(G: Array) -> Array:
+    """The part that acts."""
+    return 0.5 * (G + np.swapaxes(G, -1, -2))

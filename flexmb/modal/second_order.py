@@ -1,0 +1,78 @@
+"""Second-order field of a beam: what its axis and sections do with the squares of its modal coordinates.
+
+The modal coordinates measure strain: curvature and twist kappa = theta' of the modes, and their stretch and shears
+Gamma = [e, gamma_y, gamma_z], in axes that turn with the section, are linear in eta, so that the strain energy
+1/2 eta' K eta stays exact. The beam's kinematics R' = R kappa~, r' = R (e_x + Gamma) then give rotation vector and position to second order
+
+    theta_2 = 1/2 int theta x theta' dx
+    u_2'    = theta_2 x e_x + 1/2 theta x (theta x e_x) + theta x Gamma
+
+with theta = psi eta of first order. Bending alone leaves u_2 = -1/2 int (v'^2 + w'^2) dx along the axis: it shortens,
+hence centrifugal and gravity stiffening, buckling. Bending in two planes with torsion turns and moves sections sideways
+too: without that a beam would not buckle laterally. The integrals start at the root, which moves by the modes alone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.modal.beam import BeamElements
+from flexmb.modal.model import SecondOrder
+
+Array = NDArray[np.float64]
+
+GAUSS_POINTS = 6
+"""Exact to degree 11. Between nodes theta and Gamma are polynomials of degree 4, x theta x theta' of degree 8."""
+_X = np.array([1.0, 0.0, 0.0])
+
+
+def beam_second_order(elements: BeamElements, columns: Array, x: Array, offset: Array) -> SecondOrder:
+    """Field (n,3,m,m) of points at `offset` (n,3) m from the axis points x (n,), in the sections of these.
+
+    `columns` (size,m) are the modes. A point off the axis turns with its section: to second order
+    theta_2 x o + 1/2 theta x (theta x o) is added to the axis' displacement.
+    """
+    where, place = np.unique(np.concatenate([[0.0], x]), return_inverse=True)
+    axis = _axis(elements, columns, where).map(lambda G: G[place[1:]])
+    theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
+    swung = np.cross(np.moveaxis(axis.rotation, 1, -1), offset[:, None, None])
+    swung += _symmetric(np.cross(theta[:, :, None], np.cross(theta, offset[:, None])[:, None]))
+    return SecondOrder(axis.translation + np.moveaxis(swung, -1, 1), axis.rotation)
+
+
+def _axis(elements: BeamElements, columns: Array, x: Array) -> SecondOrder:
+    """Field of the axis at ascending x (n,), the first of them 0: integrals added up piece by piece.
+
+    int_0^x theta_2 is x int theta_2' - int x theta_2'.
+    """
+    breaks = np.union1d(elements.mesh.nodes, x)
+    s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+    half = np.diff(breaks) / 2.0
+    at = (breaks[:-1] + half)[:, None] + half[:, None] * s
+    turning, slope = _rates(elements, columns, at.ravel())
+
+    def up_to_x(rate: Array) -> Array:
+        """Integral (n,m,m,3) from the root of `rate` (points,m,m,3)."""
+        pieces = np.einsum("pg,pgmna->pmna", half[:, None] * w, rate.reshape(*at.shape, *rate.shape[1:]))
+        total = np.concatenate([np.zeros((1, *pieces.shape[1:])), np.cumsum(pieces, axis=0)])
+        return total[np.searchsorted(breaks, x)]
+
+    rotation = up_to_x(turning)
+    of_rotation = x[:, None, None, None] * rotation - up_to_x(at.reshape(-1, 1, 1, 1) * turning)
+    translation = up_to_x(slope) + np.cross(of_rotation, _X)
+    return SecondOrder(np.moveaxis(translation, -1, 1), np.moveaxis(rotation, -1, 1))
+
+
+def _rates(elements: BeamElements, columns: Array, x: Array) -> tuple[Array, Array]:
+    """By pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
+    theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
+    strain, curvature = (np.swapaxes(each, 1, 2) for each in elements.strain(x, columns))
+    turning = _symmetric(np.cross(theta[:, :, None], curvature[:, None]))
+    tilting = _symmetric(np.cross(theta[:, :, None], np.cross(theta, _X)[:, None]))
+    return turning, tilting + 2.0 * _symmetric(np.cross(theta[:, :, None], strain[:, None]))
+
+
+def _symmetric(product: Array) -> Array:
+    """Half the sum with the modes exchanged, (n,m,m,3)."""
+    return 0.5 * (product + np.swapaxes(product, 1, 2))
