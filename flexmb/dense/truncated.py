@@ -118,7 +118,7 @@ def _stiffened(member: Member, eta: Array, etad: Array, w: Array) -> tuple[Array
     on_points = replace(
         model, mass=np.where(off, 0.0, model.mass), com_offset=np.zeros_like(model.com_offset),
         inertia=np.zeros_like(model.inertia), translation=np.zeros_like(model.translation),
-        second=model.second.map(lambda G: 1j * STEP * G),
+        second=SecondOrder(1j * STEP * model.second.translation, model.second.rotation),  # type: ignore[arg-type]
     )  # fmt: skip
     M, bias = _sum(replace(member, model=exact), eta, etad, w)
     M_G, bias_G = _sum(replace(member, model=on_points), eta, etad, w)

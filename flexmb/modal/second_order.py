@@ -1,8 +1,9 @@
 """Second-order field of a beam: what its axis and sections do with the squares of its modal coordinates.
 
-The modal coordinates measure strain: curvature and twist kappa = theta' of the modes, and their stretch and shears
-Gamma = [e, gamma_y, gamma_z], in axes that turn with the section, are linear in eta, so that the strain energy
-1/2 eta' K eta stays exact. The beam's kinematics R' = R kappa~, r' = R (e_x + Gamma) then give rotation vector and position to second order
+The modal coordinates measure strain: curvature and twist kappa = theta' of the modes, stretch and shears Gamma =
+[e, gamma_y, gamma_z], all in axes that turn with the section, are linear in eta, so that the strain energy
+1/2 eta' K eta stays exact. The beam's kinematics R' = R kappa~, r' = R (e_x + Gamma) then give its rotation vector and
+position to second order
 
     theta_2 = 1/2 int theta x theta' dx
     u_2'    = theta_2 x e_x + 1/2 theta x (theta x e_x) + theta x Gamma

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from flexmb.modal import flexible_model
+from flexmb.modal.model import SecondOrder
+from flexmb.scene.bodies import VectorSquare
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import BeamBody, ModalBody, ModalNode, Scene
 from flexmb.scene.tree import rest_frames
@@ -16,7 +20,10 @@ Array = NDArray[np.float64]
 
 
 def modal_points(scene: Scene) -> Scene:
-    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same."""
+    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same.
+
+    At level "stiffened" with the second-order field of its points and nodes.
+    """
     return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
 
 
@@ -29,17 +36,30 @@ def _modal(beam: BeamBody) -> ModalBody:
             name=name, position_m=vector(node.position), quaternion=quaternions[name],
             translation_modes=tuple(map(vector, node.translation.T)),
             rotation_modes=tuple(map(vector, node.rotation_modes.T)),
+            **_field(node.second),
         )
         for name, node in model.nodes.items()
         if free or name != "origin"
     )  # fmt: skip
+    second = {} if model.second is None else dataclasses.asdict(model.second)
     return ModalBody(
         name=beam.name, nodes=nodes, boundary=beam.modes.boundary, level=beam.level,
         points=inertia_points(
-            model.mass, model.position, model.translation, model.rotation, model.inertia, model.com_offset
+            model.mass, model.position, model.translation, model.rotation, model.inertia, model.com_offset,
+            **{f"second_{name}": G for name, G in second.items()},
         ),
         stiffness=tuple(map(_floats, model.stiffness)), damping=tuple(map(_floats, model.damping)),
     )  # fmt: skip
+
+
+def _field(second: SecondOrder | None) -> dict[str, VectorSquare]:
+    """The second-order field (3,m,m) of a node by the keys of the scene."""
+    if second is None:
+        return {}
+    return {
+        f"second_{name}": tuple(tuple(map(vector, row)) for row in np.moveaxis(G, 0, -1))
+        for name, G in dataclasses.asdict(second).items()
+    }
 
 
 def _floats(values: Array) -> tuple[float, ...]:

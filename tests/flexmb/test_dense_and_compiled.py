@@ -20,8 +20,8 @@ from tests.bounds import algebra, backward_error, gamma
 
 RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "mixed": trees.MIXED,
-    "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL, "free-flying": trees.FREE_FLYING,
-    "conservative": trees.CONSERVATIVE,
+    "linear": trees.LINEAR, "stiffened": trees.STIFFENED, "every level": trees.EVERY_LEVEL,
+    "free-flying": trees.FREE_FLYING, "conservative": trees.CONSERVATIVE,
 }  # fmt: skip
 SEEDS = range(2)
 
