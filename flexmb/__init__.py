@@ -19,6 +19,7 @@ from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
 if TYPE_CHECKING:
+    from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.system import ClosureError
     from flexmb.simulation import simulate
     from flexmb.state import DynamicsError, State
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from flexmb.trajectory import Trajectory
 
 _LATER = {
+    "Advice": "flexmb.advisor.advice",
+    "advise": "flexmb.advisor.advice",
     "ClosureError": "flexmb.closure.system",
     "simulate": "flexmb.simulation",
     "Status": "flexmb.status",
@@ -39,8 +42,8 @@ _LATER = {
 }
 
 __all__ = [
-    "ClosureError", "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System",
-    "Trajectory", "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
+    "Advice", "ClosureError", "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System",
+    "Trajectory", "advise", "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
 ]  # fmt: skip
 
 

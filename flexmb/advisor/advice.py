@@ -1,0 +1,204 @@
+"""Advice: the cheapest model and method that give a quantity of a scene to a tolerance, with the evidence."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexmb.advisor.bench import Bench
+from flexmb.advisor.confirm import Confirmation, NoReference, Reference
+from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
+from flexmb.advisor.ladder import Step, cost, model_cost, rungs, step
+from flexmb.advisor.methods import Method
+from flexmb.advisor.models import LEVELS, Model, Rung, built, flexible_bodies
+from flexmb.advisor.quantity import Quantity, measured, quantities, scales
+from flexmb.advisor.response import FAMILIES, RigidRun, modal_response, rigid_run
+from flexmb.advisor.search import search
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.check import check_scene
+from flexmb.scene.schema import Scene
+
+BUDGET = 3e10
+"""Operations that all runs of one advice may take before the walk down ends; about 20 s."""
+REFERENCE_SHARE = 0.15
+"""Of the budget: the most that one reference may be expected to cost."""
+STIRRED = 1e-3
+"""Of the tolerance: families of modes that add less than that are not excited."""
+
+
+@dataclass(frozen=True)
+class Trial:
+    """A model that was run: predicted and measured error (U included), operations of its fine run, verdict."""
+
+    model: Model
+    predicted: float
+    measured: float
+    operations: float
+    adequate: bool
+
+
+@dataclass(frozen=True)
+class BodyAdvice:
+    """The rung of one body, its own predicted error, and why: the indicators in words."""
+
+    body: str
+    rung: Rung
+    predicted: float
+    reason: str
+
+
+@dataclass(frozen=True)
+class Advice:
+    """What to simulate, and how it is known.
+
+    If `accepted`: `bodies`, `method`, the reduced `scene`; errors as parts of the scale of `quantities`: `predicted`,
+    and `measured` over the whole horizon by the chosen method, with the reference's `uncertainty` in it; operations of
+    the run `predicted_operations` and counted `operations`; `seconds` of integration, which nothing depends on.
+    Else `refusal` says why no model is known to be adequate. `trials`: every model that was run. `notes`: what else.
+    """
+
+    name: str
+    t_end: float
+    tolerance: float
+    quantities: tuple[Quantity, ...]
+    refusal: str = ""
+    bodies: tuple[BodyAdvice, ...] = ()
+    method: Method | None = None
+    scene: Scene | None = None
+    predicted: float = np.nan
+    measured: float = np.nan
+    uncertainty: float = np.nan
+    predicted_operations: float = np.nan
+    operations: float = np.nan
+    evaluations: int = 0
+    seconds: float = np.nan
+    reference: str = ""
+    trials: tuple[Trial, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @property
+    def accepted(self) -> bool:
+        return not self.refusal
+
+
+def advise(
+    scene: Scene,
+    tolerance: float,
+    quantity: str | Quantity | Sequence[str | Quantity] | None = None,
+    t_end: float = 10.0,
+) -> Advice:
+    """The cheapest model of every flexible body, and method, that give `quantity` to `tolerance` up to `t_end` (s).
+
+    `quantity`: one or several as in `flexmb.advisor.quantity`, by default all markers' positions; `tolerance`: largest
+    error, relative to its scale. Everything is run to the end of the horizon, and the cost is counted operations, so
+    the advice is the same wherever it is asked for. Raises SceneError for a scene that is wrong, ValueError for a
+    quantity that is not there; where no model is adequate, the advice says so in `refusal`.
+    """
+    check_scene(scene, t_end)
+    if not 0.0 < tolerance < 1.0:
+        raise ValueError(f"the tolerance is {tolerance:g}: give a part of one, such as 1e-3")
+    wanted = quantities(quantity, scene)
+    bench = Bench(scene, t_end, wanted)
+    base = rigid_run(scene, bench.times)
+    notes = [base] if isinstance(base, str) else []
+    known = {} if isinstance(base, str) else _indicators(base, scene, wanted)
+    expected = cost(scene, t_end, 0 if isinstance(base, str) else base.run.statistics.evaluations)
+    advice = Advice(scene.name, t_end, tolerance, wanted, notes=tuple(notes))
+    try:
+        confirmation = Confirmation(bench, tolerance, _hidden(scene, known), expected, REFERENCE_SHARE * BUDGET)
+    except NoReference as problem:
+        return _with(advice, refusal=str(problem))
+    ladders = _ladders(scene, known, tolerance)
+    found = search(ladders, confirmation, BUDGET)
+    steps = {(name, step.rung): step for name, each in ladders.items() for step in each}
+    trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
+    if found is None:
+        sure = _sure(confirmation.reference)
+        return _with(advice, refusal=_nothing(trials, tolerance), trials=trials, reference=sure)
+    run = bench.run(found.model, found.method)
+    if found.exhausted:
+        notes.append("the search for something cheaper ended at its budget of operations")
+    return _with(
+        advice,
+        bodies=tuple(
+            BodyAdvice(name, rung, steps[name, rung].error, known[name].reason() if name in known else "")
+            for name, rung in found.model
+        ),
+        method=found.method,
+        scene=built(scene, found.model),
+        predicted=sum(steps[each].error for each in found.model),
+        measured=confirmation.total_error(found.model, found.method),
+        uncertainty=confirmation.reference.uncertainty,
+        predicted_operations=model_cost(scene, found.model, expected),
+        operations=run.operations, evaluations=run.evaluations, seconds=run.seconds,
+        reference=_sure(confirmation.reference), trials=trials, notes=tuple(notes),
+    )  # fmt: skip
+
+
+def _with(advice: Advice, **changes: object) -> Advice:
+    return replace(advice, **changes)  # type: ignore[arg-type]
+
+
+def _indicators(base: RigidRun, scene: Scene, wanted: tuple[Quantity, ...]) -> dict[str, Indicators]:
+    """Of every flexible body, by name. Where a quantity stands still as long as bodies are rigid, its size is 1 SI."""
+    signals = measured(wanted, base.own())
+    try:
+        scale = scales(wanted, signals)
+    except ValueError:
+        scale = dict.fromkeys(signals, 1.0)
+    return {
+        body.name: indicators(base, scene, modal_response(base, scene, body), scale) for body in flexible_bodies(scene)
+    }
+
+
+def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
+    """Predicted error of the finest modes of bodies that have no finer model: raw ones and beams that start bent."""
+    bent = {state.body for state in scene.modal_states}
+    return sum(
+        of_level(LEVELS[-1], known[body.name])
+        for body in flexible_bodies(scene)
+        if body.name in known and (body.name in bent or not isinstance(body, BeamBody))
+    )
+
+
+def _ladders(scene: Scene, known: dict[str, Indicators], tolerance: float) -> dict[str, tuple[Step, ...]]:
+    """Of every flexible body, by name: the rungs that fit it."""
+    found = {}
+    for body in flexible_bodies(scene):
+        of = known.get(body.name)
+        stirred = frozenset(_stirred(of, STIRRED * tolerance)) if of else frozenset[str]()
+        every = rungs(scene, body, stirred)
+        steps = [step(scene, body.name, rung, predicted(rung, of) if of else 0.0) for rung in every]
+        found[body.name] = tuple(each for each in steps if each is not None)
+    return found
+
+
+def _stirred(body: Indicators, least: float) -> list[str]:
+    """Families of modes that add more than `least`, a part of the scale."""
+    return [name for i, name in enumerate(FAMILIES) if np.any(body.static[body.family == i] > least)]
+
+
+def _trial(model: Model, steps: dict[tuple[str, Rung], Step], confirmation: Confirmation) -> Trial:
+    return Trial(
+        model,
+        sum(steps[each].error for each in model),
+        confirmation.error(model),
+        confirmation.run_cost(model),
+        confirmation.adequate(model),
+    )
+
+
+def _nothing(trials: tuple[Trial, ...], tolerance: float) -> str:
+    best = min(trials, key=lambda trial: trial.measured)
+    names = ", ".join(f"{name}: {rung}" for name, rung in best.model)
+    return (
+        f"no model of the ladder is within {tolerance:g}: the best of {len(trials)}, {names}, is off by "
+        f"{best.measured:.2g}"
+    )
+
+
+def _sure(reference: Reference) -> str:
+    steps = "; ".join(reference.history)
+    return reference.name + (f" ({steps})" if steps else "")

@@ -1,0 +1,113 @@
+"""Runs of models by methods, each made once: their signals, their error and their cost in counted operations.
+
+Costs decide, so they are counted, not timed: the operations of one evaluation of the model's accelerations
+(`flexmb.counting`) times the evaluations of the run. Advice is the same on every machine; times are shown beside.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexmb import composite, dynamics
+from flexmb.advisor.methods import Method, simulated
+from flexmb.advisor.models import Model, built
+from flexmb.advisor.quantity import Quantity, Signals, measured
+from flexmb.closure.system import ClosureError
+from flexmb.counting import count
+from flexmb.jain.places import matrices
+from flexmb.scene.schema import Scene
+from flexmb.state import pack
+from flexmb.system import Algorithm, System, compile
+
+SAMPLES = 401
+MAX_STEPS = 400_000
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One run. `signals` as far as it got; `message`: why it stopped, or "" if it finished. `operations` counted,
+    `seconds` measured of the integration alone."""
+
+    signals: Signals
+    message: str
+    evaluations: int
+    operations: float
+    seconds: float
+
+    @property
+    def finished(self) -> bool:
+        return not self.message
+
+
+class Bench:
+    """A scene, a horizon (s) and what is measured; every model is compiled once, every run made once."""
+
+    def __init__(self, scene: Scene, t_end: float, wanted: tuple[Quantity, ...], samples: int = SAMPLES) -> None:
+        self.scene, self.t_end, self.wanted = scene, t_end, wanted
+        self.times = np.linspace(0.0, t_end, samples)
+        self.spent = 0.0  # operations of all runs
+        self._systems: dict[Model, System | str] = {}
+        self._outcomes: dict[tuple[Model, Method], Outcome] = {}
+        self._operations: dict[tuple[Model, Algorithm], int] = {}
+
+    def system(self, model: Model) -> System | str:
+        """The compiled model, or why there is none."""
+        if model not in self._systems:
+            try:
+                self._systems[model] = compile(built(self.scene, model))
+            except (ClosureError, ValueError, NotImplementedError) as error:
+                self._systems[model] = str(error)
+        return self._systems[model]
+
+    def operations(self, model: Model, algorithm: Algorithm) -> int:
+        """Operations of one evaluation of the accelerations at the initial state."""
+        if (model, algorithm) not in self._operations:
+            system = self.system(model)
+            if isinstance(system, str):
+                raise ValueError(system)
+            self._operations[model, algorithm] = _operations(system, algorithm)
+        return self._operations[model, algorithm]
+
+    def algorithm(self, model: Model) -> Algorithm:
+        """The algorithm with fewer operations; both give the same accelerations."""
+        if self.scene.closures:
+            return "articulated"
+        found: tuple[Algorithm, ...] = ("articulated", "composite")
+        return min(found, key=lambda algorithm: self.operations(model, algorithm))
+
+    def run(self, model: Model, method: Method) -> Outcome:
+        """The run, made at the first call."""
+        if (model, method) not in self._outcomes:
+            self._outcomes[model, method] = self._run(model, method)
+            self.spent += self._outcomes[model, method].operations
+        return self._outcomes[model, method]
+
+    def _run(self, model: Model, method: Method) -> Outcome:
+        system = self.system(model)
+        if isinstance(system, str):
+            return Outcome({}, system, 0, 0.0, 0.0)
+        done = simulated(system, self.times, method, MAX_STEPS)
+        cost = done.statistics
+        each = self.operations(model, method.algorithm)
+        return Outcome(
+            signals=measured(self.wanted, done) if len(done.t) else {},
+            message="" if done.finished else done.message,
+            evaluations=cost.evaluations,
+            operations=float(each) * cost.evaluations,
+            seconds=cost.run_s,
+        )
+
+
+def _operations(system: System, algorithm: Algorithm) -> int:
+    state = system.initial_state
+    y = pack(state)
+    if algorithm == "composite":
+        places = matrices(system.constants)
+        return count(
+            composite.accelerations, 0.0, y, system.constants, system.workspace(), places
+        ).operations.total
+    return count(
+        dynamics.accelerations, 0.0, y, system.recursion_constants, system.recursion_workspace()
+    ).operations.total

@@ -1,0 +1,161 @@
+"""Errors that were measured: candidates against the finest models that can be run, integration errors by refinement.
+
+The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance; what they
+differ by is the uncertainty U of the finer. A candidate is adequate if its distance to that one, plus U, plus what its
+integrator adds, is within the tolerance: the triangle inequality, no luck in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from flexmb.advisor.bench import Bench, Outcome
+from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost, references
+from flexmb.advisor.methods import ADAPTIVE, FINEST, Method, ladders
+from flexmb.advisor.models import Model
+from flexmb.advisor.quantity import Signals, error, scales
+
+AGREED = 0.25
+"""Of the tolerance: two references that differ by less are good enough."""
+MOST = 0.5
+"""Of the tolerance: with an uncertainty beyond that nothing can be told."""
+INTEGRATION = 0.1
+"""Of the tolerance: kept for the integrator, and the most that the references' own integration may be off."""
+
+
+class NoReference(ValueError):
+    """Nothing that is known to be right can be run: the message says why."""
+
+
+@dataclass(frozen=True)
+class Reference:
+    """The finest model that was run: its name, signals, scales and uncertainty U (part of the scale)."""
+
+    name: str
+    model: Model
+    signals: Signals
+    scale: dict[str, float]
+    uncertainty: float
+    history: tuple[str, ...]
+
+
+class Confirmation:
+    """Measures errors on a bench, relative to references that it finds first."""
+
+    def __init__(self, bench: Bench, tolerance: float, hidden: float, cost: Cost, budget: float) -> None:
+        """hidden: predicted error of what no reference can show; cost: predictions; budget: the most operations
+        that one reference may be expected to cost."""
+        self.bench, self.tolerance, self.cost = bench, tolerance, cost
+        self.fine = 1e-5 * tolerance
+        self.measured: dict[Model, float] = {}
+        self.reference = self._reference(hidden, budget)
+
+    def run(self, model: Model) -> Outcome:
+        """The model integrated so finely that only the model's own error is left."""
+        return self.bench.run(model, self.finely(model))
+
+    def finely(self, model: Model) -> Method:
+        """A method whose error does not count."""
+        return Method("dop853", float(np.clip(self.fine, FINEST, 1e-7)), self.bench.algorithm(model))
+
+    def error(self, model: Model) -> float:
+        """Error of a model, U included; infinite where it does not exist or does not finish."""
+        if model not in self.measured:
+            self.measured[model] = np.inf
+            if not isinstance(self.bench.system(model), str) and self.run(model).finished:
+                self.measured[model] = self._distance(self.run(model)) + self.reference.uncertainty
+        return self.measured[model]
+
+    def total_error(self, model: Model, method: Method) -> float:
+        """Error of a run of the model by that method, U included."""
+        done = self.bench.run(model, method)
+        return self._distance(done) + self.reference.uncertainty if done.finished else np.inf
+
+    def run_cost(self, model: Model) -> float:
+        """Operations of the model's fine run, infinite where there is none."""
+        return np.inf if isinstance(self.bench.system(model), str) else self.run(model).operations
+
+    def _distance(self, done: Outcome) -> float:
+        return error(done.signals, self.reference.signals, self.reference.scale)
+
+    def adequate(self, model: Model) -> bool:
+        """Whether the model leaves the integrator its share of the tolerance."""
+        return self.error(model) <= (1.0 - INTEGRATION) * self.tolerance
+
+    def integration_error(self, model: Model, method: Method) -> float:
+        """How far a run is from the same model integrated finely."""
+        done = self.bench.run(model, method)
+        return error(done.signals, self.run(model).signals, self.reference.scale) if done.finished else np.inf
+
+    def cheapest_method(self, model: Model) -> Method:
+        """The method with the fewest operations whose error fits beside the model's.
+
+        In the ladder of every integrator, loose to tight, the first that fits and whose successor fits as well.
+        """
+        room = self.tolerance - self.error(model)
+        highest = max(highest_frequency(self.bench.scene, model), self.cost.slow / (STAGES * self.bench.t_end))
+        found = [self.finely(model)]
+        for ladder in ladders(highest, self.bench.algorithm(model)):
+            before: Method | None = None
+            for method in ladder:
+                if method.integrator in ADAPTIVE and method.value <= self.finely(model).value:
+                    break
+                fits = self.integration_error(model, method) <= room
+                if fits and before is not None:
+                    found.append(before)
+                    break
+                before = method if fits else None
+        return min(found, key=lambda method: self.bench.run(model, method).operations)
+
+    def _reference(self, hidden: float, budget: float) -> Reference:
+        history: list[str] = []
+        last: Reference | None = None
+        known = references(self.bench.scene)
+        for name, model in known:
+            if last is not None and model_cost(self.bench.scene, model, self.cost) > budget:
+                history.append(f"{name}: would cost too much")
+                continue
+            system = self.bench.system(model)
+            done = None if isinstance(system, str) else self.run(model)
+            if done is None or not done.finished:
+                history.append(f"{name}: {system if done is None else done.message}")
+                continue
+            if last is None:
+                self._refine(model)
+                done = self.run(model)
+                scale = scales(self.bench.wanted, done.signals)
+                last = Reference(name, model, done.signals, scale, np.inf, ())
+                continue
+            scale = scales(self.bench.wanted, done.signals)
+            apart = error(done.signals, last.signals, scale)
+            history.append(f"{last.name} and {name} differ by {apart:.2g}")
+            last = Reference(name, model, done.signals, scale, apart + hidden, tuple(history))
+            if last.uncertainty <= AGREED * self.tolerance:
+                return last
+        if last is None:
+            raise NoReference("none of the finest models runs to the end: " + "; ".join(history))
+        if len(known) == 1:  # rigid bodies, or raw ones that have the modes they have
+            last = replace(last, uncertainty=hidden)
+        if last.uncertainty > MOST * self.tolerance:
+            raise NoReference(self._unresolved(hidden, history))
+        return last
+
+    def _refine(self, model: Model) -> None:
+        """Tighten what counts as fine until a hundred times tighter changes the reference by less than its share."""
+        while self.fine > FINEST:
+            coarse = self.run(model)
+            tighter = self.bench.run(
+                model, Method("dop853", max(FINEST, 1e-2 * self.finely(model).value), self.bench.algorithm(model))
+            )
+            scale = scales(self.bench.wanted, tighter.signals)
+            if not tighter.finished or error(coarse.signals, tighter.signals, scale) <= INTEGRATION * self.tolerance:
+                return
+            self.fine *= 1e-2
+
+    def _unresolved(self, hidden: float, history: list[str]) -> str:
+        text = "; ".join(history) or "only one model of them runs"
+        if hidden > AGREED * self.tolerance:
+            text += f"; what none of its models shows (second-order deflection) is estimated as {hidden:.2g}"
+        return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"

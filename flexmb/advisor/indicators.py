@@ -1,0 +1,190 @@
+"""Predicted error of a rung: what its body would leave out, from one run of the rigid scene and no other.
+
+Every figure is a part of the quantity's scale. With the modal response to the rigid motion (`response`) they are:
+
+    participation   what the modes that a rung leaves out add to the quantity; attachment modes carry their static part
+    stiffening      kappa_n = sum_j N-weighted slopes: the axial force of spin, gravity and tip loads against the modal
+                    stiffness, K_G,nn / omega_n^2; -1 is buckling. Levels without second-order shapes leave it out
+    spin            (w / omega_1)^2, the softening that `ruthless` leaves out; where it reaches 1, `full` fails
+    deflection      the largest deflection over the length: what each order of a level leaves out
+    equivalence     mismatch of effective inertia of the best spring hinge, (149)-(151)
+
+They order the ladder and choose where to begin; the runs decide.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+
+from flexmb.advisor.contribution import contribution, free_share, moved
+from flexmb.advisor.models import Rung
+from flexmb.advisor.response import FAMILIES, Response, RigidRun, eigenmodes
+from flexmb.frisch.equivalence.advice import coupling_error
+from flexmb.frisch.equivalence.appendage import appendage_of
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.schema import Scene
+from flexmb.surrogate.sprung import fitted_hinge
+
+Array = NDArray[np.float64]
+
+_TINY = np.finfo(float).tiny
+SEGMENT_ERROR = 4.5
+"""Of the response, over n^2: phase error of the first modes of a chain of n segments after some periods."""
+
+
+STRAIGHT = 0.1
+"""Of the response: how far a straight rigid body on the best hinge is from the bent one that moves alike."""
+
+
+@dataclass(frozen=True)
+class Indicators:
+    """What the rigid run says of one body. Ratios have no unit.
+
+    `flexibility`: error of the rigid body, part of the scale; `static`, `dynamic` (m,): what each mode adds at most,
+    and what it adds beyond its quasi-static deflection; `stiffening`: largest |kappa| of the lowest modes;
+    `compression`: its most negative value; `spin`; `deflection`; `shortening`: second-order shortening, part of the
+    scale; `share` of the inertia that gives way; `mismatch` of the best spring hinge, infinite where there is none.
+    """
+
+    flexibility: float
+    static: Array
+    dynamic: Array
+    family: NDArray[np.intp]
+    stiffening: float
+    compression: float
+    spin: float
+    deflection: float
+    shortening: float
+    share: float
+    mismatch: float
+
+    def reason(self) -> str:
+        """The figures that matter, in words."""
+        parts = [f"bends by {self.deflection:.2g} of its length, {self.flexibility:.2g} of the quantity"]
+        if self.spin > 1e-6:
+            parts.append(f"(spin / first frequency)^2 = {self.spin:.2g}")
+        if self.stiffening > 1e-6:
+            parts.append(f"axial force / modal stiffness = {self.stiffening:.2g}")
+        if self.compression < -1e-3:
+            parts.append(f"compressed to {-self.compression:.2g} of buckling")
+        return "; ".join(parts)
+
+
+def indicators(rigid: RigidRun, scene: Scene, response: Response, scale: dict[str, float]) -> Indicators:
+    """All indicators of one body for the channels of `scale`, which maps them to what their error is relative to."""
+    part = moved(rigid, response)
+    modes = response.model.mode_count
+    static, dynamic, whole, shortening = np.zeros(modes), np.zeros(modes), 0.0, 0.0
+    lagging = response.force / np.maximum(response.frequencies**2, _TINY)
+    beyond = np.abs(response.eta - lagging).max(axis=0) / np.maximum(np.abs(response.eta).max(axis=0), _TINY)
+    curve = _shortening(response)
+    for channel, size in scale.items():
+        added = contribution(channel, rigid, scene, part) / size
+        largest = np.linalg.norm(added, axis=1).max(axis=0)
+        static, dynamic = np.maximum(static, largest), np.maximum(dynamic, largest * np.minimum(beyond, 1.0))
+        whole = max(whole, float(np.linalg.norm(added.sum(axis=2), axis=1).max()))
+        if channel.endswith(".position"):
+            shortening = max(shortening, curve / size)
+    kappa = _geometric(response)
+    lowest = max(float(response.frequencies.min(initial=np.inf)), _TINY)
+    return Indicators(
+        flexibility=whole, static=static, dynamic=dynamic, family=response.family,
+        stiffening=float(np.abs(kappa).max(initial=0.0)), compression=float(kappa.min(initial=0.0)),
+        spin=float((np.linalg.norm(response.w, axis=1).max() / lowest) ** 2),
+        deflection=_deflection(response), shortening=shortening,
+        share=free_share(rigid, scene, response.body.name), mismatch=_mismatch(scene, response.body.name),
+    )  # fmt: skip
+
+
+def predicted(rung: Rung, body: Indicators) -> float:
+    """Error of a rung, part of the scale; infinite where it would fail."""
+    whole = body.flexibility
+    if rung.kind == "rigid":
+        return whole
+    if rung.kind == "sprung":
+        if not np.isfinite(body.mismatch):
+            return np.inf
+        return whole * min(body.mismatch + STRAIGHT, 1.0) + float(body.dynamic[2:].sum())
+    if rung.kind == "segments":
+        return whole * min(SEGMENT_ERROR / rung.pieces**2, 1.0)
+    if rung.kind == "pieces":
+        held = len(set(body.family.tolist())) * (rung.pieces + rung.modes)
+        return of_level(rung.level, body) / rung.pieces**2 + float(body.dynamic[held:].sum())
+    chosen = np.isin(body.family, [FAMILIES.index(name) for name in rung.families if name in FAMILIES])
+    among = chosen if rung.families else np.ones(len(body.static), dtype=bool)
+    kept = among & (np.cumsum(among) <= rung.modes)
+    if rung.static:  # the shapes of tip force and moment stand for two more modes of a family, and for what lags none
+        kept = among & (np.cumsum(among) <= rung.modes + 2 * len(set(body.family[among].tolist())))
+    left = np.where(among & rung.static, body.dynamic, body.static)
+    return float(left[~kept].sum()) + of_level(rung.level, body)
+
+
+def of_level(level: str, body: Indicators) -> float:
+    """What a level leaves out of the response, part of the scale."""
+    whole, bent = body.flexibility, body.deflection
+    third_order = whole * bent**2
+    if level == "stiffened":
+        return third_order
+    if level == "ruthless":
+        return whole * (abs(body.stiffening - body.spin) + bent) + 2.0 * bent * body.share + body.shortening
+    if body.spin >= 1.0 + body.stiffening or body.spin >= 1.0:
+        return np.inf
+    second_order = whole * body.stiffening / (1.0 - body.spin) + body.shortening + third_order
+    return second_order + (whole * bent if level == "linear" else 0.0)
+
+
+def _axis(body: BeamBody) -> tuple[Array, Array, Array]:
+    """x (n,), mass (n,) along the axis and slopes (n,3,m) of the eigenmodes there."""
+    model = eigenmodes(replace(body, points="line"))
+    root, tip = model.nodes["root"], model.nodes["tip"]
+    x = np.concatenate([model.position[:, 0], [root.position[0], tip.position[0]]])
+    slopes = np.concatenate([model.rotation, [root.rotation_modes, tip.rotation_modes]])
+    order = np.argsort(x, kind="stable")
+    return x[order], np.concatenate([model.mass, [0.0, 0.0]])[order], slopes[order]
+
+
+def _geometric(response: Response) -> Array:
+    """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes; of beams only."""
+    body = response.body
+    if not isinstance(body, BeamBody):
+        return np.zeros((1, 0))
+    x, mass, slopes = _axis(body)
+    squares = np.sum(slopes[:, 1:] ** 2, axis=1)[:, :2]  # rotation about y and z
+    before = np.vstack([np.zeros((1, squares.shape[1])), squares[:-1]])
+    g = np.cumsum((squares + before) / 2.0 * np.diff(x, prepend=0.0)[:, None], axis=0)
+    w, a = response.w, response.acceleration
+    along = a[:, :1] + np.outer(-(w[:, 1] ** 2 + w[:, 2] ** 2), x)  # axial acceleration of the points, less gravity
+    stiffness = (-along * mass) @ g
+    for node, _, force in response.loads:
+        at = response.model.nodes[node].position[0]
+        stiffness += force[:, :1] * np.array([np.interp(at, x, column) for column in g.T])
+    return stiffness / response.frequencies[: g.shape[1]] ** 2
+
+
+def _shortening(response: Response) -> float:
+    """Half the integral of the squared slope (m), of beams only."""
+    if not isinstance(response.body, BeamBody):
+        return 0.0
+    x, _, slopes = _axis(response.body)
+    m = response.eta.shape[1]
+    angle = np.einsum("pim,tm->tpi", slopes[:, 1:, :m], response.eta)
+    return float(np.max(0.5 * np.trapezoid(np.sum(angle**2, axis=2), x, axis=1)))
+
+
+def _deflection(response: Response) -> float:
+    model = response.model
+    size = float(np.linalg.norm(model.position, axis=1).max())
+    far = int(np.argmax(np.sum(model.translation[:, :, 0] ** 2, axis=1)))
+    bent = np.linalg.norm(response.eta @ model.translation[far].T, axis=1)
+    return float(bent.max() / size) if size > 0.0 else 0.0
+
+
+def _mismatch(scene: Scene, body: str) -> float:
+    try:
+        return coupling_error(appendage_of(scene, body), fitted_hinge(scene, body))
+    except ValueError:  # not an appendage, or nothing that a hinge can follow
+        return np.inf

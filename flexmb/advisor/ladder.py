@@ -1,0 +1,178 @@
+"""The ladder of a body: every rung worth trying, with predicted error and cost; and the references above it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from msgspec.structs import replace
+from scipy.linalg import eigvalsh
+
+from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies
+from flexmb.jain.cost import articulated
+from flexmb.modal import flexible_model
+from flexmb.modal.integrals import modal_integrals
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
+from flexmb.scene.schema import Scene
+
+LEVEL_COST = {"rigid": 1.0, "ruthless": 1.0, "linear": 1.25, "full": 1.4, "stiffened": 1.8}
+"""Operations of a body against a ruthless one, counted with four modes."""
+STEP_AT_HIGHEST = 3.4
+"""Step of DOP853 times the highest frequency, where that is what limits it (measured)."""
+STAGES = 12
+ZIGZAG = 6.93
+"""Highest frequency of a chain of n rigid segments: sqrt(48) n^2 sqrt(EI / (m L^4)), neighbours turning against each
+other."""
+
+
+@dataclass(frozen=True)
+class Step:
+    """A rung with what is predicted of it: error as a part of the scale, operations of one evaluation of the body's
+    part of the scene, highest frequency (rad/s)."""
+
+    rung: Rung
+    error: float
+    operations: float
+    fastest: float
+
+
+@dataclass(frozen=True)
+class Cost:
+    """Predicted operations of a run to `t_end` (s): `rigid` for each evaluation of the bodies that are rigid anyway,
+    and no fewer evaluations than the `slow` that the rigid scene needs."""
+
+    t_end: float
+    rigid: float
+    slow: int
+
+    def of(self, steps: Iterable[Step]) -> float:
+        """Of the scene with these rungs for its flexible bodies."""
+        each, fastest = self.rigid, 0.0
+        for step in steps:
+            each, fastest = each + step.operations, max(fastest, step.fastest)
+        return each * max(self.slow, STAGES * self.t_end * fastest / STEP_AT_HIGHEST)
+
+
+def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> tuple[Rung, ...]:
+    """Every rung of one body, in no order. `moving`: families of a beam that something excites, as far as known."""
+    if isinstance(body, ModalBody):
+        every = flexible_model(body).mode_count
+        counts = sorted({n for n in COUNTS if n < every} | {every})
+        return (Rung("rigid"), Rung("sprung"), *(Rung("modes", n, level) for level in LEVELS for n in counts))
+    sets: list[tuple[str, ...]] = [()]
+    some = tuple(family for family in body.modes.families if family in moving)
+    if some and set(some) != set(body.modes.families):
+        sets.append(some)
+    carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
+    found = [Rung("rigid"), Rung("sprung")]
+    for families in sets:
+        for level in LEVELS:
+            found += [Rung("modes", n, level, False, families) for n in COUNTS]
+            if carries:
+                found += [Rung("modes", n, level, True, families) for n in (0, 1, 2, 4)]
+    found += [Rung("segments", pieces=n) for n in SEGMENTS]
+    found += [Rung("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
+    return tuple(found)
+
+
+def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
+    """Models that every candidate is measured against, coarse to fine; two successive ones say how sure they are.
+
+    First all bodies with more modes than the scene gives them, then beams in pieces, which converge to the
+    geometrically exact beam. A raw body has its own modes and no more; a beam that starts bent is not taken apart.
+    """
+    bodies = flexible_bodies(scene)
+    bent = {state.body for state in scene.modal_states}
+    whole = [b for b in bodies if isinstance(b, ModalBody) or b.name in bent]
+
+    def model(more: int, pieces: int) -> Model:
+        chosen = []
+        for body in bodies:
+            if isinstance(body, ModalBody):
+                rung = Rung("modes", flexible_model(body).mode_count, LEVELS[-1])
+            elif pieces and body not in whole:
+                rung = Rung("pieces", 0, LEVELS[-1], pieces=pieces)
+            else:
+                rung = Rung("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
+            chosen.append((body.name, rung))
+        return tuple(chosen)
+
+    found = [("more modes", model(4, 0))]
+    if len(whole) < len(bodies):
+        found += [(f"{n} pieces", model(4, n)) for n in (2, 4, 8, 16)]
+    else:
+        found += [("still more modes", model(8, 0))]
+    distinct = dict.fromkeys(each for _, each in found)
+    return tuple((name, each) for name, each in found if distinct.pop(each, 0) is None)
+
+
+def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:
+    """The predictions for one rung, operations by the polynomials of Jain & Rodriguez' section VII; None where it does
+    not fit the body."""
+    try:
+        whole = built(scene, ((name, rung),))
+        before = {b.name for b in scene.bodies if b.name != name}
+        parts = [b for b in whole.bodies if b.name not in before]
+        counts = [(_mode_count(b), "rigid" if isinstance(b, RigidBody) else b.level) for b in parts]
+        fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
+    except ValueError:
+        return None
+    each = sum(LEVEL_COST[level] * articulated([n]).total for n, level in counts)
+    return Step(rung, error, float(each), fastest)
+
+
+def cost(scene: Scene, t_end: float, slow: int) -> Cost:
+    """What is known of the cost before any rung is chosen."""
+    rigid = len(scene.bodies) + len(scene.point_masses) - len(flexible_bodies(scene))
+    return Cost(t_end, float(articulated([0] * rigid).total), slow)
+
+
+def model_cost(scene: Scene, model: Model, known: Cost) -> float:
+    """Predicted operations of a run of that model, infinite where a rung does not fit its body."""
+    steps = [step(scene, name, rung, 0.0) for name, rung in model]
+    return np.inf if None in steps else known.of(each for each in steps if each)
+
+
+def highest_frequency(scene: Scene, model: Model) -> float:
+    """Highest frequency (rad/s) of any body by itself, its base fixed; 0 where all are rigid."""
+    steps = [step(scene, name, rung, 0.0) for name, rung in model]
+    return max((each.fastest for each in steps if each), default=0.0)
+
+
+def _mode_count(body: Body) -> int:
+    return len(_squares(body)) if isinstance(body, BeamBody | ModalBody) and body.level != "rigid" else 0
+
+
+def _fastest(body: Body, rung: Rung, parts: list[Body]) -> float:
+    """Highest frequency (rad/s) of what a body became."""
+    if rung.kind == "segments" and isinstance(body, BeamBody):
+        return ZIGZAG * rung.pieces**2 * _beam_rate(body)
+    return max(
+        float(np.sqrt(max(_squares(part), default=0.0)))
+        if isinstance(part, BeamBody | ModalBody) and part.level != "rigid" else 0.0
+        for part in parts
+    )  # fmt: skip
+
+
+def _squares(body: BeamBody | ModalBody) -> tuple[float, ...]:
+    """Squares of the frequencies of a body with its base fixed; bodies of other names are the same."""
+    return _squares_of(replace(body, name="body", level="full"))
+
+
+@lru_cache(maxsize=4096)
+def _squares_of(body: BeamBody | ModalBody) -> tuple[float, ...]:
+    model = flexible_model(body)
+    m = model.mode_count
+    if m == 0:
+        return ()
+    mass = modal_integrals(model).spatial_mass[:m, :m]
+    return tuple(eigvalsh(model.stiffness, mass).tolist())
+
+
+def _beam_rate(beam: BeamBody) -> float:
+    """sqrt(EI / (m L^4)) (rad/s) of the stiffest section."""
+    station = max(beam.stations, key=lambda s: max(s.EIy_Nm2, s.EIz_Nm2) / s.mass_per_length_kg_m)
+    stiff = max(station.EIy_Nm2, station.EIz_Nm2)
+    return float(np.sqrt(stiff / (station.mass_per_length_kg_m * beam.length_m**4)))

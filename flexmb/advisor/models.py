@@ -1,0 +1,96 @@
+"""Models of a flexible body that a scene can choose from: scene to scene, body by body.
+
+A `Rung` is one model of one body, a `Model` a rung for every flexible body. What is cheaper and what is finer is not
+known here: ladders are data.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+from msgspec.structs import replace
+
+from flexmb.advisor.modes import with_modes
+from flexmb.scene.bodies import BeamBody, Level, ModalBody
+from flexmb.scene.schema import Scene
+from flexmb.surrogate import finite_segments, substructured
+from flexmb.surrogate.sprung import spring_hinged
+
+LEVELS: tuple[Level, ...] = ("ruthless", "linear", "full", "stiffened")
+COUNTS = (1, 2, 3, 4, 6, 8)
+SEGMENTS = (2, 4, 8)
+PIECES = (2, 4, 8)
+PLURAL = {1: "mode"}
+
+Kind = Literal["rigid", "sprung", "modes", "segments", "pieces"]
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One model of a flexible body.
+
+    "rigid"; "sprung": rigid on a spring hinge; "modes": its `modes` lowest of `families` (all if empty), at `level`,
+    with attachment modes if `static`; "segments": `pieces` rigid pieces on sprung hinges.
+    """
+
+    kind: Kind
+    modes: int = 0
+    level: Level = "rigid"
+    static: bool = False
+    families: tuple[str, ...] = ()
+    pieces: int = 0
+
+    def __str__(self) -> str:
+        if self.kind == "rigid":
+            return "rigid"
+        if self.kind == "sprung":
+            return "rigid on a spring hinge"
+        if self.kind == "segments":
+            return f"{self.pieces} rigid segments"
+        if self.kind == "pieces":
+            more = f" and {self.modes} eigenmodes" if self.modes else ""
+            return f"{self.pieces} pieces with static shapes{more}, {self.level}"
+        of = f" of {', '.join(self.families)}" if self.families else ""
+        static = " and static shapes" if self.static else ""
+        return f"{self.modes} {PLURAL.get(self.modes, 'modes')}{of}{static}, {self.level}"
+
+
+Model = tuple[tuple[str, Rung], ...]
+"""(body, rung) of every flexible body, in the scene's order."""
+
+
+def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
+    """Bodies with modes that their scene does not make rigid already."""
+    return tuple(b for b in scene.bodies if isinstance(b, BeamBody | ModalBody) and b.level != "rigid")
+
+
+def built(scene: Scene, model: Model) -> Scene:
+    """The scene with every body modelled as told. Raises ValueError where a rung does not fit its body."""
+    for name, rung in model:
+        scene = _applied(scene, name, rung)
+    return scene
+
+
+def with_rung(model: Model, name: str, rung: Rung) -> Model:
+    """The same model but for one body."""
+    return tuple((each, rung if each == name else own) for each, own in model)
+
+
+def rigid(scene: Scene, name: str) -> Scene:
+    """The scene with that body at level "rigid": one word changed, and its modal state left out."""
+    bodies = tuple(replace(b, level="rigid") if b.name == name else b for b in scene.bodies)
+    return replace(scene, bodies=bodies, modal_states=tuple(s for s in scene.modal_states if s.body != name))
+
+
+def _applied(scene: Scene, name: str, rung: Rung) -> Scene:
+    match rung.kind:
+        case "rigid":
+            return rigid(scene, name)
+        case "sprung":
+            return spring_hinged(scene, name)
+        case "segments":
+            return finite_segments(scene, name, rung.pieces)
+        case "pieces":
+            return substructured(scene, name, rung.pieces, level=rung.level, eigenmodes=rung.modes)
+    return with_modes(scene, name, rung.modes, rung.level, rung.static, rung.families)

@@ -1,0 +1,111 @@
+"""A flexible body with other modes: fewer or more of a beam, the lowest of raw ones; its initial state goes along."""
+
+from __future__ import annotations
+
+import numpy as np
+from msgspec.structs import replace
+from numpy.typing import NDArray
+from scipy.linalg import eigh
+
+from flexmb.modal import flexible_model
+from flexmb.modal.integrals import modal_integrals
+from flexmb.modal.model import FlexibleModel
+from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode
+from flexmb.scene.modal_data import inertia_points, modal_arrays
+from flexmb.scene.schema import ModalState, Scene
+from flexmb.surrogate.lumping import vector
+
+Array = NDArray[np.float64]
+
+
+def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, families: tuple[str, ...]) -> Scene:
+    """The scene with `count` modes of the body `name`, at `level`.
+
+    A beam gets its `count` lowest modes of `families` (its own if empty), and attachment modes if `static`; a raw body
+    the `count` lowest of the eigenmodes that its own modes contain, or its own modes if that is all of them. What the
+    modes can hold of an initial modal state is kept: its projection in the norm of kinetic energy. Raises ValueError
+    where there are not so many modes.
+    """
+    body = next(each for each in scene.bodies if each.name == name)
+    if isinstance(body, BeamBody):
+        new: BeamBody | ModalBody = _beam(body, count, level, static, families)
+    elif isinstance(body, ModalBody):
+        new = _raw(body, count, level)
+    else:
+        raise ValueError(f'body "{name}" has no modes')
+    bodies = tuple(new if each.name == name else each for each in scene.bodies)
+    states = tuple(_projected(body, new, each) if each.body == name else each for each in scene.modal_states)
+    return replace(scene, bodies=bodies, modal_states=states)
+
+
+def mode_count(body: BeamBody | ModalBody) -> int:
+    """How many modes the scene gives the body, attachment modes included."""
+    return flexible_model(body).mode_count
+
+
+def _beam(beam: BeamBody, count: int, level: Level, static: bool, families: tuple[str, ...]) -> BeamBody:
+    modes = replace(beam.modes, count=count, static=static, families=families or beam.modes.families)
+    ratio = beam.modes.damping_ratio
+    if isinstance(ratio, tuple):  # modes beyond those listed are damped as the last
+        total = mode_count(replace(beam, modes=replace(modes, damping_ratio=0.0)))
+        modes = replace(modes, damping_ratio=(*ratio, *[ratio[-1]] * total)[:total])
+    return replace(beam, modes=modes, level=level)
+
+
+def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
+    arrays = modal_arrays(body)
+    every = arrays.translation_modes.shape[2]
+    if count > every:
+        raise ValueError(f'body "{body.name}" has {every} modes, not {count}')
+    if count == every:
+        return replace(body, level=level)
+    mass = modal_integrals(flexible_model(body)).spatial_mass[:every, :every]
+    X = eigh(arrays.stiffness, mass)[1][:, :count]
+    nodes = tuple(
+        ModalNode(
+            name=node.name, position_m=node.position_m, quaternion=node.quaternion,
+            translation_modes=_combined(node.translation_modes, X), rotation_modes=_combined(node.rotation_modes, X),
+        )
+        for node in body.nodes
+    )  # fmt: skip
+    points = inertia_points(
+        arrays.mass, arrays.position, arrays.translation_modes @ X, arrays.rotation_modes @ X, arrays.inertia,
+        arrays.com_offset,
+    )  # fmt: skip
+    return replace(
+        body, file=None, points=points, nodes=nodes, level=level,
+        stiffness=_rows(X.T @ arrays.stiffness @ X), damping=_rows(X.T @ arrays.damping @ X),
+    )  # fmt: skip
+
+
+def _combined(shapes: tuple[tuple[float, float, float], ...], X: Array) -> tuple[tuple[float, float, float], ...]:
+    return tuple(vector(shape) for shape in X.T @ np.array(shapes))
+
+
+def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
+    symmetric = (matrix + matrix.T) / 2.0
+    return tuple(tuple(float(value) for value in row) for row in symmetric)
+
+
+def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
+    """The initial state in the new modes: nearest in the norm of kinetic energy."""
+    before, after = flexible_model(old), flexible_model(new)
+    onto = np.linalg.solve(_products(after, after), _products(after, before))
+    rates = np.array(state.rates or [0.0] * before.mode_count)
+    return ModalState(
+        body=state.body,
+        coordinates=tuple((onto @ np.array(state.coordinates)).tolist()),
+        rates=tuple((onto @ rates).tolist()) if np.any(rates) else (),
+    )
+
+
+def _products(a: FlexibleModel, b: FlexibleModel) -> Array:
+    """Kinetic energy's products (m_a, m_b) of the modes of two models of one body with the same inertia points."""
+    moved_a, moved_b = _centres(a), _centres(b)
+    turning = np.einsum("pim,pij,pjn->mn", a.rotation, a.inertia, b.rotation, optimize=True)
+    return np.einsum("p,pim,pin->mn", a.mass, moved_a, moved_b, optimize=True) + turning
+
+
+def _centres(model: FlexibleModel) -> Array:
+    """Mode shapes (n,3,m) of the mass centres of the points."""
+    return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)

@@ -1,0 +1,105 @@
+"""What the user cares about: channels of a run, and how far two runs are apart in them.
+
+A quantity names channels as in `flexmb.channels`: `marker:tip.position`, `marker:*.orientation`, `load:hub.torque`,
+`drive:hub`, `energy.total`; "energy" or "load:hub" names all that begin so. Its error is the largest distance of two
+runs over the output times and over its channels, relative to a scale: the one given after "@" in SI units
+(`load:hub.torque@50`), or the range of the signal, which for positions and orientations is the farthest it gets from
+its start and for everything else its largest magnitude. Where several channels of a kind are named by one word, they
+share the largest range: a marker that stays where it is cannot be wrong by more than nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.channels import Run, channels_of, distance, family, magnitude, matches, signal_range, unit
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+Signals = dict[str, Array]
+
+_STILL = 1e-12  # of its magnitude: a signal that changes by less does not change
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """Channels named by `pattern`, and what their error is relative to (SI): `scale`, or None for their range."""
+
+    pattern: str
+    scale: float | None = None
+
+    @classmethod
+    def parse(cls, word: str) -> Quantity:
+        """`PATTERN` or `PATTERN@SCALE`; ValueError for a scale that is not a positive number."""
+        pattern, at, scale = word.partition("@")
+        if not at:
+            return cls(pattern)
+        try:
+            value = float(scale)
+        except ValueError:
+            value = np.nan
+        if not (np.isfinite(value) and value > 0.0):
+            raise ValueError(f"quantity {word!r}: after @ stands the size that errors are relative to, such as @0.5")
+        return cls(pattern, value)
+
+    def __str__(self) -> str:
+        return self.pattern if self.scale is None else f"{self.pattern}@{self.scale:g}"
+
+
+def quantities(words: str | Quantity | Sequence[str | Quantity] | None, scene: Scene) -> tuple[Quantity, ...]:
+    """Quantities of the words; by default the positions of all markers. ValueError where there are none."""
+    if not words:
+        if not scene.markers:
+            raise ValueError(
+                f'scene "{scene.name}" has no markers, so there is no default for what matters: name a quantity, such '
+                'as "energy.total" or "load:HINGE.torque"'
+            )
+        return (Quantity("marker:*.position"),)
+    listed = (words,) if isinstance(words, str | Quantity) else tuple(words)
+    return tuple(word if isinstance(word, Quantity) else Quantity.parse(word) for word in listed)
+
+
+def measured(wanted: tuple[Quantity, ...], run: Run) -> Signals:
+    """The channels of a run that the quantities name, each (T,k). ValueError for a quantity that names none."""
+    channels = channels_of(run)
+    found: Signals = {}
+    for quantity in wanted:
+        named = {name: values for name, values in channels.items() if matches(quantity.pattern, name)}
+        if not named:
+            raise ValueError(f"the scene has no quantity {quantity.pattern!r}; there are {', '.join(sorted(channels))}")
+        found |= named
+    return found
+
+
+def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Array]) -> dict[str, float]:
+    """What the error of each channel is relative to, in its own unit. ValueError where a signal has no range."""
+    found: dict[str, float] = {}
+    for quantity in wanted:
+        named = [name for name in reference if matches(quantity.pattern, name)]
+        for name in named:
+            if quantity.scale is not None:
+                found[name] = quantity.scale
+                continue
+            alike = [other for other in named if family(other) == family(name)]
+            size = max(signal_range(other, reference[other]) for other in alike)
+            if size <= _STILL * max(magnitude(other, reference[other]) for other in alike):
+                raise ValueError(
+                    f"{name} does not change, so no error is relative to its range: give a size in {unit(name)}, such "
+                    f"as {quantity.pattern}@1"
+                )
+            found[name] = size
+    return found
+
+
+def error(a: Mapping[str, Array], b: Mapping[str, Array], scale: Mapping[str, float]) -> float:
+    """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter."""
+    worst = 0.0
+    for name, size in scale.items():
+        if len(a[name]) != len(b[name]):
+            return np.inf
+        worst = max(worst, float(np.max(distance(name, a[name], b[name]), initial=0.0)) / size)
+    return worst
