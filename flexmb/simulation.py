@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, Literal, NamedTuple, cast, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
@@ -15,7 +15,9 @@ from flexmb.composite import CompositeWorkspace
 from flexmb.frisch import propagation as nested_propagation
 from flexmb.frisch.tables import NestedWorkspace
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
+from flexmb.integrate.jacobians import COUNTS, FACTORISATIONS, JACOBIANS
 from flexmb.labels import state_names
+from flexmb.methods import LINEARISING, Method, Settings
 from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
@@ -29,9 +31,6 @@ from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 if TYPE_CHECKING:
     from flexmb.closed_system import ClosedSystem
     from flexmb.closure.system import ClosedWorkspace
-
-Method = Literal["dop853", "rk4"]
-FINEST_RTOL = 100 * np.finfo(float).eps
 
 
 class _Raw(NamedTuple):
@@ -67,11 +66,17 @@ def simulate(
     max_steps: int = 1_000_000,
     algorithm: Algorithm = "articulated",
     stabilise: float = 0.0,
+    spectral_radius: float | None = None,
 ) -> Trajectory:
     """Simulate a scene from its initial state at t = 0 to `t_end` (s).
 
     method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol, in the root mean
-    square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s).
+    square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not longer than `step` (s). For
+    scenes with modes or springs much faster than what matters: "radau5", which lets them die out where the step is
+    longer than their period; "exponential", which follows them exactly as far as they are linear, whatever the step;
+    both adapt their steps as "dop853" does. "generalised_alpha" takes equal steps and damps what they do not resolve:
+    `spectral_radius` from 1, nothing, to 0, all in one step (0.8 if left out); rtol and atol are what its Newton
+    iterations may leave. See docs/integrators.md.
     samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
     algorithm: "articulated", the O(N) recursion; "composite", the mass matrix and its Cholesky factors; or Frisch's
     equations, "frisch" or "frisch_as_printed", which take bodies of level `full` as `linear`. Accelerations and loads
@@ -89,10 +94,13 @@ def simulate(
         check_run(scene.scene, t_end)
     else:
         check_scene(scene, t_end)
-    _check_settings(method, rtol, atol, step, max_steps)
+    settings = Settings(method, rtol, atol, step, max_steps, spectral_radius)
+    settings.check()
     times = _sample_times(samples, t_end)
     system = scene if isinstance(scene, System) else assembled(scene)
-    raw = _integrate(system, _route(system, algorithm, stabilise), times, method, rtol, atol, step, max_steps)
+    if method in LINEARISING:
+        _refuse_without_jacobian(system, algorithm, method)
+    raw = _integrate(system, _route(system, algorithm, stabilise), times, settings)
     return _observed(system, times, raw, algorithm)
 
 
@@ -108,21 +116,14 @@ def switch_times(scene: Scene, t_end: float) -> list[float]:
     return sorted(time for time in found if 0.0 < time < t_end)
 
 
-def _check_settings(method: Method, rtol: float, atol: float, step: float | None, max_steps: int) -> None:
-    if method not in get_args(Method):
-        raise ValueError(f"method is {method!r}: use one of {', '.join(map(repr, get_args(Method)))}")
-    if method == "rk4" and (step is None or not (np.isfinite(step) and step > 0.0)):
-        raise ValueError(f'method "rk4" takes fixed steps, but step is {step}: give a positive step in seconds')
-    if method == "dop853" and step is not None:
-        raise ValueError('method "dop853" chooses its own steps: leave step out and set rtol and atol, or use "rk4"')
-    if not FINEST_RTOL <= rtol < 1.0:
-        raise ValueError(
-            f"rtol is {rtol:g}: double precision resolves {FINEST_RTOL:.1e}; use a value from there to 1e-3"
+def _refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
+    if system.scene.closures:
+        raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use "dop853" or "rk4"')
+    if algorithm != "articulated":
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which algorithm "articulated" alone has: leave algorithm out, or use '
+            'method "dop853" or "rk4"'
         )
-    if not (np.isfinite(atol) and atol > 0.0):
-        raise ValueError(f"atol is {atol:g}: give a positive one, or a coordinate that passes zero stops the run")
-    if max_steps < 1:
-        raise ValueError(f"max_steps is {max_steps}: allow at least one step")
 
 
 def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array:
@@ -156,31 +157,25 @@ def _route(system: System, algorithm: Algorithm, stabilise: float) -> _Route:
     return _Route(nested.constants, nested.workspace, nested_propagation.run_dop853, nested_propagation.run_rk4)
 
 
-def _integrate(
-    system: System,
-    route: _Route,
-    times: Array,
-    method: Method,
-    rtol: float,
-    atol: float,
-    step: float | None,
-    max_steps: int,
-) -> _Raw:
+def _integrate(system: System, route: _Route, times: Array, settings: Settings) -> _Raw:
     """Run once over no time at all, which compiles, and then in earnest."""
     initial = system.initial_state
     ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
 
     def run(times: Array, ends: Array) -> _Raw:
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
-        counts, workspace = np.zeros(4, np.int64), route.workspace()
+        counts, workspace = np.zeros(COUNTS, np.int64), route.workspace()
+        limit, tables = settings.max_steps, (route.constants, workspace, out, counts)
         start = perf_counter()
-        if method == "rk4":
-            status, t = route.run_rk4(y, times, ends, step, max_steps, route.constants, workspace, out, counts)
-        else:
+        if settings.method == "rk4":
+            status, t = route.run_rk4(y, times, ends, settings.step, limit, *tables)
+        elif settings.method == "dop853":
             controlled = system.nq + system.nu
-            status, t = route.run_dop853(
-                y, times, ends, rtol, atol, controlled, max_steps, route.constants, workspace, out, counts
-            )
+            status, t = route.run_dop853(y, times, ends, settings.rtol, settings.atol, controlled, limit, *tables)
+        else:
+            from flexmb import stiff_runs  # brings the equations of motion once more, for complex numbers
+
+            status, t = stiff_runs.run(system, settings, y, times, ends, workspace, out, counts)
         seconds = perf_counter() - start
         return _Raw(out[: counts[SAMPLES]], Status(status), int(workspace.fault[0]), t, counts.tolist(), 0.0, seconds)
 
@@ -228,6 +223,8 @@ def _observed(system: System, times: Array, raw: _Raw, algorithm: Algorithm) -> 
             evaluations=raw.counts[EVALUATIONS],
             accepted_steps=raw.counts[ACCEPTED],
             rejected_steps=raw.counts[REJECTED],
+            jacobians=raw.counts[JACOBIANS],
+            factorisations=raw.counts[FACTORISATIONS],
             compile_s=raw.compile_s,
             run_s=raw.run_s,
             output_s=perf_counter() - start,

@@ -22,6 +22,8 @@ def summary(trajectory: Trajectory) -> Table:
 def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
     cost = trajectory.statistics
     steps = f"{cost.accepted_steps} accepted, {cost.rejected_steps} rejected, {cost.evaluations} evaluations"
+    if cost.jacobians:
+        steps += f", {cost.jacobians} Jacobians, {cost.factorisations} factorisations"
     rows: list[tuple[str, Text | str]] = [
         ("status", Text(trajectory.message, style="green" if trajectory.finished else "bold red")),
         ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),

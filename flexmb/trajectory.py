@@ -32,11 +32,16 @@ class MarkerPath:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a run cost: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs."""
+    """What a run cost: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
+
+    `factorisations` counts those of a matrix of the size of the state, or of its exponential.
+    """
 
     evaluations: int
     accepted_steps: int
     rejected_steps: int
+    jacobians: int
+    factorisations: int
     compile_s: float
     run_s: float
     output_s: float

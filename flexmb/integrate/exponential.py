@@ -1,0 +1,265 @@
+"""Exponential collocation with error control and dense output, whole runs in one compiled loop.
+
+Over a step f(t, y) is a linear part J (y - y_n), treated exactly, and the rest
+
+    r = f(t, y) - f(t_n, y_n) - J (y - y_n),
+
+a polynomial of degree 4 that matches at 0, 1/4, 1/2, 3/4 and 1 of the step. So a fast linear mode sets neither the step
+nor is it damped; what sets the step is how smooth the rest is. It is found by iteration, which converges however stiff
+J is, by two orders a sweep: r starts flat. J is the Jacobian at the start of each step, as in the exponential
+Rosenbrock methods of Hochbruck, Ostermann, Acta Numerica 19 (2010), 209, section 2.4, of which this is the one that
+collocates. The order is 6, that of Boole's rule at J = 0, and 5 whatever J is.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import (
+    ACCEPTED,
+    REJECTED,
+    RETREAT,
+    SAMPLES,
+    copy,
+    derivative,
+    initial_step,
+    scaled_norm,
+    step_factor,
+)
+from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
+from flexmb.kernel import generic, helper
+from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+
+NODES = np.array([0.25, 0.5, 0.75, 1.0])
+# Row l: l-th derivative at 0 of the polynomial that vanishes at 0 and has given values at the nodes.
+_powers = np.arange(1, TERMS)
+DERIVATIVES = np.array([math.factorial(l) for l in _powers])[:, None] * np.linalg.inv(NODES[:, None] ** _powers)
+# The same of x (x - 1/4) (x - 3/4) (x - 1), by which the cubic without the middle node differs from the quartic.
+WITHOUT_MIDDLE = np.array([0.0, -3.0 / 16.0, 19.0 / 8.0, -12.0, 24.0])
+
+_SWEEPS = 8  # of the iteration, at most
+_CONVERGED = 0.02  # what the iteration may leave, in units of the tolerance
+_ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
+
+
+class Scratch(NamedTuple):
+    """Arrays of a step: J (n,n); polynomials v, v_error (TERMS,n), their responses X, X_error, states x (4,n)."""
+
+    J: np.ndarray
+    v: np.ndarray
+    v_error: np.ndarray
+    X: np.ndarray
+    X_error: np.ndarray
+    x: np.ndarray
+    x_before: np.ndarray
+    rest: np.ndarray  # (4,n)
+    y_new: np.ndarray
+    f_new: np.ndarray
+    error: np.ndarray
+    term: np.ndarray
+    product: np.ndarray
+
+
+@helper
+def response(flow, s):
+    """x at the quarters of the step under the polynomial v."""
+    respond(flow, s.v, s.X, s.term, s.product)
+    at_quarters(flow, s.X, s.x)
+
+
+@helper
+def change(flow, s, y, rtol, atol, controlled):
+    """Scaled norm of the change of x at the nodes by a sweep, root mean square over the nodes."""
+    total = 0.0
+    for node in range(4):
+        for i in range(y.shape[0]):
+            s.error[i] = flow.scale[i] * (s.x[node, i] - s.x_before[node, i])
+        total += scaled_norm(s.error, y, rtol, atol, controlled) ** 2
+    return math.sqrt(0.25 * total)
+
+
+@generic
+def evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts):
+    """h r at the nodes, balanced, and from it the polynomial v; returns a status code."""
+    n = y.shape[0]
+    for node in range(4):
+        for i in range(n):
+            s.y_new[i] = y[i] + flow.scale[i] * s.x[node, i]
+        status = derivative(rhs, min(t + NODES[node] * h, last), s.y_new, s.f_new, constants, workspace, counts)
+        if status != OK:
+            return status
+        for i in range(n):
+            row, total = flow.Z[i], 0.0
+            for j in range(n):
+                total += row[j] * s.x[node, j]
+            s.rest[node, i] = h * (s.f_new[i] - f[i]) / flow.scale[i] - total
+    for l in range(1, TERMS):
+        for i in range(n):
+            total = 0.0
+            for node in range(4):
+                total += DERIVATIVES[l - 1, node] * s.rest[node, i]
+            s.v[l, i] = total
+    return OK
+
+
+@generic
+def iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, workspace, counts):
+    """Solve for x at the nodes; returns a status code, NOT_CONVERGED where the iteration would not end in time."""
+    n = y.shape[0]
+    for i in range(n):
+        s.v[0, i] = h * f[i] / flow.scale[i]
+        for l in range(1, TERMS):
+            s.v[l, i] = 0.0
+    response(flow, s)
+    before = 0.0
+    for sweep in range(1, _SWEEPS + 1):
+        for node in range(4):
+            copy(s.x[node], s.x_before[node])
+        status = evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts)
+        if status != OK:
+            return status
+        response(flow, s)
+        size = change(flow, s, y, rtol, atol, controlled)
+        if not math.isfinite(size):
+            return NONFINITE
+        if size <= _CONVERGED:
+            return OK
+        if sweep > 1:
+            rate = size / before
+            if rate >= 1.0 or rate ** (_SWEEPS - sweep) * size > _CONVERGED:
+                return NOT_CONVERGED
+            if rate / (1.0 - rate) * size <= _CONVERGED:
+                return OK
+        before = size
+    return NOT_CONVERGED
+
+
+@helper
+def estimate(y, flow, s, rtol, atol, controlled):
+    """Scaled norm of what the middle node does, to the end of the step or to its middle. Uses x_before.
+
+    A component that follows the rest at once sees nothing of the middle node at the end; samples inside the step do.
+    """
+    n = y.shape[0]
+    for i in range(n):
+        s.term[i] = max(abs(y[i]), abs(s.y_new[i]))
+        for l in range(TERMS):
+            s.v_error[l, i] = WITHOUT_MIDDLE[l] * s.v[TERMS - 1, i] / 24.0
+    respond(flow, s.v_error, s.X_error, s.error, s.product)
+    at_quarters(flow, s.X_error, s.x_before)
+    norm = 0.0
+    for node in (1, 3):
+        for i in range(n):
+            s.error[i] = flow.scale[i] * s.x_before[node, i]
+        norm = max(norm, scaled_norm(s.error, s.term, rtol, atol, controlled))
+    return norm
+
+
+@generic
+def attempt(rhs, project, t, t_new, last, y, f, flow, s, rtol, atol, controlled, constants, workspace, counts):
+    """One trial step: y_new, projected, and its slope f_new; returns status, error norm."""
+    h = t_new - t
+    status = iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, workspace, counts)
+    if status != OK:
+        return status, math.inf
+    for i in range(y.shape[0]):
+        s.y_new[i] = y[i] + flow.scale[i] * s.x[3, i]
+    error = estimate(y, flow, s, rtol, atol, controlled)
+    if error < 1.0:
+        project(t_new, s.y_new, constants)
+        status = derivative(rhs, min(t_new, last), s.y_new, s.f_new, constants, workspace, counts)
+    return status, error
+
+
+@generic
+def store_samples(project, t, t_new, y, flow, s, times, constants, out, counts):
+    """Store the samples in (t, t_new]; inside the step by the exact flow under the same polynomial, projected."""
+    sample = counts[SAMPLES]
+    while sample < times.shape[0] and times[sample] <= t_new:
+        if times[sample] == t_new:
+            copy(s.y_new, out[sample])
+        else:
+            theta = (times[sample] - t) / (t_new - t)
+            at_fraction(flow, s.v, s.X, s.x, theta, out[sample], s.term, s.product)
+            for i in range(y.shape[0]):
+                out[sample, i] = y[i] + flow.scale[i] * out[sample, i]
+            project(times[sample], out[sample], constants)
+        sample += 1
+    counts[SAMPLES] = sample
+
+
+@generic
+def exponential(
+    rhs, jacobian, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
+):
+    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    Arguments, samples, segments and the retreat from a failing right-hand side are those of `dop853`; `jacobian` and
+    counts (6,) are those of `jacobians`. Where the iteration does not converge, the step is halved.
+    """
+    n = y.shape[0]
+    flow = Flow(
+        np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((5, n, n)), np.empty(1, np.int64)
+    )
+    s = Scratch(
+        np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
+        np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n), np.empty(n),
+    )  # fmt: skip
+    f = np.empty(n)
+    t, h = times[0], 0.0
+    project(t, y, constants)
+    copy(y, out[0])
+    counts[SAMPLES] = 1
+    for end in segment_ends:
+        last = np.nextafter(end, t)
+        status = derivative(rhs, t, y, f, constants, workspace, counts)
+        if status != OK:
+            return status, t
+        if h == 0.0:
+            h = initial_step(
+                rhs, t, y, f, end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
+                constants, workspace, counts, s.y_new, s.f_new,
+            )  # fmt: skip
+        renew, rejected, trouble = True, False, STEP_TOO_SMALL
+        while t < end:
+            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
+                return MAX_STEPS, t
+            if h < 10.0 * (np.nextafter(t, math.inf) - t):
+                return trouble, t
+            t_new = end if t + 1.01 * h >= end else t + h
+            length = t_new - t
+            if renew:
+                status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+                if status != OK:
+                    return status, t
+            status, error = NOT_CONVERGED, math.inf
+            counts[FACTORISATIONS] += 1
+            if prepare(flow, s.J, length):
+                status, error = attempt(
+                    rhs, project, t, t_new, last, y, f, flow, s, rtol, atol, controlled, constants, workspace, counts
+                )
+            renew = status == OK and error < 1.0
+            if renew:
+                store_samples(project, t, t_new, y, flow, s, times, constants, out, counts)
+                factor = step_factor(error, _ERROR_EXPONENT, rejected)
+                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
+                h = max(h, length * factor) if t_new == end and factor >= 1.0 else length * factor
+                t = t_new
+                copy(s.y_new, y)
+                copy(s.f_new, f)
+                counts[ACCEPTED] += 1
+                trouble = STEP_TOO_SMALL
+            else:
+                if status == OK:
+                    h = length * step_factor(error, _ERROR_EXPONENT, rejected)
+                else:
+                    h = length * (0.5 if status == NOT_CONVERGED else RETREAT)
+                trouble = STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
+                counts[REJECTED] += 1
+            rejected = not renew
+    return OK, t

@@ -1,0 +1,215 @@
+"""The generalised-alpha method with a fixed step, on Lie groups too, whole runs in one compiled loop.
+
+Chung, Hulbert, J. Appl. Mech. 60 (1993), 371; on Lie groups Bruels, Cardona, J. Comput. Nonlinear Dyn. 5 (2010),
+031002, here for explicit equations of motion, udot = f(t, q, u):
+
+    q_1 = q_0 o exp(h u_0 + h^2 ((1/2 - beta) a_0 + beta a_1)),     u_1 = u_0 + h ((1 - gamma) a_0 + gamma a_1),
+    (1 - alpha_m) a_1 + alpha_m a_0 = (1 - alpha_f) udot_1 + alpha_f udot_0.
+
+Order 2; the spectral radius at infinite frequency is the parameter: 1 damps nothing, 0 whatever the step does not
+resolve in one step.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, copy, derivative, scaled_norm
+from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.kernel import generic, helper
+from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK
+
+_ITERATIONS = 12  # of Newton's method, at most
+_ROUNDING = 2.0**-46  # a correction this far below accelerations is theirs: 64 roundings
+_WORN = 4  # iterations after which the Jacobian is renewed
+_SAME = 1e-9  # relative difference of steps that share factors
+_STEP_SLACK = 1e-9  # a step may exceed the one asked for by this fraction, as in `rk4`
+
+
+class Scratch(NamedTuple):
+    """Arrays of a step: J (n,n); matrix of Newton's method (nu,nu); a, udot at both ends (nu,); slopes (n,)."""
+
+    J: np.ndarray
+    matrix: np.ndarray
+    pivots: np.ndarray
+    a: np.ndarray
+    a_new: np.ndarray
+    rate: np.ndarray
+    rate_new: np.ndarray
+    increment: np.ndarray
+    correction: np.ndarray
+    f: np.ndarray
+    f_new: np.ndarray
+    y_new: np.ndarray
+    y_before: np.ndarray
+
+
+@helper
+def parameters(radius):
+    """alpha_m, alpha_f, beta, gamma of the spectral radius at infinity."""
+    alpha_m = (2.0 * radius - 1.0) / (radius + 1.0)
+    alpha_f = radius / (radius + 1.0)
+    return alpha_m, alpha_f, 0.25 * (1.0 - alpha_m + alpha_f) ** 2, 0.5 - alpha_m + alpha_f
+
+
+@helper
+def largest(values):
+    """Largest magnitude."""
+    size = 0.0
+    for value in values:
+        size = max(size, abs(value))
+    return size
+
+
+@helper
+def factorise(s, h, radius, nq, counts):
+    """Factors of d(udot_1 - f)/d(udot_1); dq/du is the block of J that maps speeds to rates of coordinates."""
+    alpha_m, alpha_f, beta, gamma = parameters(radius)
+    weight = (1.0 - alpha_f) / (1.0 - alpha_m)
+    nu = s.matrix.shape[0]
+    for i in range(nu):
+        for j in range(nu):
+            total = 0.0
+            for k in range(nq):
+                total += s.J[nq + i, k] * s.J[k, nq + j]
+            s.matrix[i, j] = -weight * (h * gamma * s.J[nq + i, nq + j] + h * h * beta * total)
+        s.matrix[i, i] += 1.0
+    counts[FACTORISATIONS] += 1
+    return lu_factorise(s.matrix, s.pivots)
+
+
+@generic
+def end_of_step(move, y, h, radius, nq, s, constants):
+    """y_new and a_new from udot at both ends; what follows the speeds is left alone."""
+    alpha_m, alpha_f, beta, gamma = parameters(radius)
+    for j in range(s.a.shape[0]):
+        a = ((1.0 - alpha_f) * s.rate_new[j] + alpha_f * s.rate[j] - alpha_m * s.a[j]) / (1.0 - alpha_m)
+        s.a_new[j] = a
+        s.increment[j] = h * (y[nq + j] + h * ((0.5 - beta) * s.a[j] + beta * a))
+        s.y_new[nq + j] = y[nq + j] + h * ((1.0 - gamma) * s.a[j] + gamma * a)
+    move(y, s.increment, s.y_new, constants)
+
+
+@generic
+def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspace, counts):
+    """Solve for udot at the end of the step. Returns (status, iterations)."""
+    nu = s.a.shape[0]
+    copy(s.rate, s.rate_new)
+    end_of_step(move, y, h, radius, nq, s, constants)
+    before = math.inf
+    for iteration in range(1, _ITERATIONS + 1):
+        status = derivative(rhs, t_new, s.y_new, s.f_new, constants, workspace, counts)
+        if status != OK:
+            return status, iteration
+        for j in range(nu):
+            s.correction[j] = s.f_new[nq + j] - s.rate_new[j]
+        lu_solve(s.matrix, s.pivots, s.correction)
+        for j in range(nu):
+            s.rate_new[j] += s.correction[j]
+        copy(s.y_new, s.y_before)
+        end_of_step(move, y, h, radius, nq, s, constants)
+        if not all_finite(s.y_new):
+            return NONFINITE, iteration
+        for i in range(nq + nu):
+            s.y_before[i] -= s.y_new[i]
+        size = scaled_norm(s.y_before, s.y_new, rtol, atol, nq + nu)
+        if size <= 1.0 or largest(s.correction) <= _ROUNDING * largest(s.rate_new):
+            return OK, iteration
+        if size > before:
+            return NOT_CONVERGED, iteration
+        before = size
+    return NOT_CONVERGED, _ITERATIONS
+
+
+@generic
+def step_once(
+    rhs, jacobian, move, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, constants, workspace, counts
+):
+    """One step from y(t) to y_new, with a new Jacobian where the old one does not do.
+
+    Returns (status, h of the factors, 0 where they are worn).
+    """
+    status, iterations = NOT_CONVERGED, 0
+    if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
+        h_factored = h if factorise(s, h, radius, nq, counts) else 0.0
+    if h_factored > 0.0:
+        status, iterations = newton(
+            rhs, move, min(t_new, last), y, h, radius, nq, s, rtol, atol, constants, workspace, counts
+        )
+    if status == NOT_CONVERGED:
+        status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+        if status != OK:
+            return status, 0.0
+        if not factorise(s, h, radius, nq, counts):
+            return NOT_CONVERGED, 0.0
+        status, iterations = newton(
+            rhs, move, min(t_new, last), y, h, radius, nq, s, rtol, atol, constants, workspace, counts
+        )
+        return status, h
+    return status, h if iterations < _WORN else 0.0
+
+
+@generic
+def generalised_alpha(
+    rhs, jacobian, move, project, y, times, segment_ends, step, radius, nq, controlled, rtol, atol, max_steps,
+    constants, workspace, out, counts,
+):  # fmt: skip
+    """Integrate y = [q (nq,), u, quadratures] from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    Steps, samples and segments are those of `rk4`; `jacobian` and counts (6,) those of `jacobians`. `move(y, increment,
+    result, constants)` puts q o exp(increment) into result. Newton's method stops where its correction is below
+    rtol |y| + atol over the first `controlled` components. Quadratures follow the trapezoidal rule. a starts as udot,
+    at the start and after every segment end, where udot may jump. Returns (status code, time of the last good state).
+    """
+    n, nu = y.shape[0], controlled - nq
+    s = Scratch(
+        np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), np.empty(nu), np.empty(nu), np.empty(nu),
+        np.empty(nu), np.empty(nu), np.empty(nu), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+    )  # fmt: skip
+    t = times[0]
+    project(t, y, constants)
+    copy(y, out[0])
+    copy(y, s.y_new)
+    counts[SAMPLES] = 1
+    segment, at_start, h_factored = 0, True, 0.0
+    for sample in range(1, times.shape[0]):
+        while t < times[sample]:
+            start, end = t, min(times[sample], segment_ends[segment])
+            last = np.nextafter(segment_ends[segment], start)
+            steps = max(1, math.ceil((end - start) / step * (1.0 - _STEP_SLACK)))
+            h = (end - start) / steps
+            for k in range(steps):
+                if counts[ACCEPTED] >= max_steps:
+                    return MAX_STEPS, t
+                if at_start:
+                    status = derivative(rhs, t, y, s.f, constants, workspace, counts)
+                    if status != OK:
+                        return status, t
+                    for j in range(nu):
+                        s.rate[j] = s.a[j] = s.f[nq + j]
+                    at_start = False
+                t_new = end if k == steps - 1 else start + (k + 1) * h
+                status, h_factored = step_once(
+                    rhs, jacobian, move, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol,
+                    constants, workspace, counts,
+                )  # fmt: skip
+                if status != OK:
+                    return status, t
+                for i in range(controlled, n):
+                    s.y_new[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
+                t = t_new
+                copy(s.y_new, y)
+                project(t, y, constants)
+                copy(s.rate_new, s.rate)
+                copy(s.a_new, s.a)
+                copy(s.f_new, s.f)
+                counts[ACCEPTED] += 1
+            if t == segment_ends[segment]:
+                segment, at_start = segment + 1, True
+        copy(y, out[sample])
+        counts[SAMPLES] = sample + 1
+    return OK, t

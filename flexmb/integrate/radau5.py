@@ -1,0 +1,311 @@
+"""Radau IIA of order 5 with error control and dense output, whole runs in one compiled loop.
+
+Hairer, Wanner, Solving Ordinary Differential Equations II (1996), IV.8. L-stable: a mode that is too fast for the step
+dies out instead of limiting it. The three stages come from simplified Newton iterations with one real and one complex
+factorisation; Jacobian and factors are kept as long as they serve.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import (
+    ACCEPTED,
+    REJECTED,
+    RETREAT,
+    SAFETY,
+    SAMPLES,
+    SHRINK,
+    copy,
+    derivative,
+    initial_step,
+    scaled_norm,
+)
+from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
+from flexmb.kernel import generic, helper
+from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+
+_ITERATIONS = 7  # of Newton's method, at most
+_GROW = 8.0  # strongest growth of a step
+_KEEP = 1.2  # a growth below this is not worth new factors
+_SAME = 1e-9  # relative difference of steps that share factors
+_SLOW = 1e-3  # a contraction above this asks for a new Jacobian
+_ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
+
+
+class Scratch(NamedTuple):
+    """Arrays of a step: stages Z, their slopes F (3,n); factors; unknowns w, v and corrections dw, dv, decoupled."""
+
+    J: np.ndarray
+    real: np.ndarray
+    paired: np.ndarray
+    real_pivots: np.ndarray
+    paired_pivots: np.ndarray
+    Z: np.ndarray
+    F: np.ndarray
+    w: np.ndarray
+    v: np.ndarray
+    dw: np.ndarray
+    dv: np.ndarray
+    y_new: np.ndarray
+    f_new: np.ndarray
+    error: np.ndarray
+    trial: np.ndarray
+
+
+@helper
+def factorise(s, h, counts):
+    """Factors of REAL/h - J and COMPLEX/h - J; returns whether both are regular."""
+    n = s.J.shape[0]
+    for i in range(n):
+        for j in range(n):
+            s.real[i, j] = -s.J[i, j]
+            s.paired[i, j] = -s.J[i, j]
+        s.real[i, i] += REAL / h
+        s.paired[i, i] += COMPLEX / h
+    counts[FACTORISATIONS] += 1
+    return lu_factorise(s.real, s.real_pivots) and lu_factorise(s.paired, s.paired_pivots)
+
+
+@helper
+def evaluate_polynomial(Z, x, result):
+    """result (n,) = collocation polynomial at the fraction x of the step, less the state at its start."""
+    for i in range(result.shape[0]):
+        value = 0.0
+        for k in range(2, -1, -1):
+            value = (value + P[0, k] * Z[0, i] + P[1, k] * Z[1, i] + P[2, k] * Z[2, i]) * x
+        result[i] = value
+
+
+@helper
+def correct(s, h):
+    """One Newton correction (dw real, dv complex) of the decoupled stages (w, v)."""
+    F = s.F
+    for i in range(s.w.shape[0]):
+        s.dw[i] = W_REAL[0] * F[0, i] + W_REAL[1] * F[1, i] + W_REAL[2] * F[2, i] - REAL / h * s.w[i]
+        s.dv[i] = W_COMPLEX[0] * F[0, i] + W_COMPLEX[1] * F[1, i] + W_COMPLEX[2] * F[2, i] - COMPLEX / h * s.v[i]
+    lu_solve(s.real, s.real_pivots, s.dw)
+    lu_solve(s.paired, s.paired_pivots, s.dv)
+    for i in range(s.w.shape[0]):
+        s.w[i] += s.dw[i]
+        s.v[i] += s.dv[i]
+
+
+@helper
+def to_stages(w, v, Z):
+    """Z (3,n) from its decoupled form."""
+    for s in range(3):
+        for i in range(w.shape[0]):
+            Z[s, i] = V_REAL[s] * w[i] + 2.0 * (V_COMPLEX[s] * v[i]).real
+
+
+@helper
+def to_decoupled(Z, w, v):
+    """The decoupled form of Z (3,n)."""
+    for i in range(w.shape[0]):
+        w[i] = W_REAL[0] * Z[0, i] + W_REAL[1] * Z[1, i] + W_REAL[2] * Z[2, i]
+        v[i] = W_COMPLEX[0] * Z[0, i] + W_COMPLEX[1] * Z[1, i] + W_COMPLEX[2] * Z[2, i]
+
+
+@helper
+def stage_norm(dZ, y, rtol, atol, controlled):
+    """Root mean square of the scaled norms of three stages (3,n)."""
+    total = 0.0
+    for s in range(3):
+        total += scaled_norm(dZ[s], y, rtol, atol, controlled) ** 2
+    return math.sqrt(total / 3.0)
+
+
+@generic
+def newton(rhs, t, last, y, h, s, rtol, atol, controlled, constants, workspace, counts):
+    """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
+
+    Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
+    there in time.
+    """
+    tolerance = max(10.0 * 2.0**-52 / rtol, min(0.03, math.sqrt(rtol)))
+    to_decoupled(s.Z, s.w, s.v)
+    rate, before = 0.0, 0.0
+    for iteration in range(1, _ITERATIONS + 1):
+        for stage in range(3):
+            for i in range(y.shape[0]):
+                s.trial[i] = y[i] + s.Z[stage, i]
+            status = derivative(rhs, min(t + C[stage] * h, last), s.trial, s.F[stage], constants, workspace, counts)
+            if status != OK:
+                return status, iteration, rate
+        correct(s, h)
+        to_stages(s.dw, s.dv, s.F)
+        size = stage_norm(s.F, y, rtol, atol, controlled)
+        to_stages(s.w, s.v, s.Z)
+        if not math.isfinite(size):
+            return NONFINITE, iteration, rate
+        if iteration > 1:
+            rate = size / before
+            if rate >= 1.0 or rate ** (_ITERATIONS - iteration) / (1.0 - rate) * size > tolerance:
+                return NOT_CONVERGED, iteration, rate
+        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size < tolerance):
+            return OK, iteration, rate
+        before = size
+    return NOT_CONVERGED, _ITERATIONS, rate
+
+
+@helper
+def estimate(y, slope, h, s, rtol, atol, controlled):
+    """Scaled norm of the embedded formula's error (8.19): the defect at the start, stiff parts filtered out."""
+    for i in range(y.shape[0]):
+        s.error[i] = slope[i] + (E[0] * s.Z[0, i] + E[1] * s.Z[1, i] + E[2] * s.Z[2, i]) / h
+        s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
+    lu_solve(s.real, s.real_pivots, s.error)
+    return scaled_norm(s.error, s.trial, rtol, atol, controlled)
+
+
+@helper
+def new_over_old(h, h_before, error, error_before):
+    """Step size by the controller of Gustafsson (8.25): the error's trend is taken to go on."""
+    if error == 0.0:
+        return _GROW
+    factor = error ** (-1.0 / _ERROR_EXPONENT)
+    if h_before > 0.0:
+        factor *= min(1.0, h / h_before * (error_before / error) ** (1.0 / _ERROR_EXPONENT))
+    return factor
+
+
+@helper
+def guess(before, h_before, h, Z):
+    """First guess of the stages: the polynomial of the step before, continued; zero without one."""
+    for stage in range(3):
+        if h_before > 0.0:
+            evaluate_polynomial(before, 1.0 + C[stage] * h / h_before, Z[stage])
+        for i in range(Z.shape[1]):
+            Z[stage, i] = Z[stage, i] - before[2, i] if h_before > 0.0 else 0.0
+
+
+@generic
+def attempt(
+    rhs, project, t, t_new, last, y, f, s, filter_again, rtol, atol, controlled, constants, workspace, counts
+):
+    """One trial step from a guess in Z: y_new, projected, and its slope f_new; returns status, error norm, iterations,
+    contraction. `filter_again`: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
+    """
+    h = t_new - t
+    status, iterations, rate = newton(rhs, t, last, y, h, s, rtol, atol, controlled, constants, workspace, counts)
+    if status != OK:
+        return status, math.inf, iterations, rate
+    for i in range(y.shape[0]):
+        s.y_new[i] = y[i] + s.Z[2, i]
+    error = estimate(y, f, h, s, rtol, atol, controlled)
+    if error >= 1.0 and filter_again:
+        for i in range(y.shape[0]):
+            s.trial[i] = y[i] + s.error[i]
+        status = derivative(rhs, t, s.trial, s.f_new, constants, workspace, counts)
+        if status == OK:
+            error = estimate(y, s.f_new, h, s, rtol, atol, controlled)
+    if status == OK and error < 1.0:
+        project(t_new, s.y_new, constants)
+        status = derivative(rhs, min(t_new, last), s.y_new, s.f_new, constants, workspace, counts)
+    return status, error, iterations, rate
+
+
+@generic
+def store_samples(project, t, t_new, y, s, times, constants, out, counts):
+    """Store the samples in (t, t_new]: the collocation polynomial, projected, inside the step."""
+    sample = counts[SAMPLES]
+    while sample < times.shape[0] and times[sample] <= t_new:
+        if times[sample] == t_new:
+            copy(s.y_new, out[sample])
+        else:
+            evaluate_polynomial(s.Z, (times[sample] - t) / (t_new - t), out[sample])
+            for i in range(y.shape[0]):
+                out[sample, i] += y[i]
+            project(times[sample], out[sample], constants)
+        sample += 1
+    counts[SAMPLES] = sample
+
+
+@generic
+def radau5(
+    rhs, jacobian, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
+):
+    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    Arguments, samples, segments and the retreat from a failing right-hand side are those of `dop853`; `jacobian` and
+    counts (6,) are those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed, then the
+    step is halved.
+    """
+    n = y.shape[0]
+    s = Scratch(
+        np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
+        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty(n), np.empty(n, np.complex128),
+        np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+    )  # fmt: skip
+    Z_before, f = np.empty((3, n)), np.empty(n)
+    t, h = times[0], 0.0
+    project(t, y, constants)
+    copy(y, out[0])
+    counts[SAMPLES] = 1
+    for end in segment_ends:
+        last = np.nextafter(end, t)
+        status = derivative(rhs, t, y, f, constants, workspace, counts)
+        if status != OK:
+            return status, t
+        if h == 0.0:
+            h = initial_step(
+                rhs, t, y, f, end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
+                constants, workspace, counts, s.trial, s.error,
+            )  # fmt: skip
+        h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
+        renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
+        while t < end:
+            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
+                return MAX_STEPS, t
+            if h < 10.0 * (np.nextafter(t, math.inf) - t):
+                return trouble, t
+            t_new = end if t + 1.01 * h >= end else t + h
+            length = t_new - t
+            if renew:
+                status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+                if status != OK:
+                    return status, t
+                renew, fresh, h_factored = False, True, 0.0
+            status, error, iterations, rate = NOT_CONVERGED, math.inf, 0, 0.0
+            # Equal steps differ by the rounding of time: the factors are good for all of them.
+            if abs(length - h_factored) > _SAME * length:
+                h_factored = length if factorise(s, length, counts) else 0.0
+            if h_factored > 0.0:
+                guess(Z_before, h_before, length, s.Z)
+                status, error, iterations, rate = attempt(
+                    rhs, project, t, t_new, last, y, f, s, rejected or h_before == 0.0, rtol, atol, controlled,
+                    constants, workspace, counts,
+                )  # fmt: skip
+            caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
+            if status == OK and error < 1.0:
+                store_samples(project, t, t_new, y, s, times, constants, out, counts)
+                factor = min(_GROW, caution * new_over_old(length, h_before, error, error_before))
+                factor = min(1.0, factor) if rejected else factor
+                renew = iterations > 2 and rate > _SLOW
+                factor = 1.0 if 1.0 <= factor < _KEEP and not renew else factor
+                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
+                h = max(h, length * factor) if t_new == end and factor >= 1.0 else length * factor
+                t, h_before, error_before = t_new, length, max(1e-2, error)
+                copy(s.y_new, y)
+                copy(s.f_new, f)
+                for stage in range(3):
+                    copy(s.Z[stage], Z_before[stage])
+                counts[ACCEPTED] += 1
+                fresh, rejected, trouble = False, False, STEP_TOO_SMALL
+            else:
+                if status == OK:
+                    h = length * max(SHRINK, min(1.0, caution * new_over_old(length, h_before, error, error_before)))
+                elif status == NOT_CONVERGED and not fresh:
+                    h, renew = length, True  # the Jacobian may be too old, not the step too long
+                else:
+                    h, renew = length * (0.5 if status == NOT_CONVERGED else RETREAT), not fresh
+                trouble = STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
+                rejected = True
+                counts[REJECTED] += 1
+    return OK, t

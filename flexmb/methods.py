@@ -1,0 +1,62 @@
+"""The integrators by name, and what a run may ask of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+
+Method = Literal["dop853", "rk4", "radau5", "exponential", "generalised_alpha"]
+FIXED: tuple[Method, ...] = ("rk4", "generalised_alpha")  # take equal steps
+LINEARISING: tuple[Method, ...] = ("radau5", "exponential", "generalised_alpha")  # need Jacobians
+FINEST_RTOL = 100 * np.finfo(float).eps
+DAMPING_NOTHING_SLOW = 0.8  # spectral radius: a mode that is not resolved loses nine tenths in ten steps
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run is integrated: `step` (s) and `spectral_radius` belong to methods that have them, else None."""
+
+    method: Method
+    rtol: float
+    atol: float
+    step: float | None
+    max_steps: int
+    spectral_radius: float | None = None
+
+    @property
+    def radius(self) -> float:
+        """Spectral radius at infinite frequency of generalised-alpha."""
+        return DAMPING_NOTHING_SLOW if self.spectral_radius is None else self.spectral_radius
+
+    def check(self) -> None:
+        """ValueError for settings that make no sense."""
+        if self.method not in get_args(Method):
+            raise ValueError(f"method is {self.method!r}: use one of {', '.join(map(repr, get_args(Method)))}")
+        if self.method in FIXED and (self.step is None or not (np.isfinite(self.step) and self.step > 0.0)):
+            raise ValueError(
+                f'method "{self.method}" takes fixed steps, but step is {self.step}: give a positive step in seconds'
+            )
+        if self.method not in FIXED and self.step is not None:
+            raise ValueError(
+                f'method "{self.method}" chooses its own steps: leave step out and set rtol and atol, or use "rk4"'
+            )
+        if self.spectral_radius is not None:
+            if self.method != "generalised_alpha":
+                raise ValueError(f'spectral_radius is for method "generalised_alpha": leave it out for "{self.method}"')
+            if not 0.0 <= self.spectral_radius <= 1.0:
+                raise ValueError(
+                    f"spectral_radius is {self.spectral_radius:g}: from 0 (what is not resolved dies in a step) to 1 "
+                    "(nothing is damped)"
+                )
+        if not FINEST_RTOL <= self.rtol < 1.0:
+            raise ValueError(
+                f"rtol is {self.rtol:g}: double precision resolves {FINEST_RTOL:.1e}; use a value from there to 1e-3"
+            )
+        if not (np.isfinite(self.atol) and self.atol > 0.0):
+            raise ValueError(
+                f"atol is {self.atol:g}: give a positive one, or a coordinate that passes zero stops the run"
+            )
+        if self.max_steps < 1:
+            raise ValueError(f"max_steps is {self.max_steps}: allow at least one step")
