@@ -18,6 +18,7 @@ from crosscheck.report import write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome
 from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
+from flexmb.scene.problems import closest
 
 EXIT_USAGE = 2
 
@@ -132,6 +133,44 @@ def verify(
     except ValueError as error:
         _refuse(str(error))
     raise typer.Exit(print_outcome(console, outcome))
+
+
+@app.command()
+def stability(
+    maps: Annotated[list[str], typer.Argument(help="Names of maps, `all`, or `list` to see which there are.")],
+    out: Out = Path("out"),
+    depth: Annotated[
+        int | None, typer.Option(help="How often cells at a boundary are halved; by default what the map says.", min=0)
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
+    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+) -> None:
+    """
+    Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
+
+    **Writes** into `--out` the records of each map, `<map>.jsonl`, and into `--pictures` `<map>.svg` and the verdicts,
+    `maps.json`. A run that was stopped resumes where it was.
+
+    **Exit code**: 0 every boundary lies within one of the finest cells of its overlay; 1 one does not, or cells did not
+    run; 2 there is no such map.
+
+    **Examples**: `crosscheck stability list` · `crosscheck stability vibrating_hinge --depth 5` ·
+    `crosscheck stability all --pictures docs/pictures`
+    """
+    from crosscheck.stability.console import run_and_draw, show_maps  # they load the compiler
+    from crosscheck.stability.run import PROVIDER, maps_of
+
+    known = maps_of(PROVIDER)
+    if maps == ["list"]:
+        return show_maps(console, known.values())
+    chosen = list(known) if maps == ["all"] else maps
+    for name in chosen:
+        if name not in known:
+            _refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
+    raise typer.Exit(
+        run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs)
+    )
 
 
 def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:

@@ -47,13 +47,18 @@ def run_jobs(
     stay with their kind while there are jobs of it, and only one is at a kind until its first job is done, so that what
     that job leaves in caches on disk is not made twice. Whatever workers print goes to the file `log`. Numerical
     libraries get one thread per worker. Closing the iterator early stops the workers.
+
+    `jobs` may grow while its events are read: what an event brings to light can ask for more jobs.
     """
-    kinds = [kind(job) for job in jobs]
-    waiting = list(range(len(jobs)))
+    kinds: list[str] = []
+    waiting: list[int] = []
     prepared: set[str] = set()
-    crew = [_start(function, log) for _ in range(min(workers, len(jobs)))]
+    crew: list[_Worker] = []
     try:
-        while waiting or any(worker.job is not None for worker in crew):
+        while len(kinds) < len(jobs) or waiting or any(worker.job is not None for worker in crew):
+            waiting += range(len(kinds), len(jobs))
+            kinds += [kind(job) for job in jobs[len(kinds) :]]
+            crew += [_start(function, log) for _ in range(min(workers, len(kinds)) - len(crew))]
             for worker in crew:
                 if worker.job is None and (job := _next_job(worker, crew, waiting, kinds, prepared)) is not None:
                     yield _hand_out(worker, job, jobs, kinds)

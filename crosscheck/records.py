@@ -14,7 +14,7 @@ import zlib
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import msgspec
 import numpy as np
@@ -138,7 +138,7 @@ class Archive:
         self._stream = file.open("ab")
         self._encoder = msgspec.json.Encoder()
 
-    def write(self, record: Record) -> None:
+    def write(self, record: msgspec.Struct) -> None:
         """Append one line."""
         self._stream.write(self._encoder.encode(record) + b"\n")
         self._stream.flush()
@@ -150,8 +150,13 @@ class Archive:
 
 def read(file: Path) -> list[Record]:
     """All records of a file, in order; a last line without its end is skipped. ValueError names a wrong line."""
-    decoder = msgspec.json.Decoder(Record)
-    found: list[Record] = []
+    return decoded_lines(file, Record)
+
+
+def decoded_lines(file: Path, kind: Any) -> list[Any]:
+    """`read` for records of any tagged struct or union of them."""
+    decoder = msgspec.json.Decoder(kind)
+    found = []
     with file.open("rb") as stream:
         for number, line in enumerate(stream, start=1):
             if not line.endswith(b"\n"):

@@ -14,6 +14,7 @@ from crosscheck.engines.exudyn.state import States
 
 IMPLICIT = ("TrapezoidalIndex2", "GeneralizedAlpha")
 EXPLICIT = "DOPRI5"
+FIXED_EXPLICIT = ("ExplicitEuler", "RK44")
 SPECTRAL_RADIUS = 0.9
 NEWTON_TOLERANCES = (1e-8, 1e-6, 1e-4)
 """Relative and absolute tolerance of Newton's method, tried in turn until a run reaches its end.
@@ -71,7 +72,7 @@ class Recorder:
 
 def integrate(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> Solution:
     """Integrate from 0 through `times`; uniform sampling for the implicit solvers."""
-    run = _implicit if effort.method in IMPLICIT else _explicit
+    run = _fixed if effort.method in IMPLICIT + FIXED_EXPLICIT else _explicit
     start = perf_counter()
     states, evaluations = run(assembly, times, effort)
     wall = perf_counter() - start
@@ -102,9 +103,9 @@ def steps_between_samples(times: Array, step: float) -> int:
     return 2 ** max(0, int(np.ceil(np.log2(gaps[0] / step) - 1e-9)))
 
 
-def _implicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
+def _fixed(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
     """A fixed-step run; a sensor takes the samples, which fall on steps."""
-    for tolerance in NEWTON_TOLERANCES:
+    for tolerance in NEWTON_TOLERANCES if effort.method in IMPLICIT else NEWTON_TOLERANCES[:1]:
         states, evaluations = _fixed_steps(assembly, times, effort, tolerance)
         if len(states.times) >= len(times):
             break

@@ -1,4 +1,4 @@
-"""One scene compiled for MuJoCo: evaluate at t = 0, or integrate with RK4 at a fixed step."""
+"""One scene compiled for MuJoCo: evaluate at t = 0, or integrate at a fixed step with any of its integrators."""
 
 from __future__ import annotations
 
@@ -25,7 +25,12 @@ from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
 
-_STAGES = 4
+_INTEGRATORS = {  # by an effort's method: MuJoCo's number, and evaluations a step
+    "RK4": (mujoco.mjtIntegrator.mjINT_RK4, 4),
+    "Euler": (mujoco.mjtIntegrator.mjINT_EULER, 1),
+    "implicit": (mujoco.mjtIntegrator.mjINT_IMPLICIT, 1),
+    "implicitfast": (mujoco.mjtIntegrator.mjINT_IMPLICITFAST, 1),
+}
 
 
 class Fastest(NamedTuple):
@@ -51,6 +56,8 @@ class MujocoModel:
         return self._observer.observe(self._initial())
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
+        integrator, stages = _INTEGRATORS[effort.method]
+        self._tree.model.opt.integrator = integrator
         with _quiet():
             start = time.perf_counter()
             states, steps, message = self._integrate(run.times, effort.value)
@@ -63,8 +70,9 @@ class MujocoModel:
                 samples.append(self._observer.observe(data))
         status: Status = "finished" if len(states) == len(run.times) else "diverged"
         reached = run.times[: len(states)]
-        evaluations = _STAGES * steps
-        return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations)
+        return stack(
+            reached, samples, status=status, message=message, wall_s=wall, evaluations=stages * steps
+        )
 
     def fastest(self) -> Fastest:
         """Fastest motion and stiffest pole at the initial state, for choosing a step."""

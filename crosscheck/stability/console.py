@@ -1,0 +1,83 @@
+"""Maps on the terminal: a bar while they run, a line for each verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+import msgspec
+from rich.console import Console
+from rich.markup import escape
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.table import Table
+
+from crosscheck.stability.judge import MapVerdict
+from crosscheck.stability.map import StabilityMap
+from crosscheck.stability.picture import draw
+from crosscheck.stability.run import Finished, run_map
+
+VERDICTS = "maps.json"
+
+
+def show_maps(console: Console, maps: Iterable[StabilityMap]) -> None:
+    """A table of the maps."""
+    table = Table("map", "axes", "overlay", header_style="bold")
+    for what in maps:
+        table.add_row(what.name, f"{escape(what.x.label)} x {escape(what.y.label)}", escape(what.overlay.name))
+    console.print(table)
+
+
+def run_and_draw(
+    console: Console, names: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
+    workers: int | None,
+) -> int:  # fmt: skip
+    """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
+    verdicts = []
+    for name in names:
+        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, workers)
+        picture = draw(done, pictures / f"{name}.svg")
+        verdicts.append(done.verdict)
+        write_verdicts(verdicts, pictures / VERDICTS)
+        console.print(_line(done, picture), highlight=False, soft_wrap=True)
+    good = sum(verdict.ok for verdict in verdicts)
+    colour = "green" if good == len(verdicts) else "red"
+    console.print(f"[bold {colour}]{good} of {len(verdicts)} maps agree with their overlays[/bold {colour}]")
+    return 0 if good == len(verdicts) else 1
+
+
+def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
+    """The verdicts as a JSON file; those of other maps that it holds already are kept."""
+    known = {verdict.map: verdict for verdict in read_verdicts(file)} if file.exists() else {}
+    known |= {verdict.map: verdict for verdict in verdicts}
+    text = msgspec.json.format(msgspec.json.encode([known[name] for name in sorted(known)]), indent=1)
+    file.write_bytes(text + b"\n")
+
+
+def read_verdicts(file: Path) -> list[MapVerdict]:
+    """What `write_verdicts` wrote."""
+    return msgspec.json.decode(file.read_bytes(), type=list[MapVerdict])
+
+
+def _run(
+    console: Console, name: str, records: Path, depth: int | None, fresh: bool, workers: int | None
+) -> Finished:
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
+        TimeElapsedColumn(), console=console, transient=True,
+    ) as progress:  # fmt: skip
+        task = progress.add_task(name, total=None)
+
+        def hear(what: StabilityMap, done: int, known: int) -> None:
+            progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
+
+        return run_map(name, records, depth=depth, fresh=fresh, workers=workers, listener=hear)
+
+
+def _line(done: Finished, picture: Path) -> str:
+    verdict = done.verdict
+    mark = "[green]✓[/green]" if verdict.ok else "[red]✕[/red]"
+    cells = ", ".join(f"{count} {name}" for name, count in verdict.cells.items())
+    far = "beyond the map" if verdict.distance < 0 else f"{verdict.distance}"
+    text = f"{verdict.map}: {verdict.status}, farthest cell from the overlay {far}; {cells}; {verdict.seconds:.0f} s"
+    worst = "" if verdict.ok or not verdict.worst else f"; {verdict.worst}"
+    return f"{mark} {escape(text + worst)} -> {escape(str(picture))}"

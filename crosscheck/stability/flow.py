@@ -1,0 +1,66 @@
+"""The flow of a scene near a motion, by runs: growth of small disturbances, and amplitudes over long times.
+
+A disturbance of size `SIZE` of each chosen coordinate or speed is followed through a time; what comes back is, to
+SIZE^2 and to rounding over SIZE, the transition matrix of the linearised motion; its eigenvalues are Floquet's
+multipliers if that time is a period.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.propagate import run_dop853
+from flexmb.state import pack
+from flexmb.status import OK, Status
+from flexmb.system import System
+
+Array = NDArray[np.float64]
+
+SIZE = 1e-6
+RTOL, ATOL = 1e-12, 1e-16
+MAX_STEPS = 1_000_000
+
+
+class StoppedError(ArithmeticError):
+    """A run that did not reach its end; `status` says why."""
+
+    def __init__(self, status: Status) -> None:
+        super().__init__(status.advice)
+        self.status = status
+
+
+def flow(system: System, start: Array, time: float) -> Array:
+    """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
+    times, out = np.array([0.0, time]), np.empty((2, len(start)))
+    counts, controlled = np.zeros(4, np.int64), system.nq + system.nu
+    status, _ = run_dop853(
+        start.copy(), times, times[1:], RTOL, ATOL, controlled, MAX_STEPS,
+        system.recursion_constants, system.recursion_workspace(), out, counts,
+    )  # fmt: skip
+    if status != OK:
+        raise StoppedError(Status(status))
+    return np.asarray(out[1])
+
+
+def transition_matrix(system: System, places: Sequence[int], time: float) -> Array:
+    """(n,n): how disturbances of the states at `places` of the scene's motion have changed after `time` (s)."""
+    start = pack(system.initial_state)
+    columns = []
+    for place in places:
+        ends = []
+        for sign in (1.0, -1.0):
+            moved = start.copy()
+            moved[place] += sign * SIZE
+            ends.append(flow(system, moved, time)[list(places)])
+        columns.append((ends[0] - ends[1]) / (2.0 * SIZE))
+    return np.array(columns).T
+
+
+def growth_rate(system: System, places: Sequence[int], time: float) -> float:
+    """Largest real part (1/s) of the exponents of disturbances over `time` (s)."""
+    multipliers = np.linalg.eigvals(transition_matrix(system, places, time))
+    return float(np.log(np.max(np.abs(multipliers))) / time)
+

@@ -1,0 +1,151 @@
+"""What a stability map is: one family of scenes with two parameters, one quantity, two named axes, one overlay."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.scene.schema import Scene
+
+Array = NDArray[np.float64]
+CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
+
+STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours for the classes of maps that ask nothing but that
+DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A parameter from `low` to `high` in `cells` coarse cells, equal in its logarithm if `log`.
+
+    With `categories` it is one row of cells for each of them, which are not divided, and its values are 0, 1, 2 ...
+    """
+
+    name: str
+    unit: str = ""
+    low: float = 0.0
+    high: float = 1.0
+    cells: int = 1
+    log: bool = False
+    categories: tuple[str, ...] = ()
+
+    @staticmethod
+    def of(name: str, *categories: str) -> Axis:
+        """An axis whose values have names."""
+        return Axis(name, low=-0.5, high=len(categories) - 0.5, cells=len(categories), categories=categories)
+
+    @property
+    def label(self) -> str:
+        """Name and unit."""
+        return f"{self.name} ({self.unit})" if self.unit else self.name
+
+    def values(self, fractions: Array) -> Array:
+        """Parameters at fractions 0..1 of the axis."""
+        if self.log:
+            return np.asarray(self.low * (self.high / self.low) ** fractions)
+        return np.asarray(self.low + (self.high - self.low) * fractions)
+
+    def edges(self, level: int) -> Array:
+        """Bounds (n+1,) of the cells after `level` halvings."""
+        count = self.count(level)
+        return self.values(np.arange(count + 1) / count)
+
+    def centres(self, level: int) -> Array:
+        """Middles (n,) of the cells after `level` halvings."""
+        count = self.count(level)
+        return self.values((np.arange(count) + 0.5) / count)
+
+    def count(self, level: int) -> int:
+        """How many cells there are after `level` halvings."""
+        return self.cells if self.categories else self.cells * 2**level
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What was found in a cell: the quantity's value, or that and why there is none."""
+
+    value: float = np.nan
+    status: CellStatus = "measured"
+    message: str = ""
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A class of cells: between two thresholds of the quantity."""
+
+    name: str
+    colour: str
+
+
+@dataclass(frozen=True)
+class Overlay:
+    """The boundary known from elsewhere: where `predict(x, y)` (arrays of one shape) passes `levels`.
+
+    Below the first level the first class is expected, and so on: as many levels as the map has thresholds. A `bound`
+    says only what the quantity does not exceed: classes below the expected one are right too. `source` names the
+    theory or the publication.
+    """
+
+    name: str
+    source: str
+    predict: Callable[[Array, Array], Array]
+    levels: tuple[float, ...] = (0.0,)
+    bound: bool = False
+
+    def classes(self, x: Array, y: Array) -> NDArray[np.intp]:
+        """Numbers of the classes expected at x, y."""
+        return np.searchsorted(self.levels, self.predict(x, y), side="right")
+
+
+@dataclass(frozen=True)
+class StabilityMap:
+    """One case, one quantity, two axes.
+
+    `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds` lie
+    between the `thresholds` (increasing, one fewer). `depth` halvings are made where class or status changes. A cell
+    that `failed` counts as class number `failure` in the comparison with the overlay; without one no failure is right.
+    Where `skips`, cells that did not finish are no evidence. `shows` is for the gallery; `amplitude(x, y)` is the
+    largest amplitude over 1000 periods relative to the start's, where the map calls a motion stable.
+    """
+
+    name: str
+    title: str
+    quantity: str
+    scene: Callable[[float, float], Scene]
+    measure: Callable[[Scene, float, float], Outcome]
+    x: Axis
+    y: Axis
+    thresholds: tuple[float, ...]
+    kinds: tuple[Kind, ...]
+    overlay: Overlay
+    shows: str
+    depth: int = 3
+    failure: int | None = None
+    skips: bool = False
+    amplitude: Callable[[float, float], float] | None = None
+
+    def __post_init__(self) -> None:
+        if not len(self.kinds) == len(self.thresholds) + 1 == len(self.overlay.levels) + 1:
+            raise ValueError(f"map {self.name}: {len(self.kinds)} classes need one fewer thresholds and overlay levels")
+
+    def kind(self, value: float) -> int:
+        """Number of the class of a value."""
+        return int(np.searchsorted(self.thresholds, value, side="right"))
+
+    def outcome(self, x: float, y: float) -> Outcome:
+        """The quantity at one place."""
+        return self.measure(self.scene(x, y), x, y)
+
+
+def growth_kinds() -> tuple[Kind, Kind]:
+    """Classes of a map of growth rates."""
+    return Kind("stable", STABLE), Kind("unstable", UNSTABLE)
+
+
+def digit_kinds(*names: str) -> tuple[Kind, ...]:
+    """Classes of a map of errors, from many digits to few."""
+    return tuple(Kind(name, colour) for name, colour in zip(names, DIGITS[: len(names)], strict=True))

@@ -1,0 +1,1 @@
+"""The maps: one small file for each case, its scene family, quantity, overlay and reference."""

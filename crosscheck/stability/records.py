@@ -1,0 +1,65 @@
+"""Records of maps: one line for the machine, one for the map, one for each cell, written as they come."""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from crosscheck.records import Environment, decoded_lines
+from crosscheck.stability.map import Axis, CellStatus, StabilityMap
+from crosscheck.stability.refine import Cell
+
+
+class MapRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="map"):
+    """A map as it was run. `identity` changes with its definition: then earlier cells are not its own any more."""
+
+    map: str
+    identity: str
+    quantity: str
+    x: Axis
+    y: Axis
+
+
+class CellRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="cell"):
+    """What was found in one cell (`Cell`) of the map of that identity, at its middle x, y."""
+
+    identity: str
+    level: int
+    i: int
+    j: int
+    x: float
+    y: float
+    status: CellStatus
+    value: float | None = None
+    message: str = ""
+    cpu_s: float = 0.0
+
+    @property
+    def cell(self) -> Cell:
+        return Cell(self.level, self.i, self.j)
+
+
+Record = Environment | MapRecord | CellRecord
+
+
+def identity(what: StabilityMap) -> str:
+    """A digest of the map's axes and of the text of the file that defines what is measured."""
+    source = inspect.getsource(sys.modules[what.measure.__module__])
+    text = f"{what.name} {what.x} {what.y} {source}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
+
+
+def read(file: Path) -> list[Record]:
+    """All records of a file, in order. ValueError names a wrong line."""
+    return decoded_lines(file, Record)
+
+
+def cells_of(records: Sequence[Record], wanted: str) -> dict[Cell, CellRecord]:
+    """Cells recorded for the map of one identity; those that did not run are asked for again."""
+    found = [each for each in records if isinstance(each, CellRecord) and each.identity == wanted]
+    return {record.cell: record for record in found if record.status != "did not run"}

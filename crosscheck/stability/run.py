@@ -1,0 +1,146 @@
+"""Running a map: coarse cells first, then those that refinement asks for, recorded as they come; resumable."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Iterator, Sequence
+from functools import cache
+from importlib import import_module
+from pathlib import Path
+from time import process_time
+from typing import Any, NamedTuple
+
+from crosscheck.engines.contract import EngineMissing
+from crosscheck.pool import Event, run_jobs
+from crosscheck.records import Archive, environment
+from crosscheck.stability.judge import MapVerdict, judge, label
+from crosscheck.stability.map import Outcome, StabilityMap
+from crosscheck.stability.records import CellRecord, MapRecord, cells_of, identity, read
+from crosscheck.stability.refine import Cell, Mesh
+
+PROVIDER = "crosscheck.stability.catalogue:stability_maps"
+Listener = Callable[[StabilityMap, int, int], None]
+Scheduler = Callable[..., Iterator[Event]]
+
+
+class CellJob(NamedTuple):
+    """One cell of a map, as it is sent to a worker."""
+
+    provider: str
+    map: str
+    identity: str
+    cell: Cell
+    x: float
+    y: float
+
+
+class Finished(NamedTuple):
+    """A map that was run: its mesh, what its cells gave, and the judgement."""
+
+    map: StabilityMap
+    mesh: Mesh
+    records: dict[Cell, CellRecord]
+    verdict: MapVerdict
+
+
+def run_map(
+    name: str,
+    records: Path,
+    *,
+    depth: int | None = None,
+    fresh: bool = False,
+    workers: int | None = None,
+    provider: str = PROVIDER,
+    scheduler: Scheduler = run_jobs,
+    listener: Listener = lambda what, done, known: None,
+) -> Finished:
+    """Run one map of the provider to `depth` halvings (default: its own) and append to the file `records`.
+
+    Cells already recorded for the same definition are kept unless `fresh`. `listener` hears how many cells of those
+    known so far are done. Raises KeyError where there is no such map.
+    """
+    what = maps_of(provider)[name]
+    mesh = Mesh(what.x, what.y, what.depth if depth is None else depth)
+    if fresh:
+        records.unlink(missing_ok=True)
+    mark = identity(what)
+    known = cells_of(read(records), mark) if records.exists() else {}
+    used: dict[Cell, CellRecord] = {}
+    archive = Archive(records)
+    try:
+        archive.write(environment())
+        archive.write(MapRecord(map=name, identity=mark, quantity=what.quantity, x=what.x, y=what.y))
+        jobs = list[CellJob]()
+
+        def ask(cells: Sequence[Cell]) -> None:
+            """Take from the records what is there, and send for the rest; refine further if nothing is left."""
+            while cells:
+                here = [known[cell] for cell in cells if cell in known]
+                new = [cell for cell in cells if cell not in known]
+                jobs.extend(CellJob(provider, name, mark, cell, *mesh.centre(cell)) for cell in new)
+                cells = take(here) if here else []
+
+        def take(found: list[CellRecord]) -> list[Cell]:
+            used.update((record.cell, record) for record in found)
+            listener(what, len(used), len(used) + len(mesh.waiting) - len(found))
+            return mesh.settle((record.cell, label(what, record)) for record in found)
+
+        ask(sorted(mesh.waiting))
+        for event in scheduler(run_cell, jobs, workers or os.cpu_count() or 1, str(records.with_suffix(".log"))):
+            if event.kind in ("emitted", "crashed"):
+                job = jobs[event.job]
+                record = event.content if event.kind == "emitted" else _crash(job, event.content)
+                archive.write(record)
+                ask(take([record]))
+    finally:
+        archive.close()
+    return Finished(what, mesh, used, judge(what, mesh, used))
+
+
+@cache
+def maps_of(provider: str) -> dict[str, StabilityMap]:
+    """Maps by name, from "module:function"."""
+    module, _, function = provider.partition(":")
+    found: dict[str, StabilityMap] = getattr(import_module(module), function)()
+    return found
+
+
+def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
+    """What a worker does with a cell: nothing a map raises is lost."""
+    begin = process_time()
+    try:
+        outcome = maps_of(job.provider)[job.map].outcome(job.x, job.y)
+    except EngineMissing as error:
+        outcome = Outcome(status="did not run", message=str(error))
+    except Exception as error:
+        outcome = Outcome(status="failed", message=f"{type(error).__name__}: {error}")
+    if outcome.status == "measured" and not math.isfinite(outcome.value):
+        outcome = Outcome(status="failed", message=f"the quantity is {outcome.value}")
+    emit(
+        CellRecord(
+            identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
+            status=outcome.status, value=float(outcome.value) if outcome.status == "measured" else None,
+            message=outcome.message, cpu_s=process_time() - begin,
+        )
+    )  # fmt: skip
+
+
+def _crash(job: CellJob, how: str) -> CellRecord:
+    return CellRecord(
+        identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
+        status="failed", message=how,
+    )  # fmt: skip
+
+
+def run_here(
+    function: Callable[..., None], jobs: Sequence[Any], workers: int, log: str
+) -> Iterator[Event]:
+    """A scheduler without processes: one job after the other, here."""
+    number = 0
+    while number < len(jobs):
+        found: list[Any] = []
+        function(jobs[number], found.append)
+        yield from (Event(number, "emitted", content) for content in found)
+        yield Event(number, "ended")
+        number += 1

@@ -1,0 +1,73 @@
+"""Maps that need no mechanics: a circle that is known, cells that fail, a worker that dies."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+
+import numpy as np
+
+from crosscheck.engines.contract import EngineMissing
+from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.schema import Scene
+
+PROVIDER = "tests.crosscheck.stability.synthetic:maps"
+RADIUS = 0.6
+CORNER = 0.8
+
+
+def scene(x: float, y: float) -> Scene:
+    """Any."""
+    builder = SceneBuilder("any").rigid_body("body", mass=1.0, inertia=(1.0, 1.0, 1.0))
+    return builder.free("base", "ground", "body").scene()
+
+
+def circle(x: Array, y: Array) -> Array:
+    """Positive outside."""
+    return np.asarray(np.hypot(x, y) - RADIUS)
+
+
+def measure(scene: Scene, x: float, y: float) -> Outcome:
+    """The circle's own distance."""
+    return Outcome(float(circle(np.asarray(x), np.asarray(y))))
+
+
+def with_bad_corner(scene: Scene, x: float, y: float) -> Outcome:
+    """Raises right of `CORNER`, does not finish above it; missing or dead where both are."""
+    if x > CORNER and y > CORNER:
+        os._exit(3)
+    if x > CORNER:
+        raise ArithmeticError("no such state")
+    return Outcome(status="did not finish", message="too long") if y > CORNER else measure(scene, x, y)
+
+
+def without_library(scene: Scene, x: float, y: float) -> Outcome:
+    """What an engine says that is not installed."""
+    raise EngineMissing("pip install it")
+
+
+CIRCLE = StabilityMap(
+    name="circle", title="A circle", quantity="distance", scene=scene, measure=measure,
+    x=Axis("x", "m", -1.0, 1.0, 8), y=Axis("y", "m", -1.0, 1.0, 8), thresholds=(0.0,), kinds=growth_kinds(),
+    overlay=Overlay("the circle", "Euclid", circle), shows="A circle.", depth=4,
+)  # fmt: skip
+
+
+def shifted(by: float) -> Overlay:
+    """A wrong circle."""
+    return Overlay("not the circle", "nobody", lambda x, y: circle(x - by, y))
+
+
+def maps() -> dict[str, StabilityMap]:
+    """By name."""
+    quarter = Axis("x", "m", 0.0, 1.0, 4)
+    corner = replace(CIRCLE, name="corner", measure=with_bad_corner, x=quarter, y=replace(quarter, name="y"), depth=1)
+    found = (
+        CIRCLE,
+        corner,
+        replace(CIRCLE, name="absent", measure=without_library, depth=1),
+        replace(CIRCLE, name="wrong", overlay=shifted(0.05)),
+        replace(CIRCLE, name="close", overlay=shifted(0.015)),
+    )
+    return {what.name: what for what in found}

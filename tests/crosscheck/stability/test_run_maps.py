@@ -1,0 +1,122 @@
+"""Whole maps: verdicts that can fail, failed cells in colours of their own, resuming, and the command."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from matplotlib.image import imread
+from typer.testing import CliRunner
+
+from crosscheck import cli
+from crosscheck.stability import console, run
+from crosscheck.stability.catalogue import stability_maps
+from crosscheck.stability.judge import judge
+from crosscheck.stability.picture import STATUSES, draw
+from crosscheck.stability.records import CellRecord, read
+from crosscheck.stability.run import Finished, run_here, run_map
+from tests.crosscheck.stability import synthetic
+from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
+
+
+def run_it(name: str, folder: Path, **options: object) -> Finished:
+    return run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, **{"scheduler": run_here, **options})
+
+
+def test_a_true_overlay_is_met_and_a_wrong_one_is_noticed(tmp_path: Path) -> None:
+    """The finest cells are 1/64 m: a circle shifted by less than one is within one cell, by three it is not."""
+    true, close, wrong = (run_it(name, tmp_path).verdict for name in ("circle", "close", "wrong"))
+    assert (true.status, true.distance) == ("agree", 0)
+    assert (close.status, close.distance) == ("agree", 1)
+    assert wrong.status == "differ" and 2 <= wrong.distance <= 4
+    assert "expected" in wrong.worst
+
+
+def test_an_overlay_elsewhere_altogether_is_infinitely_far(tmp_path: Path) -> None:
+    done = run_it("circle", tmp_path)
+    nowhere = judge(replace(CIRCLE, overlay=shifted(10.0)), done.mesh, done.records)
+    assert (nowhere.status, nowhere.distance) == ("differ", -1)
+
+
+def test_a_bound_allows_better_and_refuses_worse(tmp_path: Path) -> None:
+    """Stable is better: a bound may call stable places unstable, not unstable ones stable."""
+    done = run_it("circle", tmp_path)
+    for radius, status in ((0.3, "agree"), (0.9, "differ")):
+        smaller = replace(CIRCLE.overlay, predict=lambda x, y, r=radius: (x**2 + y**2) ** 0.5 - r, bound=True)
+        assert judge(replace(CIRCLE, overlay=smaller), done.mesh, done.records).status == status
+
+
+def test_cells_that_fail_stop_or_die_are_colours_of_their_own(tmp_path: Path) -> None:
+    done = run_it("corner", tmp_path, scheduler=run.run_jobs, workers=2)
+    found = {record.status for record in done.records.values()}
+    assert found == {"measured", "failed", "did not finish"}
+    died = [record for record in done.records.values() if record.x > 0.8 and record.y > 0.8]
+    assert died and all(record.message == "the worker process died (exit code 3)" for record in died)
+    raised = next(record for record in done.records.values() if record.x > 0.8 and record.y < 0.8)
+    assert raised.message == "ArithmeticError: no such state"
+    assert done.verdict.status == "differ"  # no failure is right on this map
+    pixels = imread(draw(done, tmp_path / "corner.png"))[..., :3]
+    for status in ("failed", "did not finish"):
+        colour = [int(STATUSES[status][n : n + 2], 16) / 255 for n in (1, 3, 5)]
+        assert (abs(pixels - colour).max(axis=-1) < 0.01).sum() > 1000
+    as_unstable, as_stable = (judge(replace(done.map, failure=k), done.mesh, done.records) for k in (1, 0))
+    assert (as_unstable.status, as_stable.status) == ("agree", "differ")  # the corner is outside the circle
+
+
+def test_what_did_not_run_is_never_green_and_asked_for_again(tmp_path: Path) -> None:
+    done = run_it("absent", tmp_path)
+    assert done.verdict.status == "did not run" and not done.verdict.ok
+    assert run_it("absent", tmp_path).verdict.cells == {"did not run": 64}
+    assert len([each for each in read(tmp_path / "absent.jsonl") if isinstance(each, CellRecord)]) == 128
+
+
+def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = run_it("circle", tmp_path)
+    file = tmp_path / "circle.jsonl"
+    text = file.read_bytes()
+    (tmp_path / "cut.jsonl").write_bytes(text[: len(text) // 2])  # in the middle of a line
+    known = len([each for each in read(tmp_path / "cut.jsonl") if isinstance(each, CellRecord)])
+    seen: list[int] = []
+
+    def counting(job, emit) -> None:
+        seen.append(1)
+        run.run_cell(job, emit)
+
+    def scheduler(function, jobs, workers, log):
+        return run_here(counting, jobs, workers, log)
+
+    again = run_map("circle", tmp_path / "cut.jsonl", provider=PROVIDER, scheduler=scheduler)
+    assert len(seen) == len(whole.records) - known > 0
+    assert again.verdict.cells == whole.verdict.cells and again.mesh.labels == whole.mesh.labels
+    seen.clear()
+    run_map("circle", tmp_path / "cut.jsonl", provider=PROVIDER, scheduler=scheduler)
+    assert not seen
+
+
+def test_the_command_writes_pictures_records_and_verdicts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(run, "PROVIDER", PROVIDER)
+    monkeypatch.setattr(console, "run_map", functools.partial(run_map, provider=PROVIDER))
+    runner, out = CliRunner(), tmp_path / "out"
+    words = ["stability", "circle", "--depth", "2", "--jobs", "1", "--out", str(out)]
+    result = runner.invoke(cli.app, words)
+    assert result.exit_code == 0, result.output
+    assert {"circle.jsonl", "circle.svg", "maps.json"} <= {file.name for file in out.iterdir()}
+    assert (out / "circle.svg").stat().st_size < 200_000
+    assert runner.invoke(cli.app, ["stability", "wrong", "--jobs", "1", "--out", str(out)]).exit_code == 1
+    verdicts = {verdict.map: verdict.ok for verdict in console.read_verdicts(out / "maps.json")}
+    assert verdicts == {"circle": True, "wrong": False}
+    unknown = runner.invoke(cli.app, ["stability", "circel"])
+    assert unknown.exit_code == 2 and 'did you mean "circle"?' in unknown.output
+    listed = runner.invoke(cli.app, ["stability", "list"], env={"COLUMNS": "200"})
+    assert listed.exit_code == 0 and "the circle" in listed.output
+
+
+def test_every_map_says_what_it_is() -> None:
+    """Names are unique and file names; sources and sentences are there; predictions take arrays of any shape."""
+    known = stability_maps()
+    assert synthetic.maps().keys() != known.keys()
+    for name, what in known.items():
+        assert name == what.name and name.isidentifier()
+        assert what.overlay.source and what.shows.endswith(".") and what.title
