@@ -13,7 +13,8 @@ from flexmb.arrays import Real
 from flexmb.closure.assembly import consistent
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.propagate import dop853_run, rk4_run
-from flexmb.closure.system import ClosedWorkspace, ClosureError, Closures
+from flexmb.closure.system import ClosedMotion, ClosureError, Closures
+from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
 from flexmb.status import Status
 from flexmb.system import Algorithm, Evaluation, State, System, pack
@@ -24,9 +25,9 @@ class ClosedSystem(System):
 
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
-        own = closure_constants(scene, self._links, self.constants, self._closure_ports)
+        own = closure_constants(scene, self.constants, self._closure_ports)
         slowest = slowest_mode(self._links)
-        self.closures = Closures(scene.closures, self.constants, own, self.workspace(), slowest, self._check)
+        self.closures = Closures(scene.closures, self.constants, own, self.workspace, slowest, self._check)
         self._start: State | None = None
 
     @property
@@ -46,8 +47,12 @@ class ClosedSystem(System):
 
         Raises DynamicsError where an inertia is not positive definite, or the closures are singular.
         """
-        self._only_articulated(algorithm)
-        return self.closures.motion(state.t, pack(state)).accelerations
+        return self._motion(state.t, pack(state), algorithm).accelerations
+
+    def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
+        _refuse_others(self.scene, algorithm)
+        motion = self.closures.composite_motion if algorithm == "composite" else self.closures.motion
+        return motion(t, y)
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""
@@ -60,9 +65,8 @@ class ClosedSystem(System):
 
     def evaluate(self, t: float, q: Real, u: Real, algorithm: Algorithm = "articulated") -> Evaluation:
         """Everything observable at one state; `loads` has the closures' too."""
-        self._only_articulated(algorithm)
         y = np.concatenate([q, u, [0.0]])
-        motion = self.closures.motion(t, y)
+        motion = self._motion(t, y, algorithm)
         markers, wheel_loads, energy, momentum = self._outputs()
         dynamics.observe_motion(
             t, y, motion.accelerations, self._marker_body, self._marker_port, self.constants, self._w,
@@ -89,13 +93,13 @@ class ClosedSystem(System):
 
     def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
         """Constants, a maker of workspaces and the compiled runs; ClosureError where there is no motion to run."""
-        self._only_articulated(algorithm)
+        _refuse_others(self.scene, algorithm)
         if not (np.isfinite(stabilise) and stabilise >= 0.0):
             raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
         self._refuse_locked()
 
-        def workspace() -> ClosedWorkspace:
-            return self.closures.workspace(self.workspace(), stabilise)
+        def workspace() -> Closed:
+            return self.closures.chain("composite" if algorithm == "composite" else "articulated", stabilise)
 
         return self.closures.constants, workspace, dop853_run, rk4_run
 
@@ -114,9 +118,10 @@ class ClosedSystem(System):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)
 
-    def _only_articulated(self, algorithm: Algorithm) -> None:
-        if algorithm != "articulated":
-            raise NotImplementedError(
-                f'scene "{self.scene.name}" has closures, which algorithm {algorithm!r} does not know: '
-                'use algorithm="articulated"'
-            )
+
+def _refuse_others(scene: s.Scene, algorithm: Algorithm) -> None:
+    if algorithm not in ("articulated", "composite"):
+        raise NotImplementedError(
+            f'scene "{scene.name}" has closures, which algorithm {algorithm!r} does not know: '
+            'use algorithm="articulated" or "composite"'
+        )

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.arrays import RUTHLESS, Constants
+from flexmb.arrays import Constants
 from flexmb.closure import tables as t
 from flexmb.links import Link, closure_sides, matrix
 from flexmb.scene import schema as s
@@ -24,10 +24,9 @@ SUPPRESSED = {
 
 
 def closure_constants(
-    scene: s.Scene, chain: list[Link], constants: Constants, ports: Sequence[tuple[int, int]]
+    scene: s.Scene, constants: Constants, ports: Sequence[tuple[int, int]]
 ) -> t.ClosureConstants:
     """Constants of a scene's closures; `ports` are (body, port) of both sides of each, (-1, -1) on the ground."""
-    _refuse_ruthless(chain, scene.closures[0])
     sides = np.zeros((len(scene.closures), 2), t.SIDE)
     closures = np.zeros(len(scene.closures), t.CLOSURE)
     rows: list[tuple[int, int, int]] = []
@@ -55,15 +54,6 @@ def closure_constants(
         weight=np.where(row_table["type"] == t.ROTATION, length, 1.0),
         length=np.array([length]),
     )
-
-
-def _refuse_ruthless(chain: list[Link], closure: s.Closure) -> None:
-    for link in chain:
-        if link.level == RUTHLESS and link.model.mode_count:
-            raise NotImplementedError(
-                f'closure "{closure.name}": the inertia of body "{link.name}" at level "ruthless" does not see its '
-                'deformation, by which a loop would close; use level "linear" or "full" for all bodies of this scene'
-            )
 
 
 def _ancestors(constants: Constants, bodies: Sequence[int]) -> set[int]:

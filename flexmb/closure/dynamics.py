@@ -2,14 +2,12 @@
 
 from flexmb.balance import power
 from flexmb.closure.factor import choose_rows
-from flexmb.closure.forces import add_loads, choose, free_tree, row_loads
-from flexmb.closure.projection import displace, locate, project_closed
+from flexmb.closure.forces import accelerate, choose, free_tree, locate, respond, row_loads, transmit
+from flexmb.closure.projection import displace, project_closed
 from flexmb.closure.rows import load_on_b
-from flexmb.closure.unit_loads import pass_outward
 from flexmb.coordinates import configuration_rate, load_state
 from flexmb.dynamics import world_loads
 from flexmb.kernel import helper, kernel
-from flexmb.loads import drive_loads, hinge_loads
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.status import OK
 
@@ -17,20 +15,19 @@ NOTHING, COORDINATES, SPEEDS = range(3)
 
 
 @helper
-def rhs(t, y, dy, model, _):
+def rhs(t, y, dy, s, _):
     """dy/dt of y = [q, u, work] at time t; returns a status code, that of the projection before it too."""
-    c, w, cc, cw = model
+    c, w, cw = s.c, s.w, s.cw
     if cw.failure[0] != OK:
         w.fault[0] = cw.failure[1]
         return cw.failure[0]
     load_state(t, y, c, w)
-    status = free_tree(c, w, cc, cw)
+    status = free_tree(s.route, s)
     if status == OK:
-        status = row_loads(c, w, cc, cw)
+        status = row_loads(w, s.cc, cw)
     if status != OK:
         return status
-    add_loads(c, w, cc, cw)
-    drive_loads(c, w)
+    accelerate(s.route, s)
     configuration_rate(c, w)
     nq, nu = w.q.shape[0], w.u.shape[0]
     for i in range(nq):
@@ -42,17 +39,16 @@ def rhs(t, y, dy, model, _):
 
 
 @helper
-def project(t, y, model):
+def project(t, y, s):
     """Put y on the manifold of closures, unit quaternions and prescribed coordinates."""
-    c, w, cc, cw = model
-    project_closed(t, y, c, w, cc, cw)
+    project_closed(t, y, s)
 
 
 @kernel
-def linearise(t, y, c, w, cc, cw):
+def linearise(t, y, s):
     """The tree without closure loads at y: rows with accelerations, their half-solved unit loads; returns a status."""
-    load_state(t, y, c, w)
-    return free_tree(c, w, cc, cw)
+    load_state(t, y, s.c, s.w)
+    return free_tree(s.route, s)
 
 
 @kernel
@@ -63,43 +59,42 @@ def count_rows(cc, cw):
 
 
 @kernel
-def move(t, y, x, what, c, w, cc, cw):
-    """Change y by (1 - H Psi K)' D^-1/2 x of the state linearised last, and find its rows' values and rates.
+def move(t, y, x, what, s):
+    """Change y by M^-1 J'f, x being what f leaves at the state linearised last; find its rows' values and rates.
 
     what: COORDINATES displaces it, SPEEDS adds to the speeds, NOTHING leaves it.
     """
     if what != NOTHING:
-        pass_outward(c, w, cw, x, cw.step)
+        respond(s.route, s, x, s.cw.step)
     if what == COORDINATES:
-        displace(t, y, c, w, cw)
+        displace(t, y, s)
     elif what == SPEEDS:
-        nq = w.q.shape[0]
-        for j in range(w.u.shape[0]):
-            y[nq + j] += cw.step[j]
-    locate(t, y, c, w, cc, cw)
+        nq = s.w.q.shape[0]
+        for j in range(s.w.u.shape[0]):
+            y[nq + j] += s.cw.step[j]
+    locate(s.route, t, y, s)
 
 
 @kernel
-def closure_loads(c, w, cc, cw):
+def closure_loads(w, cc, cw):
     """Loads of cw.rank independent rows at the state that was linearised last, into cw.row.load; a status code."""
-    status = choose(c, w, cc, cw)
+    status = choose(w, cc, cw)
     if status == OK:
-        status = row_loads(c, w, cc, cw)
+        status = row_loads(w, cc, cw)
     return status
 
 
 @kernel
-def loads(c, w, cc, cw, hinges, closures):
+def loads(s, hinges, closures):
     """Accelerations and loads under the rows' loads in cw.row.load, at the state that was linearised last.
 
     hinges (N,6), closures (C,6): [torque; force] on the outboard body about O, on body_b about frame B; World axes.
     """
-    add_loads(c, w, cc, cw)
-    drive_loads(c, w)
-    hinge_loads(c, w)
-    world_loads(c, w, hinges)
-    for i in range(cc.closure.shape[0]):
-        R = mat3(cw.closure[i].world, 0)
-        tau, f = load_on_b(cc, cw, i)
+    accelerate(s.route, s)
+    transmit(s.route, s)
+    world_loads(s.c, s.w, hinges)
+    for i in range(s.cc.closure.shape[0]):
+        R = mat3(s.cw.closure[i].world, 0)
+        tau, f = load_on_b(s.cc, s.cw, i)
         store3(closures[i], 0, times(R, tau))
         store3(closures[i], 3, times(R, f))

@@ -11,6 +11,7 @@ from math import sqrt
 from flexmb.kernel import helper
 
 DEPENDENT = 1e-9
+ROUND_OFF = 2.0**-46  # rows this small beside the largest of the scene are what rounding leaves of nothing
 
 
 @helper
@@ -33,8 +34,8 @@ def closure_sizes(cc, cw):
         largest = max(largest, size)
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             cw.scratch[r] = size
-    for r in range(cc.row.shape[0]):  # a closure that moves nothing has rows of round-off only
-        cw.scratch[r] = max(cw.scratch[r], DEPENDENT * DEPENDENT * largest)
+    for r in range(cc.row.shape[0]):  # a closure of parts that cannot move has rows of round-off only
+        cw.scratch[r] = max(cw.scratch[r], ROUND_OFF / DEPENDENT * largest)
 
 
 @helper

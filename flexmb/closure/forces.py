@@ -1,62 +1,43 @@
-"""Closure loads that keep closures closed, added to what the forward dynamics of the tree has found."""
+"""Closure loads that keep closures closed, added to what the forward dynamics of the tree has found.
+
+By unit loads that pass through the articulated quantities, `Recursion`; all other routes are in `generalised`.
+"""
 
 from math import sqrt
 
+from flexmb.closure import generalised
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pivot
-from flexmb.jain.kinematics import pose_sweep
+from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
+from flexmb.coordinates import load_state
+from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.sweeps import SINGLE, forward_dynamics, outward
-from flexmb.kernel import helper
+from flexmb.kernel import by_bundle, helper
+from flexmb.loads import drive_loads, hinge_loads
 from flexmb.spatial.vector import add3, scale, vec3
 from flexmb.status import CLOSURE_SINGULAR, OK
 
 
 @helper
-def free_tree(c, w, cc, cw):
-    """The tree without closure loads: its accelerations, the rows, and x of a unit load of every row."""
-    status = forward_dynamics(c, w)
+def _tree_and_rows(route, s):
+    status = forward_dynamics(s.c, s.w)
     if status != OK:
         return status
-    pose_sweep(c, w)
-    evaluate_rows(c, w, cc, cw, True)
-    half_solve(c, w, cc, cw)
+    pose_sweep(s.c, s.w)
+    evaluate_rows(s.c, s.w, s.cc, s.cw, True)
+    half_solve(s.c, s.w, s.cc, s.cw)
     return OK
 
 
 @helper
-def row_loads(c, w, cc, cw):
-    """Loads of the chosen rows into cw.row.load: Lambda^-1 f = -(J udot_0 + gamma).
-
-    With stabilisation g'' + gain[0] g' + gain[1] g = 0 instead of g'' = 0. Returns a status code.
-    """
-    dependent = factorise(cc, cw)
-    if dependent >= 0:
-        w.fault[0] = cc.row[dependent].closure
-        return CLOSURE_SINGULAR
-    for a in range(cw.rank[0]):
-        r = cw.chosen[a]
-        damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
-        cw.scratch[a] = -(cw.row[r].acceleration + damped)
-    solve(cw)
-    return OK
+def _pass_outward(route, s, x, v):
+    pass_outward(s.c, s.w, s.cw, x, v)
 
 
 @helper
-def choose(c, w, cc, cw):
-    """Choose the independent rows anew; a status code."""
-    if choose_rows(cc, cw):
-        return OK
-    w.fault[0] = cc.row[cw.chosen[cw.row.shape[0] - 1]].closure
-    return CLOSURE_SINGULAR
-
-
-@helper
-def add_loads(c, w, cc, cw):
-    """Let cw.row.load act beside everything else, and move the tree accordingly.
-
-    In the terms of `flexmb.jain.sweeps`: z_f -= J_f'f, z_R and epsilon likewise, and outward once more.
-    """
+def _accelerate(route, s):
+    """In the terms of `flexmb.jain.sweeps`: z_f -= J_f'f, z_R and epsilon likewise, and outward once more."""
+    c, w, cc, cw = s.c, s.w, s.cc, s.cw
     clear_loads(c, cw)
     for i in range(cc.closure.shape[0]):
         tau, f = load_on_b(cc, cw, i)
@@ -75,3 +56,57 @@ def add_loads(c, w, cc, cw):
             for n in range(w.body[k].free_count):
                 w.body[k].hinge_residual[n] += x[j + n]
     outward(c, w)
+    drive_loads(c, w)
+
+
+@helper
+def _hinge_loads(route, s):
+    hinge_loads(s.c, s.w)
+
+
+@helper
+def _locate(route, t, y, s):
+    load_state(t, y, s.c, s.w)
+    velocity_sweep(s.c, s.w, False, False)
+    pose_sweep(s.c, s.w)
+    evaluate_rows(s.c, s.w, s.cc, s.cw, False)
+
+
+# A route with an array "speed" is one of generalised forces. Each takes s.route, then:
+# (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
+free_tree = by_bundle("speed", generalised.tree_and_rows, _tree_and_rows)
+# (s, x, v): v = M^-1 J'f, the change of all speeds, where x is that of the rows' loads f.
+respond = by_bundle("speed", generalised.respond, _pass_outward)
+# (s): let cw.row.load act beside everything else: accelerations and drive loads.
+accelerate = by_bundle("speed", generalised.accelerate, _accelerate)
+# (s): loads across hinges, body axes, into w.body.load, after `accelerate`.
+transmit = by_bundle("speed", generalised.hinge_and_drive_loads, _hinge_loads)
+# (t, y, s): rows' values and rates at y; the factors of the last forward dynamics stay.
+locate = by_bundle("speed", generalised.locate, _locate)
+
+
+@helper
+def row_loads(w, cc, cw):
+    """Loads of the chosen rows into cw.row.load: Lambda^-1 f = -(J udot_0 + gamma).
+
+    With stabilisation g'' + gain[0] g' + gain[1] g = 0 instead of g'' = 0. Returns a status code.
+    """
+    dependent = factorise(cc, cw)
+    if dependent >= 0:
+        w.fault[0] = cc.row[dependent].closure
+        return CLOSURE_SINGULAR
+    for a in range(cw.rank[0]):
+        r = cw.chosen[a]
+        damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
+        cw.scratch[a] = -(cw.row[r].acceleration + damped)
+    solve(cw)
+    return OK
+
+
+@helper
+def choose(w, cc, cw):
+    """Choose the independent rows anew; a status code."""
+    if choose_rows(cc, cw):
+        return OK
+    w.fault[0] = cc.row[cw.chosen[cw.row.shape[0] - 1]].closure
+    return CLOSURE_SINGULAR

@@ -5,14 +5,16 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.arrays import Constants, Index, Real, Workspace
+from flexmb.arrays import RUTHLESS, Constants, Real, Workspace
 from flexmb.closure import dynamics
-from flexmb.closure.tables import ROTATION, ClosureConstants, ClosureWorkspace, workspace
+from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
+from flexmb.jain.places import Matrices, matrices
+from flexmb.jain.response import Response, response
 from flexmb.scene.schema import Closure
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
@@ -21,18 +23,6 @@ SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
 
 class ClosureError(ValueError):
     """Closures that cannot be closed, or leave no motion; the message names the closure, the gap and the remedy."""
-
-
-class ClosedWorkspace(NamedTuple):
-    """What one evaluation of a closed chain writes: of its tree, of its closures."""
-
-    tree: Workspace
-    closures: ClosureWorkspace
-
-    @property
-    def fault(self) -> Index:
-        """(1,) body or closure where an evaluation failed."""
-        return self.tree.fault
 
 
 class ClosedMotion(NamedTuple):
@@ -52,59 +42,80 @@ class Closures:
         closures: Sequence[Closure],
         constants: Constants,
         own: ClosureConstants,
-        tree: Workspace,
+        tree: Callable[[], Workspace],
         slowest: float,
         check: Callable[[int, int], None],
     ) -> None:
-        """`slowest`: lowest modal frequency (rad/s), infinite without modes.
+        """`tree` makes workspaces; `slowest`: lowest modal frequency (rad/s), infinite without modes.
 
         `check` raises unless a status is OK; its second argument is the body or closure at fault.
         """
-        self.scene, self._check, self._slowest = closures, check, slowest
+        self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self.constants = constants, own
         self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
-        self._tree, self._own = self.workspace(tree)
+        self._chain = self.chain("articulated")
+        self._composite: Closed | None = None
 
-    def workspace(self, tree: Workspace, rate: float = 0.0) -> ClosedWorkspace:
-        """A fresh workspace of the closures beside one of the tree; with a `rate` (1/s) closures are stabilised."""
+    def chain(self, algorithm: Literal["articulated", "composite"], rate: float = 0.0) -> Closed:
+        """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
         bodies, modes = c.mode.shape
         own = workspace(cc, bodies, modes, len(c.speed))
         own.rank[0], own.gain[:] = self.rank, (2.0 * rate, rate * rate)
-        return ClosedWorkspace(tree, own)
+        w, route = self._tree(), self._route(algorithm)
+        return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
+
+    def _route(self, algorithm: str) -> Recursion | Response | Matrices:
+        c = self.constants[0]
+        if algorithm == "composite":
+            return matrices(c)
+        if np.any((c.body["level"] == RUTHLESS) & (c.body["modes"] > 0)):
+            return response(c)
+        return Recursion()
 
     @property
-    def _arrays(self) -> tuple[Constants, Workspace, ClosureConstants, ClosureWorkspace]:
-        c, cc = self.constants
-        return c, self._tree, cc, self._own
+    def _own(self) -> ClosureWorkspace:
+        return self._chain.cw
 
     @property
     def fault(self) -> int:
         """Body or closure at which the last evaluation failed."""
-        return int(self._tree.fault[0])
+        return int(self._chain.fault[0])
 
     def motion(self, t: float, y: Real) -> ClosedMotion:
         """Everything about accelerations and loads at y = [q, u, work], which must be closed."""
-        c, w, cc, cw = self._arrays
-        hinges, closures = np.zeros((len(c.body), 6)), np.zeros((len(cc.closure), 6))
-        cw.rank[0] = self.rank
-        self.linearise(t, y)
-        self._check(dynamics.closure_loads(c, w, cc, cw), self.fault)
-        cw.row["load"] = self._last = self._least(cw.row["load"])
-        dynamics.loads(c, w, cc, cw, hinges, closures)
-        drives = np.where(c.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
-        return ClosedMotion(w.speed["acceleration"].copy(), drives, hinges, closures)
+        return self._motion(t, y, self._chain)
+
+    def composite_motion(self, t: float, y: Real) -> ClosedMotion:
+        """The same by composite bodies."""
+        if self._composite is None:
+            self._composite = self.chain("composite")
+        return self._motion(t, y, self._composite)
+
+    def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
+        s.cw.rank[0] = self.rank
+        self._check(dynamics.linearise(t, y, s), int(s.fault[0]))
+        self._check(dynamics.closure_loads(s.w, s.cc, s.cw), int(s.fault[0]))
+        least = s.cw.row["load"] - _shadow(s.cw.row["load"], null_loads(s.cw))
+        return self._under(s, least)
+
+    def _under(self, s: Closed, loads: Real) -> ClosedMotion:
+        """The motion under these loads (G,) of the rows, at the state that was linearised last."""
+        hinges, closures = np.zeros((len(s.c.body), 6)), np.zeros((len(s.cc.closure), 6))
+        s.cw.row["load"] = loads
+        dynamics.loads(s, hinges, closures)
+        drives = np.where(s.c.speed["prescribed"] >= 0, s.w.speed["drive"], 0.0)
+        return ClosedMotion(s.w.speed["acceleration"].copy(), drives, hinges, closures)
 
     # Newton's steps, for initial conditions
 
     def linearise(self, t: float, y: Real) -> None:
         """Rows' values, rates and responses to unit loads at y."""
-        self._check(dynamics.linearise(t, y, *self._arrays), self.fault)
+        self._check(dynamics.linearise(t, y, self._chain), self.fault)
 
     def linearise_stiff(self, t: float, y: Real) -> int:
         """The same with the metric that hardly bends bodies; returns the status code."""
-        _, *others = self._arrays
-        return int(dynamics.linearise(t, y, self._stiff, *others))
+        return int(dynamics.linearise(t, y, self._chain._replace(c=self._stiff)))
 
     @cached_property
     def _stiff(self) -> Constants:
@@ -135,18 +146,18 @@ class Closures:
     def moved(self, t: float, y: Real, x: Real) -> Real:
         """y displaced by the motion that x stands for; rows' values are those of the result."""
         y = y.copy()
-        dynamics.move(t, y, x, dynamics.COORDINATES, *self._arrays)
+        dynamics.move(t, y, x, dynamics.COORDINATES, self._chain)
         return y
 
     def pushed(self, t: float, y: Real, x: Real) -> Real:
         """y with its speeds changed by what x stands for; rows' rates are those of the result."""
         y = y.copy()
-        dynamics.move(t, y, x, dynamics.SPEEDS, *self._arrays)
+        dynamics.move(t, y, x, dynamics.SPEEDS, self._chain)
         return y
 
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
         """Distance and (sine of the) angle by which every closure is open."""
-        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, *self._arrays)
+        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
     def _gap(self, i: int, key: str) -> tuple[float, float]:
@@ -157,9 +168,8 @@ class Closures:
 
     def count_rows(self) -> None:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
-        _, _, cc, cw = self._arrays
-        dynamics.count_rows(cc, cw)
-        self.rank = int(cw.rank[0])
+        dynamics.count_rows(self._chain.cc, self._own)
+        self.rank = int(self._own.rank[0])
 
     @property
     def independent(self) -> int:
@@ -187,33 +197,34 @@ class Closures:
 
     def determined(self, t: float, y: Real) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether each component of the hinges' (N,6) and closures' (C,6) loads is the same for all null loads."""
-        c, w, cc, cw = self._arrays
         found = [self.motion(t, y)]
-        size = max(1.0, float(np.max(np.abs(cw.row["load"]))))
+        last = self._own.row["load"].copy()
+        size = max(1.0, float(np.max(np.abs(last))))
         for null in self.null_loads().T:
             self.linearise(t, y)
-            hinges, closures = np.zeros((len(c.body), 6)), np.zeros((len(cc.closure), 6))
-            cw.row["load"] = self._last + size * null
-            dynamics.loads(c, w, cc, cw, hinges, closures)
-            found.append(found[0]._replace(hinges=hinges, closures=closures))
+            found.append(self._under(self._chain, last + size * null))
         return (
             np.ptp([each.hinges for each in found], axis=0) <= SAME * size,
             np.ptp([each.closures for each in found], axis=0) <= SAME * size,
         )
 
-    def _least(self, loads: Real) -> Real:
-        """Of all loads of the rows that move the mechanism alike, the least in the sum of squares (SI)."""
-        null = self.null_loads()
-        return loads - null @ (null.T @ loads)
-
     def null_loads(self) -> Real:
         """Orthonormal loads (G,k) of the rows that move nothing, at the state evaluated last."""
-        half = self._own.half
-        rows, rank = len(half), int(self._own.rank[0])
-        if rank == rows:
-            return np.zeros((rows, 0))
-        chosen, rest = self._own.chosen[:rank], self._own.chosen[rank:]
-        null = np.zeros((rows, rows - rank))
-        null[rest] = np.eye(rows - rank)
-        null[chosen] = -np.linalg.lstsq(half[chosen].T, half[rest].T, rcond=None)[0]
-        return np.linalg.qr(null)[0]
+        return null_loads(self._own)
+
+
+def null_loads(cw: ClosureWorkspace) -> Real:
+    """Orthonormal loads (G,k) of the rows that move nothing."""
+    rows, rank = len(cw.half), int(cw.rank[0])
+    if rank == rows:
+        return np.zeros((rows, 0))
+    chosen, rest = cw.chosen[:rank], cw.chosen[rank:]
+    null = np.zeros((rows, rows - rank))
+    null[rest] = np.eye(rows - rank)
+    null[chosen] = -np.linalg.lstsq(cw.half[chosen].T, cw.half[rest].T, rcond=None)[0]
+    return np.linalg.qr(null)[0]
+
+
+def _shadow(loads: Real, null: Real) -> Real:
+    """The part of loads that lies in the span of orthonormal null loads: without it they are the least of all."""
+    return np.asarray(null @ (null.T @ loads))

@@ -6,10 +6,14 @@ body_a (the inboard side), frame B on body_b, both turned so that an axis is z; 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flexmb.arrays import Index, Real, Record
+from flexmb.arrays import Constants, Index, Real, Record, Workspace
 from flexmb.bundle import bundle
+from flexmb.jain.places import Matrices
+from flexmb.jain.response import Response
 
 ROTATION, TRANSLATION = range(2)
 ON_GROUND = -1  # body of a frame that is fixed in World
@@ -88,6 +92,33 @@ class ClosureWorkspace:
     accel: Real  # (N,6) of the bodies, per `step`
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
     failure: Index  # (2,) status of the last projection, and where
+
+
+@bundle
+class Recursion:
+    """No arrays: the articulated quantities in the tree's workspace are all that unit loads need."""
+
+
+class Closed(NamedTuple):
+    """A closed chain as kernels see it: constants and workspaces of its tree (c, w) and its closures (cc, cw).
+
+    route: what factorises the mass matrix. Recursion: unit loads are passed through the articulated quantities, and
+    `seen` is w itself. Response or Matrices: closures act as generalised forces J'f, solved for by the innovations of
+    the recursion or by the Cholesky factor of composite bodies, and `seen` is a workspace of its own, in which all
+    bodies have their true shape.
+    """
+
+    c: Constants
+    w: Workspace
+    cc: ClosureConstants
+    cw: ClosureWorkspace
+    seen: Workspace
+    route: Recursion | Response | Matrices
+
+    @property
+    def fault(self) -> Index:
+        """(1,) body or closure where an evaluation failed."""
+        return self.w.fault
 
 
 def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureWorkspace:

@@ -23,22 +23,18 @@ def half_solve(c, w, cc, cw):
     for i in range(cc.closure.shape[0]):
         start, stop = cc.closure[i].row_start, cc.closure[i].row_stop
         for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
-            _clear(c, cw, cc.path[j])
+            clear_body(c, cw, cc.path[j])
         for r in range(start, stop):
             for j in range(w.u.shape[0]):
                 cw.half[r, j] = 0.0
-            direction = vec3(cw.row[r].direction, 0)
-            zero = (0.0, 0.0, 0.0)
-            tau = direction if cc.row[r].type == ROTATION else zero
-            f = zero if cc.row[r].type == ROTATION else direction
-            apply_load(c, w, cc, cw, i, r - start, tau, f)
+            apply_unit_load(c, w, cc, cw, i, r)
         for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
             for r in range(start, stop):
                 pass_inward(c, w, cw, cc.path[j], r - start, cw.half[r])
 
 
 @helper
-def _clear(c, cw, k):
+def clear_body(c, cw, k):
     for s in range(cw.force.shape[1]):
         for n in range(6):
             cw.force[k, s, n] = 0.0
@@ -49,7 +45,17 @@ def _clear(c, cw, k):
 @helper
 def clear_loads(c, cw):
     for k in range(c.body.shape[0]):
-        _clear(c, cw, k)
+        clear_body(c, cw, k)
+
+
+@helper
+def apply_unit_load(c, w, cc, cw, i, r):
+    """The unit load of row r of closure i, in the slot that is its number in the closure."""
+    direction = vec3(cw.row[r].direction, 0)
+    zero = (0.0, 0.0, 0.0)
+    tau = direction if cc.row[r].type == ROTATION else zero
+    f = zero if cc.row[r].type == ROTATION else direction
+    apply_load(c, w, cc, cw, i, r - cc.closure[i].row_start, tau, f)
 
 
 @helper
@@ -83,16 +89,8 @@ def pass_inward(c, w, cw, k, s, x):
 
     Afterwards cw.force[k, s] is the load about O that modes have not taken.
     """
-    tau, f = vec3(cw.force[k, s], 0), vec3(cw.force[k, s], 3)
-    i = c.body[k].outboard_port
     nm, eta = c.body[k].modes, c.body[k].etad_index
-    if i >= 0:
-        r = vec3(w.port[i].r, 0)
-        for n in range(nm):
-            angular = vec3(w.port_mode[i, n].W, 0)
-            linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
-            cw.modal[k, s, n] -= dot(angular, tau) + dot(linear, f)
-        tau, f = shift_force(tau, f, scale(-1.0, r))
+    tau, f = _about_hinge(c, w, cw, k, s)
     for n in range(nm):
         part = cw.modal[k, s, n]
         for m in range(n):
@@ -104,6 +102,44 @@ def pass_inward(c, w, cw, k, s, x):
     store3(cw.force[k, s], 0, tau)
     store3(cw.force[k, s], 3, f)
     tau, f = _through_hinge(c, w, k, x, tau, f)
+    _hand_on(c, w, cw, k, s, tau, f)
+
+
+@helper
+def project_inward(c, w, cw, k, s, T):
+    """Rows T of J'f of body k's own speeds for the load in slot s; all of it goes on to the parent.
+
+    Afterwards cw.force[k, s] is the load about O, body axes. w has the poses and the motions of the ports.
+    """
+    tau, f = _about_hinge(c, w, cw, k, s)
+    store3(cw.force[k, s], 0, tau)
+    store3(cw.force[k, s], 3, f)
+    for n in range(c.body[k].modes):
+        T[c.body[k].etad_index + n] = cw.modal[k, s, n]
+    for n in range(c.body[k].nv):
+        angular, linear = motion_column(c, w, k, n)
+        T[c.body[k].u_index + n] = dot(angular, tau) + dot(linear, f)
+    _hand_on(c, w, cw, k, s, tau, f)
+
+
+@helper
+def _about_hinge(c, w, cw, k, s):
+    """The load in slot s about O; where O is on a node that deforms, modes feel the reaction to it."""
+    tau, f = vec3(cw.force[k, s], 0), vec3(cw.force[k, s], 3)
+    i = c.body[k].outboard_port
+    if i >= 0:
+        r = vec3(w.port[i].r, 0)
+        for n in range(c.body[k].modes):
+            angular = vec3(w.port_mode[i, n].W, 0)
+            linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
+            cw.modal[k, s, n] -= dot(angular, tau) + dot(linear, f)
+        tau, f = shift_force(tau, f, scale(-1.0, r))
+    return tau, f
+
+
+@helper
+def _hand_on(c, w, cw, k, s, tau, f):
+    """A load about O of body k, added to those of its parent and of the parent's modes."""
     parent = c.body[k].parent
     if parent < 0:
         return

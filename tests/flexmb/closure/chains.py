@@ -166,18 +166,26 @@ def _pose(rng: Generator, kind: str, axis: Array) -> tuple[Array, Array]:
 
 
 def on_hinges(scene: s.Scene, q: Array, u: Array, rates: Array, closures: dict[str, Array]) -> dict[str, Array]:
-    """Loads (6,) across the tree's hinges by Newton and Euler for everything outboard, which closures load too."""
+    """Loads (6,) across the tree's hinges by Newton and Euler for everything outboard, which closures load too.
+
+    Closures join nodes where they truly are. Where bodies are ruthless, hinges transmit their loads with the same
+    components in the axes of the hinge at rest shape.
+    """
     dense = DenseSystem(scene)
     found = dense.hinge_loads(0.0, q, u, rates)
     still = Motion(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
-    frames = member_frames(dense.tree, still)
+    at_rest = Motion(dense._undeformed(q), still.u, still.rates)
+    frames, rest = member_frames(dense.tree, still), member_frames(dense.tree, at_rest)
     for closure in scene.closures:
         side = seat(dense, closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b)
         point = seat_frame(dense.tree, frames, *side, still).position.value[0, 0]
         load = closures[closure.name]
         for k, member in enumerate(dense.tree.members):
-            origin = seat_frame(dense.tree, frames, k, member.outboard, still).position.value[0, 0]
-            moved = np.concatenate([load[:3] + np.cross(point - origin, load[3:]), load[3:]])
+            hinge = seat_frame(dense.tree, frames, k, member.outboard, still)
+            hinge_at_rest = seat_frame(dense.tree, rest, k, member.outboard, at_rest)
+            turn = hinge_at_rest.rotation.value[0, 0] @ hinge.rotation.value[0, 0].T
+            torque = load[:3] + np.cross(point - hinge.position.value[0, 0], load[3:])
+            moved = np.concatenate([turn @ torque, turn @ load[3:]])
             outboard = _outboard(dense, k)
             sign = (dense.tree.index(closure.body_b) in outboard) - (dense.tree.index(closure.body_a) in outboard)
             found[member.hinge.name] = found[member.hinge.name] - sign * moved

@@ -1,4 +1,7 @@
-"""Random trees with random closures: accelerations and closure loads against one dense system of equations."""
+"""Random trees with random closures: accelerations and closure loads against one dense system of equations.
+
+By unit loads through the recursion (with ruthless bodies: by its innovations), and by composite bodies.
+"""
 
 from __future__ import annotations
 
@@ -15,6 +18,7 @@ from tests.flexmb.closure import chains
 RECIPES = {
     "rigid": replace(trees.RIGID, prescribed=False), "full": replace(trees.FULL, prescribed=False),
     "linear": replace(trees.LINEAR, prescribed=False, deformation=0.01), "free-flying": trees.FREE_FLYING,
+    "ruthless": replace(trees.RUTHLESS, prescribed=False), "every level": replace(trees.EVERY_LEVEL, deformation=0.01),
 }  # fmt: skip
 PAIRS = [("weld", "spherical"), ("revolute", "universal"), ("prismatic", "planar"), ("cylindrical", "revolute")]
 CASES = [(recipe, types, seed) for recipe in RECIPES for seed, types in enumerate(PAIRS)]
@@ -28,7 +32,12 @@ class Pair:
     state: flexmb.State
     dense: chains.Constrained
     found: flexmb.Evaluation
+    by_composite_bodies: flexmb.Evaluation
     bound: float
+
+    @property
+    def both(self) -> tuple[flexmb.Evaluation, flexmb.Evaluation]:
+        return self.found, self.by_composite_bodies
 
 
 @pytest.fixture(scope="module", params=CASES, ids=str)
@@ -42,7 +51,8 @@ def pair(request) -> Pair:
     dense = chains.constrained(scene, state.q, state.u)
     depth = len(scene.bodies) + len(scene.point_masses)
     bound = algebra(system.nu + len(dense.J), depth)
-    return Pair(system, state, dense, system.evaluate(0.0, state.q, state.u), bound)
+    found = [system.evaluate(0.0, state.q, state.u, algorithm) for algorithm in ("articulated", "composite")]
+    return Pair(system, state, dense, *found, bound)
 
 
 def test_the_scene_is_closed(pair):
@@ -51,17 +61,22 @@ def test_the_scene_is_closed(pair):
 
 
 def test_accelerations_keep_the_closures_closed(pair):
-    rates, J = pair.found.accelerations[pair.dense.free], pair.dense.J
-    size = np.max(np.abs(J)) * np.sum(np.abs(rates)) + np.max(np.abs(pair.dense.gamma))
-    assert np.max(np.abs(J @ rates + pair.dense.gamma)) <= pair.bound * size
+    J = pair.dense.J
+    for found in pair.both:
+        rates = found.accelerations[pair.dense.free]
+        size = np.max(np.abs(J)) * np.sum(np.abs(rates)) + np.max(np.abs(pair.dense.gamma))
+        assert np.max(np.abs(J @ rates + pair.dense.gamma)) <= pair.bound * size
 
 
 def test_what_is_left_of_the_trees_equations_is_a_load_of_closures(pair):
     """M udot - right lies in the range of J': backward error."""
-    rates, J = pair.found.accelerations[pair.dense.free], pair.dense.J
-    missing = pair.dense.M @ rates - pair.dense.right
-    left = missing - J.T @ np.linalg.lstsq(J.T, missing, rcond=1e-13)[0]
-    assert np.max(np.abs(left)) <= pair.bound * np.max(np.abs(pair.dense.M) @ np.abs(rates) + np.abs(pair.dense.right))
+    J = pair.dense.J
+    for found in pair.both:
+        rates = found.accelerations[pair.dense.free]
+        missing = pair.dense.M @ rates - pair.dense.right
+        left = missing - J.T @ np.linalg.lstsq(J.T, missing, rcond=1e-13)[0]
+        size = np.max(np.abs(pair.dense.M) @ np.abs(rates) + np.abs(pair.dense.right))
+        assert np.max(np.abs(left)) <= pair.bound * size
 
 
 def test_as_many_rows_are_independent(pair):
@@ -72,9 +87,16 @@ def test_as_many_rows_are_independent(pair):
 
 def test_loads_of_closures_and_hinges_balance(pair):
     """Newton and Euler for everything outboard of each hinge, with the loads that the closures report."""
-    state, loads = pair.state, pair.found.loads
-    scene = pair.system.scene
-    expected = chains.on_hinges(scene, state.q, state.u, pair.found.accelerations, loads)
-    size = 10.0 * max(np.max(np.abs(load)) for load in (*loads.values(), *expected.values()))
-    for name, load in expected.items():
-        assert np.max(np.abs(loads[name] - load)) <= pair.bound * size
+    state, scene = pair.state, pair.system.scene
+    for found in pair.both:
+        loads = found.loads
+        expected = chains.on_hinges(scene, state.q, state.u, found.accelerations, loads)
+        size = 10.0 * max(np.max(np.abs(load)) for load in (*loads.values(), *expected.values()))
+        for name, load in expected.items():
+            assert np.max(np.abs(loads[name] - load)) <= pair.bound * size
+
+
+def test_both_routes_find_the_same_drive_loads(pair):
+    size = 10.0 * max(np.max(np.abs(load)) for load in pair.found.loads.values())
+    for name, drive in pair.found.drives.items():
+        assert np.max(np.abs(pair.by_composite_bodies.drives[name] - drive)) <= pair.bound * size

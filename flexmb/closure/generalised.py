@@ -1,0 +1,182 @@
+"""Closures as generalised forces J'f on the tree: for bodies of level `ruthless`, and for composite bodies.
+
+Two cases where unit loads cannot pass through the articulated quantities. A body of level `ruthless` has its inertia
+at rest shape, but closures join the nodes where they truly are: J, its rate and the loads are those of the true shape,
+kept in a workspace `seen` of their own, and M stays as it is. Composite bodies leave no articulated quantities, but a
+Cholesky factor of M. With M = F F' from either, rows F^-1 J' are what `half_solve` finds otherwise, and Lambda^-1 =
+J M^-1 J'.
+
+The load of a hinge is what inertia asks for, less what closures do to all that the hinge carries, about O in the axes
+of the hinge: so its components along the hinge's motions are what springs and motors do.
+"""
+
+from flexmb.closure.rows import evaluate_rows, load_on_b
+from flexmb.closure.unit_loads import apply_load, apply_unit_load, clear_body, clear_loads, project_inward
+from flexmb.coordinates import load_state
+from flexmb.jain import composite, innovations
+from flexmb.jain.inverse import inverse_dynamics
+from flexmb.jain.kinematics import acceleration_sweep, pose_sweep, velocity_sweep
+from flexmb.jain.sweeps import forward_dynamics
+from flexmb.kernel import by_bundle, helper
+from flexmb.spatial.vector import add3, mat3, matmul, scale, times, transpose, vec3
+from flexmb.status import OK
+
+
+@helper
+def _by_recursion(route, c, w):
+    return forward_dynamics(c, w)
+
+
+@helper
+def _by_composite_bodies(route, c, w):
+    return composite.forward_dynamics(c, w, route)
+
+
+@helper
+def _half_by_recursion(x, c, w, T):
+    """F^-1 T in place of T, Jain & Rodriguez (55)."""
+    innovations.clear(c, x)
+    for j in range(T.shape[0]):
+        x.speed[j].applied = T[j]
+    innovations.innovations(c, w, x)
+    for j in range(T.shape[0]):
+        T[j] = x.speed[j].innovation
+
+
+@helper
+def _half_by_composite_bodies(m, c, w, T):
+    """U'^-1 T of the free speeds in the first places of T, tips first; the others are zero."""
+    n, U = m.x.shape[0], m.U
+    for a in range(n):
+        m.x[a] = T[m.speed[m.order[a]]]
+    for j in range(T.shape[0]):
+        T[j] = 0.0
+    for a in range(n):
+        T[a] = m.x[a] / U[a, a]
+        for b in range(a + 1, n):
+            m.x[b] -= U[a, b] * T[a]
+
+
+@helper
+def _rest_by_recursion(x, c, w, y, v):
+    """v = F'^-1 y, the outward half of (56)."""
+    for j in range(y.shape[0]):
+        x.speed[j].innovation = y[j]
+    innovations.respond(c, w, x)
+    for j in range(y.shape[0]):
+        v[j] = x.speed[j].acceleration if c.speed[j].prescribed < 0 else 0.0
+
+
+@helper
+def _rest_by_composite_bodies(m, c, w, y, v):
+    n, U = m.x.shape[0], m.U
+    for j in range(v.shape[0]):
+        v[j] = 0.0
+    for a in range(n - 1, -1, -1):
+        total = y[a]
+        for b in range(a + 1, n):
+            total -= U[a, b] * m.x[b]
+        m.x[a] = total / U[a, a]
+        v[m.speed[m.order[a]]] = m.x[a]
+
+
+_tree = by_bundle("U", _by_composite_bodies, _by_recursion)
+_half = by_bundle("U", _half_by_composite_bodies, _half_by_recursion)
+_rest = by_bundle("U", _rest_by_composite_bodies, _rest_by_recursion)
+
+
+@helper
+def tree_and_rows(route, s):
+    """Accelerations of the tree without closure loads, the rows, and F^-1 J' of every row; a status code."""
+    status = _tree(s.route, s.c, s.w)
+    if status != OK:
+        return status
+    c, seen = s.c, s.seen
+    for i in range(seen.q.shape[0]):
+        seen.q[i] = s.w.q[i]
+    for j in range(seen.u.shape[0]):
+        seen.u[j] = s.w.u[j]
+        seen.speed[j].acceleration = s.w.speed[j].acceleration
+    velocity_sweep(c, seen, True, True)
+    pose_sweep(c, seen)
+    acceleration_sweep(c, seen)
+    evaluate_rows(c, seen, s.cc, s.cw, True)
+    _half_solve(s)
+    return OK
+
+
+@helper
+def _half_solve(s):
+    """J' of every row into cw.half, then F^-1 J'."""
+    c, cc, cw = s.c, s.cc, s.cw
+    for i in range(cc.closure.shape[0]):
+        start, stop = cc.closure[i].row_start, cc.closure[i].row_stop
+        for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+            clear_body(c, cw, cc.path[j])
+        for r in range(start, stop):
+            for j in range(cw.half.shape[1]):
+                cw.half[r, j] = 0.0
+            apply_unit_load(c, s.seen, cc, cw, i, r)
+        for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+            for r in range(start, stop):
+                project_inward(c, s.seen, cw, cc.path[j], r - start, cw.half[r])
+        for r in range(start, stop):
+            _half(s.route, c, s.w, cw.half[r])
+
+
+@helper
+def respond(route, s, y, v):
+    """v = F'^-1 y: the change of all speeds; prescribed ones do not change."""
+    _rest(s.route, s.c, s.w, y, v)
+
+
+@helper
+def accelerate(route, s):
+    """Let cw.row.load act beside everything else: accelerations and drive loads."""
+    cw, y = s.cw, s.cw.coefficient
+    for j in range(y.shape[0]):
+        y[j] = 0.0
+        for r in range(cw.half.shape[0]):
+            y[j] += cw.row[r].load * cw.half[r, j]
+    respond(route, s, y, cw.step)
+    driven = False
+    for j in range(y.shape[0]):
+        s.w.speed[j].acceleration += cw.step[j]
+        driven = driven or s.c.speed[j].prescribed >= 0
+    if driven:
+        hinge_and_drive_loads(route, s)
+
+
+@helper
+def hinge_and_drive_loads(route, s):
+    """w.body.load and w.speed.drive for the accelerations and closure loads found; the factors of M are lost."""
+    c, w, cc, cw = s.c, s.w, s.cc, s.cw
+    tau, T = cw.step, cw.coefficient
+    inverse_dynamics(c, w, tau)
+    clear_loads(c, cw)
+    for i in range(cc.closure.shape[0]):
+        torque, force = load_on_b(cc, cw, i)
+        apply_load(c, s.seen, cc, cw, i, 0, torque, force)
+    for j in range(T.shape[0]):
+        T[j] = 0.0  # wheels, on which closures do not act
+    for k in range(c.body.shape[0] - 1, -1, -1):
+        project_inward(c, s.seen, cw, k, 0, T)
+        torque, force = vec3(cw.force[k, 0], 0), vec3(cw.force[k, 0], 3)
+        i = c.body[k].outboard_port
+        if i >= 0:
+            turn = matmul(mat3(w.port[i].R, 0), transpose(mat3(s.seen.port[i].R, 0)))
+            torque, force = times(turn, torque), times(turn, force)
+        add3(w.body[k].load, 0, scale(-1.0, torque))
+        add3(w.body[k].load, 3, scale(-1.0, force))
+    for j in range(T.shape[0]):
+        w.speed[j].drive = tau[j] - w.speed[j].applied - T[j] if c.speed[j].prescribed >= 0 else 0.0
+    pose_sweep(c, w)
+
+
+@helper
+def locate(route, t, y, s):
+    """Rows' values and rates at y; the factors of M stay."""
+    load_state(t, y, s.c, s.seen)
+    velocity_sweep(s.c, s.seen, True, True)
+    pose_sweep(s.c, s.seen)
+    evaluate_rows(s.c, s.seen, s.cc, s.cw, False)
