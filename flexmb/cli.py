@@ -44,10 +44,21 @@ def simulate(
     scene: SceneFile,
     t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
-    method: Annotated[str, typer.Option(help="`dop853` (adapts its step) or `rk4` (fixed `--step`).")] = "dop853",
-    rtol: Annotated[float, typer.Option(help="Relative error allowed in a step (dop853).")] = 1e-10,
-    atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units (dop853).")] = 1e-12,
-    step: Annotated[float | None, typer.Option(help="Step in s (rk4).", show_default=False)] = None,
+    method: Annotated[
+        str,
+        typer.Option(
+            help="`dop853`; for stiff scenes `radau5`, `exponential`. With `--step`: `rk4`, `generalised_alpha`."
+        ),
+    ] = "dop853",
+    rtol: Annotated[float, typer.Option(help="Relative error allowed in a step.")] = 1e-10,
+    atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units.")] = 1e-12,
+    step: Annotated[
+        float | None, typer.Option(help="Step in s (rk4, generalised_alpha).", show_default=False)
+    ] = None,
+    spectral_radius: Annotated[
+        float | None,
+        typer.Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False),
+    ] = None,
     samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
     algorithm: Annotated[
         str, typer.Option(help="`articulated` (recursion), `frisch` (nested bodies, 1975) or `frisch_as_printed`.")
@@ -62,6 +73,7 @@ def simulate(
         flexmb simulate boom.toml --t-end 60
         flexmb simulate boom.toml --t-end 60 --rtol 1e-12 --samples 1001 --out fine
         flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
+        flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
@@ -78,6 +90,7 @@ def simulate(
             trajectory = run(
                 load_scene(scene), t_end, method,  # type: ignore[arg-type]
                 rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
+                spectral_radius=spectral_radius,
             )  # fmt: skip
         out.mkdir(parents=True, exist_ok=True)
         trajectory.to_csv(out / "trajectory.csv")

@@ -12,7 +12,7 @@ from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
 from flexmb.advisor.ladder import Step, cost, model_cost, rungs, step
 from flexmb.advisor.methods import Method
-from flexmb.advisor.models import LEVELS, Model, Rung, built, flexible_bodies
+from flexmb.advisor.models import Model, Rung, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.response import FAMILIES, RigidRun, modal_response, rigid_run
 from flexmb.advisor.search import search
@@ -157,7 +157,7 @@ def _hidden(scene: Scene, known: dict[str, Indicators]) -> float:
     """Predicted error of the finest modes of bodies that have no finer model: raw ones and beams that start bent."""
     bent = {state.body for state in scene.modal_states}
     return sum(
-        of_level(LEVELS[-1], known[body.name])
+        of_level(levels(body)[-1], known[body.name])
         for body in flexible_bodies(scene)
         if body.name in known and (body.name in bent or not isinstance(body, BeamBody))
     )

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from flexmb.advisor.contribution import contribution, free_share, moved
 from flexmb.advisor.models import Rung
 from flexmb.advisor.response import FAMILIES, Response, RigidRun, eigenmodes
+from flexmb.advisor.sprung import fitted_hinge
 from flexmb.frisch.equivalence.advice import coupling_error
 from flexmb.frisch.equivalence.appendage import appendage_of
+from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.schema import Scene
-from flexmb.surrogate.sprung import fitted_hinge
 
 Array = NDArray[np.float64]
 
@@ -148,10 +149,10 @@ def _axis(body: BeamBody) -> tuple[Array, Array, Array]:
 
 
 def _geometric(response: Response) -> Array:
-    """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes; of beams only."""
+    """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes of a beam."""
     body = response.body
     if not isinstance(body, BeamBody):
-        return np.zeros((1, 0))
+        return _like_a_cantilever(response)
     x, mass, slopes = _axis(body)
     squares = np.sum(slopes[:, 1:] ** 2, axis=1)[:, :2]  # rotation about y and z
     before = np.vstack([np.zeros((1, squares.shape[1])), squares[:-1]])
@@ -165,10 +166,25 @@ def _geometric(response: Response) -> Array:
     return stiffness / response.frequencies[: g.shape[1]] ** 2
 
 
+def _like_a_cantilever(response: Response) -> Array:
+    """|kappa| (T,1) of a raw body, whose slopes nobody knows: as if it were a uniform cantilever of its length.
+
+    Of its first mode: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by a force at the tip, all
+    taken as if along it.
+    """
+    model = response.model
+    length, mass = _length(model), float(model.mass.sum())
+    pulls = np.sum([np.linalg.norm(force, axis=1) for _, _, force in response.loads], axis=0)
+    w, a = np.linalg.norm(response.w, axis=1), np.linalg.norm(response.acceleration, axis=1)
+    stiffness = 1.1933 * w**2 + 1.5709 * a / length + 4.6478 * pulls / (mass * length)
+    return np.atleast_2d(stiffness / max(response.frequencies.min() ** 2, _TINY)).T
+
+
 def _shortening(response: Response) -> float:
-    """Half the integral of the squared slope (m), of beams only."""
+    """Half the integral of the squared slope (m); of a raw body that of a cantilever's first mode, 0.58 of the squared
+    deflection over the length."""
     if not isinstance(response.body, BeamBody):
-        return 0.0
+        return 0.58 * _deflection(response) ** 2 * _length(response.model)
     x, _, slopes = _axis(response.body)
     m = response.eta.shape[1]
     angle = np.einsum("pim,tm->tpi", slopes[:, 1:, :m], response.eta)
@@ -177,10 +193,14 @@ def _shortening(response: Response) -> float:
 
 def _deflection(response: Response) -> float:
     model = response.model
-    size = float(np.linalg.norm(model.position, axis=1).max())
+    size = _length(model)
     far = int(np.argmax(np.sum(model.translation[:, :, 0] ** 2, axis=1)))
     bent = np.linalg.norm(response.eta @ model.translation[far].T, axis=1)
-    return float(bent.max() / size) if size > 0.0 else 0.0
+    return float(bent.max() / max(size, _TINY))
+
+
+def _length(model: FlexibleModel) -> float:
+    return float(np.linalg.norm(model.position, axis=1).max())
 
 
 def _mismatch(scene: Scene, body: str) -> float:

@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.linalg import eigvalsh
 
-from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies
+from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies, levels
 from flexmb.jain.cost import articulated
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
@@ -60,7 +60,7 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
     if isinstance(body, ModalBody):
         every = flexible_model(body).mode_count
         counts = sorted({n for n in COUNTS if n < every} | {every})
-        return (Rung("rigid"), Rung("sprung"), *(Rung("modes", n, level) for level in LEVELS for n in counts))
+        return (Rung("rigid"), Rung("sprung"), *(Rung("modes", n, level) for level in levels(body) for n in counts))
     sets: list[tuple[str, ...]] = [()]
     some = tuple(family for family in body.modes.families if family in moving)
     if some and set(some) != set(body.modes.families):
@@ -91,7 +91,7 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
         chosen = []
         for body in bodies:
             if isinstance(body, ModalBody):
-                rung = Rung("modes", flexible_model(body).mode_count, LEVELS[-1])
+                rung = Rung("modes", flexible_model(body).mode_count, levels(body)[-1])
             elif pieces and body not in whole:
                 rung = Rung("pieces", 0, LEVELS[-1], pieces=pieces)
             else:

@@ -12,10 +12,13 @@ from typing import Literal
 from msgspec.structs import replace
 
 from flexmb.advisor.modes import with_modes
+from flexmb.advisor.sprung import spring_hinged
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
+from flexmb.scene.check.second_order import second_order
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.problems import Place
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
-from flexmb.surrogate.sprung import spring_hinged
 
 LEVELS: tuple[Level, ...] = ("ruthless", "linear", "full", "stiffened")
 COUNTS = (1, 2, 3, 4, 6, 8)
@@ -63,6 +66,14 @@ Model = tuple[tuple[str, Rung], ...]
 def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
     """Bodies with modes that their scene does not make rigid already."""
     return tuple(b for b in scene.bodies if isinstance(b, BeamBody | ModalBody) and b.level != "rigid")
+
+
+def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
+    """Levels that the body has data for: raw bodies seldom have a second-order field."""
+    if isinstance(body, BeamBody):
+        return LEVELS
+    stiffened = replace(body, level="stiffened")
+    return LEVELS[:-1] if any(second_order(Place(), stiffened, modal_arrays(body))) else LEVELS
 
 
 def built(scene: Scene, model: Model) -> Scene:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from msgspec.structs import replace
 from numpy.typing import NDArray
@@ -11,7 +13,7 @@ from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode
-from flexmb.scene.modal_data import inertia_points, modal_arrays
+from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.surrogate.lumping import vector
 
@@ -65,17 +67,42 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
         ModalNode(
             name=node.name, position_m=node.position_m, quaternion=node.quaternion,
             translation_modes=_combined(node.translation_modes, X), rotation_modes=_combined(node.rotation_modes, X),
+            **_second_order(node, X),
         )
         for node in body.nodes
     )  # fmt: skip
     points = inertia_points(
         arrays.mass, arrays.position, arrays.translation_modes @ X, arrays.rotation_modes @ X, arrays.inertia,
-        arrays.com_offset,
+        arrays.com_offset, _square(arrays.second_translation, X), _square(arrays.second_rotation, X),
     )  # fmt: skip
+    geometric = {
+        name: _nested(_square(value, X))
+        for name in ("gravity_stiffness", "gradient_stiffness")
+        if (value := getattr(arrays, name)) is not None
+    }
     return replace(
         body, file=None, points=points, nodes=nodes, level=level,
-        stiffness=_rows(X.T @ arrays.stiffness @ X), damping=_rows(X.T @ arrays.damping @ X),
+        stiffness=_rows(X.T @ arrays.stiffness @ X), damping=_rows(X.T @ arrays.damping @ X), **geometric,
     )  # fmt: skip
+
+
+def _second_order(node: ModalNode, X: Array) -> dict[str, Any]:
+    """The second-order data of a node in the modes X (m,k), by the keys of the scene."""
+    found = {}
+    for name, array in node_arrays(node).items():
+        turned = _square(array, X)
+        found[name] = _nested(turned if name == "force_stiffness" else np.moveaxis(turned, 0, -1))
+    return found
+
+
+def _nested(array: Array) -> tuple[Any, ...]:
+    """An array as a scene has it."""
+    return tuple(map(_nested, array)) if array.ndim > 1 else tuple(array.tolist())
+
+
+def _square(array: Array | None, X: Array) -> Any:
+    """What each pair of modes has, (...,m,m), in the modes X (m,k): (...,k,k)."""
+    return None if array is None else X.T @ array @ X
 
 
 def _combined(shapes: tuple[tuple[float, float, float], ...], X: Array) -> tuple[tuple[float, float, float], ...]:

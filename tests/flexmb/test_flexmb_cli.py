@@ -7,6 +7,7 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from flexmb.cli import app
+from flexmb.scene.shapes import beam_section
 from flexmb.warmup import pendulum
 
 
@@ -83,3 +84,24 @@ def test_help_teaches(words):
     result = invoke(*words, "--help")
     assert result.exit_code == 0
     assert "flexmb" in result.output
+
+
+def test_advise_writes_the_reduced_scene_and_the_command_that_runs_it(tmp_path):
+    profile = fm.SmoothStep(start_value=0.0, end_value=0.5, start_s=0.0, duration_s=1.0)
+    section = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=1.7e-10, Iz=1.7e-10, rho=2700.0)
+    modes = fm.Modes(count=3, families=("bending_y",))
+    arm = fm.SceneBuilder("arm").beam("arm", length=1.0, elements=8, section=section, modes=modes, points="line")
+    arm = arm.revolute("hub", "ground", "arm", prescribed=profile).marker("tip", "arm", node="tip").scene()
+    fm.save_scene(arm, tmp_path / "arm.toml")
+    reduced = tmp_path / "new" / "small.toml"
+    result = invoke("advise", tmp_path / "arm.toml", "--tol", 0.01, "--t-end", 1.2, "--out", reduced)
+    assert result.exit_code == 0, result.output
+    for word in ("Model of each flexible body", "predicted", "measured", "because", "Measured against", "adequate"):
+        assert word in result.output
+    command = result.output.strip().splitlines()[-1].split()
+    assert command[:3] == ["flexmb", "simulate", str(reduced)]
+    assert invoke(*command[1:], "--out", tmp_path, "--no-plots").exit_code == 0
+    assert invoke("advise", tmp_path / "arm.toml", "--quantity", "marker:nose.position").exit_code == 2
+    refused = invoke("advise", tmp_path / "arm.toml", "--tol", 1e-9, "--t-end", 1.2, "--out", tmp_path / "none.toml")
+    assert refused.exit_code == 1 and "refused" in refused.output
+    assert not (tmp_path / "none.toml").exists()

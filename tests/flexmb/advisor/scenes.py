@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import numpy as np
+from msgspec.structs import replace
+
 import flexmb as fm
 from flexmb.scene.shapes import beam_section
 
@@ -34,3 +37,23 @@ def loaded(function: fm.Function, direction: tuple[float, float, float]) -> fm.S
     """A clamped arm with a force at its tip."""
     scene = beam(fm.SceneBuilder("loaded arm")).weld("mount", "ground", "arm").marker("tip", "arm", node="tip")
     return scene.force("push", "arm", node="tip", direction=direction, function=function).scene()
+
+
+def stiff_and_soft(angle: float, duration: float) -> fm.Scene:
+    """An arm as in `turned`, twenty times as stiff, with a soft one of half the length across its tip."""
+    profile = fm.SmoothStep(start_value=0.0, end_value=angle, start_s=0.0, duration_s=duration)
+    stiff = replace(SECTION, EIy_Nm2=20.0 * SECTION.EIy_Nm2, EIz_Nm2=20.0 * SECTION.EIz_Nm2)
+    soft = replace(
+        SECTION, EIy_Nm2=0.03 * SECTION.EIy_Nm2, EIz_Nm2=0.03 * SECTION.EIz_Nm2, GJ_Nm2=0.2, mass_per_length_kg_m=0.05,
+    )  # fmt: skip
+    modes = fm.Modes(count=2, families=("bending_y",))
+    half = np.sqrt(0.5)
+    return (
+        fm.SceneBuilder("stiff and soft")
+        .beam("arm", length=LENGTH, elements=8, section=stiff, modes=modes, points="line")
+        .beam("whip", length=LENGTH / 2.0, elements=8, section=soft, modes=modes, points="line")
+        .revolute("hub", "ground", "arm", prescribed=profile)
+        .weld("wrist", "arm", "whip", parent_node="tip", parent_quaternion=(half, 0.0, 0.0, half))
+        .marker("tip", "whip", node="tip")
+        .scene()
+    )

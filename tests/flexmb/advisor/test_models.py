@@ -9,10 +9,10 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.ladder import highest_frequency, references, rungs
-from flexmb.advisor.models import Rung, built
+from flexmb.advisor.models import LEVELS, Rung, built, levels
+from flexmb.advisor.sprung import fitted_hinge, spring_hinged
 from flexmb.modal import flexible_model
 from flexmb.surrogate import modal_points
-from flexmb.surrogate.sprung import fitted_hinge, spring_hinged
 from tests.flexmb.advisor.scenes import beam, loaded, turned
 
 
@@ -81,6 +81,22 @@ def test_raw_modes_are_cut_to_the_lowest_eigenmodes_they_span() -> None:
         known = np.sqrt(np.array(body.stiffness)[n - 1, n - 1])
         assert cut == pytest.approx(known, rel=1e-9)
     fm.compile(built(mixed_scene, (("arm", Rung("modes", 2, "full")),)))
+
+
+def test_raw_modes_take_their_second_order_field_along() -> None:
+    """Cut to the lowest of the beam's own modes they accelerate as the beam with as many."""
+    scene = turned(1.0, 0.5)
+    stiff = replace(scene, bodies=(replace(scene.bodies[0], level="stiffened"),))
+    raw = modal_points(stiff)
+    assert levels(raw.bodies[0]) == LEVELS
+    assert levels(modal_points(scene).bodies[0]) == LEVELS[:-1]
+    rung = (("arm", Rung("modes", 2, "stiffened")),)
+    one, two = (fm.compile(built(each, rung)) for each in (stiff, raw))
+    q, u = one.initial_state.q.copy(), one.initial_state.u.copy()
+    q[one.coordinate("arm.modes")], u[one.speed("arm.modes")] = (0.05, -0.01), (0.3, 0.2)
+    q[0], u[0] = one.initial_state.q[0], 0.0
+    a, b = (system.accelerations(system.state(q, u, 0.2)) for system in (one, two))
+    assert_allclose(a, b, rtol=1e-9)
 
 
 def test_a_spring_hinge_swings_at_the_first_frequency_and_keeps_the_names() -> None:
