@@ -10,7 +10,7 @@ import numpy as np
 from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
-from flexmb.advisor.ladder import Step, cost, model_cost, rungs, step
+from flexmb.advisor.ladder import Cost, Step, cost, model_cost, rungs, step
 from flexmb.advisor.methods import Method
 from flexmb.advisor.models import Model, Rung, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
@@ -96,31 +96,23 @@ def advise(
     the advice is the same wherever it is asked for. Raises SceneError for a scene that is wrong, ValueError for a
     quantity that is not there; where no model is adequate, the advice says so in `refusal`.
     """
-    check_scene(scene, t_end)
-    if not 0.0 < tolerance < 1.0:
-        raise ValueError(f"the tolerance is {tolerance:g}: give a part of one, such as 1e-3")
-    wanted = quantities(quantity, scene)
-    bench = Bench(scene, t_end, wanted)
-    base = rigid_run(scene, bench.times)
-    notes = [base] if isinstance(base, str) else []
-    known = {} if isinstance(base, str) else _indicators(base, scene, wanted)
-    expected = cost(scene, t_end, 0 if isinstance(base, str) else base.run.statistics.evaluations)
-    advice = Advice(scene.name, t_end, tolerance, wanted, notes=tuple(notes))
+    asked = prepare(scene, tolerance, quantity, t_end)
+    advice = Advice(scene.name, t_end, tolerance, asked.bench.wanted, notes=asked.notes)
     try:
-        confirmation = Confirmation(bench, tolerance, _hidden(scene, known), expected, REFERENCE_SHARE * BUDGET)
+        confirmation = asked.confirmation()
     except NoReference as problem:
-        return _with(advice, refusal=str(problem))
-    ladders = _ladders(scene, known, tolerance)
+        return replace(advice, refusal=str(problem))
+    known, ladders, bench, notes = asked.known, asked.ladders, asked.bench, asked.notes
     found = search(ladders, confirmation, BUDGET)
     steps = {(name, step.rung): step for name, each in ladders.items() for step in each}
     trials = tuple(_trial(model, steps, confirmation) for model in confirmation.measured)
     if found is None:
         sure = _sure(confirmation.reference)
-        return _with(advice, refusal=_nothing(trials, tolerance), trials=trials, reference=sure)
+        return replace(advice, refusal=_nothing(trials, tolerance), trials=trials, reference=sure)
     run = bench.run(found.model, found.method)
     if found.exhausted:
-        notes.append("the search for something cheaper ended at its budget of operations")
-    return _with(
+        notes += ("the search for something cheaper ended at its budget of operations",)
+    return replace(
         advice,
         bodies=tuple(
             BodyAdvice(name, rung, steps[name, rung].error, known[name].reason() if name in known else "")
@@ -131,14 +123,49 @@ def advise(
         predicted=sum(steps[each].error for each in found.model),
         measured=confirmation.total_error(found.model, found.method),
         uncertainty=confirmation.reference.uncertainty,
-        predicted_operations=model_cost(scene, found.model, expected),
+        predicted_operations=model_cost(scene, found.model, asked.cost),
         operations=run.operations, evaluations=run.evaluations, seconds=run.seconds,
-        reference=_sure(confirmation.reference), trials=trials, notes=tuple(notes),
+        reference=_sure(confirmation.reference), trials=trials, notes=notes,
     )  # fmt: skip
 
 
-def _with(advice: Advice, **changes: object) -> Advice:
-    return replace(advice, **changes)  # type: ignore[arg-type]
+@dataclass(frozen=True)
+class Prepared:
+    """A question with what is predicted before any candidate runs.
+
+    `known`: indicators by body, none where the rigid scene does not run; `cost` and `hidden` as for `Confirmation`;
+    `ladders`: by body, its steps; `notes`: why there are no indicators.
+    """
+
+    bench: Bench
+    tolerance: float
+    known: dict[str, Indicators]
+    cost: Cost
+    hidden: float
+    ladders: dict[str, tuple[Step, ...]]
+    notes: tuple[str, ...]
+
+    def confirmation(self) -> Confirmation:
+        """The measurements, references run. Raises NoReference."""
+        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE_SHARE * BUDGET)
+
+
+def prepare(
+    scene: Scene, tolerance: float, quantity: str | Quantity | Sequence[str | Quantity] | None, t_end: float
+) -> Prepared:
+    """Check the question, run the rigid scene, predict. Raises as `advise` does."""
+    check_scene(scene, t_end)
+    if not 0.0 < tolerance < 1.0:
+        raise ValueError(f"the tolerance is {tolerance:g}: give a part of one, such as 1e-3")
+    bench = Bench(scene, t_end, quantities(quantity, scene))
+    base = rigid_run(scene, bench.times)
+    known, slow = {}, 0
+    if isinstance(base, RigidRun):
+        known, slow = _indicators(base, scene, bench.wanted), base.run.statistics.evaluations
+    return Prepared(
+        bench, tolerance, known, cost(scene, t_end, slow), _hidden(scene, known),
+        _ladders(scene, known, tolerance), (base,) if isinstance(base, str) else (),
+    )  # fmt: skip
 
 
 def _indicators(base: RigidRun, scene: Scene, wanted: tuple[Quantity, ...]) -> dict[str, Indicators]:
