@@ -30,7 +30,7 @@ from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 if TYPE_CHECKING:
     from flexmb.closed_system import ClosedSystem
-    from flexmb.closure.system import ClosedWorkspace
+    from flexmb.closure.tables import Closed
 
 
 class _Raw(NamedTuple):
@@ -49,7 +49,7 @@ class _Route(NamedTuple):
     """An algorithm as integrators see it: its constants, a maker of workspaces, and the compiled runs."""
 
     constants: Any
-    workspace: Callable[[], Workspace | CompositeWorkspace | NestedWorkspace | ClosedWorkspace]
+    workspace: Callable[[], Workspace | CompositeWorkspace | NestedWorkspace | Closed]
     run_dop853: Callable[..., Any]
     run_rk4: Callable[..., Any]
 

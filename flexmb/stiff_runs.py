@@ -72,7 +72,7 @@ def run_generalised_alpha(
 def run(
     system: System, settings: Settings, y: Array, times: Array, ends: Array, w: Any, out: Array, counts: Any
 ) -> tuple[int, float]:
-    """Integrate y (nq+nu+1,) with the recursion; w its workspace. Returns status code and time of the last good state."""
+    """Integrate y (nq+nu+1,); w is the recursion's workspace. Returns status code, time of the last good state."""
     nq, controlled = system.nq, system.nq + system.nu
     tangent_w = tangent.tangent_workspace(system.constants, nq, system.nu)
     tables = system.recursion_constants, system.constants, w, tangent_w

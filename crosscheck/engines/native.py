@@ -3,6 +3,9 @@
 `native` is the O(N) recursion. `native-frisch` are the nested-body equations of Frisch (1975), corrected, and
 `native-frisch-as-printed` the same to the letter of the print: other equations for accelerations, loads and drives, on
 the same kinematics. Frisch's are of first order in the deformation, which is what level `linear` asks for.
+
+`native-radau5`, `native-exponential` and `native-generalised-alpha` are `native` with another integrator, for stiff
+scenes: a curve of their own in a work-precision chart.
 """
 
 from __future__ import annotations
@@ -12,27 +15,31 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
+from flexmb.methods import FIXED, LINEARISING, Method
 from flexmb.scene.schema import RigidBody, Scene
 from flexmb.simulation import simulate
 from flexmb.system import ERRATA, Algorithm, System, compile
 from flexmb.trajectory import Trajectory as NativeTrajectory
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
+_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)
 _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the order of hundredths
 
 
 class NativeEngine:
-    """flexmb with one of its algorithms, at the levels the scene asks for, with DOP853."""
+    """flexmb with one of its algorithms, at the levels the scene asks for, and one of its integrators."""
 
     def __init__(
         self,
         name: str = "native",
         algorithm: Algorithm = "articulated",
         summary: str = "flexmb: the O(N) recursion",
+        method: Method = "dop853",
     ) -> None:
         self.name = name
         self.summary = summary
         self._algorithm: Algorithm = algorithm
+        self._method: Method = method
 
     def version(self) -> str:
         try:
@@ -49,8 +56,10 @@ class NativeEngine:
         return Support("surrogate", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """A ladder of tolerances; DOP853 finds the steps that fit the scene."""
-        return tuple(Effort("tolerance", value, "dop853") for value in _TOLERANCES)
+        """A ladder of tolerances, by which adaptive methods find the steps that fit the scene; or of steps."""
+        if self._method in FIXED:
+            return tuple(Effort("step", value, self._method) for value in _STEPS)
+        return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
         """ValueError where the print does not apply: modes not clamped at the hinge. NotImplementedError for loops."""
@@ -59,7 +68,9 @@ class NativeEngine:
             if scene.closures:
                 raise NotImplementedError("Frisch's equations are those of trees: closures are for engine native")
             system.nested(self._algorithm)
-        return NativeModel(system, self._algorithm)
+        if scene.closures and self._method in LINEARISING:
+            raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
+        return NativeModel(system, self._algorithm, self._method)
 
 
 def frisch() -> NativeEngine:
@@ -73,16 +84,37 @@ def frisch_as_printed() -> NativeEngine:
     return NativeEngine("native-frisch-as-printed", "frisch_as_printed", summary)
 
 
-class NativeModel:
-    """A compiled system with the algorithm that runs it."""
+def radau5() -> NativeEngine:
+    """Stiff modes die out where steps are longer than their periods."""
+    return NativeEngine("native-radau5", "articulated", "flexmb, integrated by Radau IIA of order 5", "radau5")
 
-    def __init__(self, system: System, algorithm: Algorithm) -> None:
+
+def exponential() -> NativeEngine:
+    """Stiff modes are followed exactly as far as they are linear."""
+    return NativeEngine(
+        "native-exponential", "articulated", "flexmb, integrated by exponential collocation", "exponential"
+    )
+
+
+def generalised_alpha() -> NativeEngine:
+    """Fixed steps, spectral radius 0.8."""
+    return NativeEngine(
+        "native-generalised-alpha", "articulated", "flexmb, integrated by generalised-alpha", "generalised_alpha"
+    )
+
+
+class NativeModel:
+    """A compiled system with the algorithm that runs it, and the integrator its efforts name."""
+
+    def __init__(self, system: System, algorithm: Algorithm, method: Method = "dop853") -> None:
         self._system = system
         self._algorithm: Algorithm = algorithm
+        self._method: Method = method
 
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
-        self.simulate(Run(np.array([0.0, 1e-6])), Effort("tolerance", 1e-3, "dop853"))
+        effort = Effort("step" if self._method in FIXED else "tolerance", 1e-3, self._method)
+        self.simulate(Run(np.array([0.0, 1e-6])), effort)
 
     def evaluate(self) -> Snapshot:
         state = self._system.initial_state
@@ -100,15 +132,20 @@ class NativeModel:
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
-        """A tolerance drives DOP853 (atol a hundredth of rtol), a step RK4."""
-        t_end, system, algorithm = float(run.times[-1]), self._system, self._algorithm
-        if effort.kind == "tolerance":
-            atol = _ABSOLUTE * effort.value
-            done = simulate(
-                system, t_end, "dop853", rtol=effort.value, atol=atol, samples=run.times, algorithm=algorithm
-            )
-        else:
-            done = simulate(system, t_end, "rk4", step=effort.value, samples=run.times, algorithm=algorithm)
+        """The method is the effort's; of a tolerance, atol is a hundredth."""
+        accuracy = (
+            {"rtol": effort.value, "atol": _ABSOLUTE * effort.value}
+            if effort.kind == "tolerance"
+            else {"step": effort.value}
+        )
+        done = simulate(
+            self._system,
+            float(run.times[-1]),
+            effort.method,  # type: ignore[arg-type]  # simulate refuses what is none
+            samples=run.times,
+            algorithm=self._algorithm,
+            **accuracy,
+        )
         return Trajectory(
             status=_status(done),
             message="" if done.finished else done.message,

@@ -65,9 +65,9 @@ class Scratch(NamedTuple):
 
 
 @helper
-def response(flow, s):
-    """x at the quarters of the step under the polynomial v."""
-    respond(flow, s.v, s.X, s.term, s.product)
+def response(flow, s, terms):
+    """x at the quarters of the step under the first terms of the polynomial v."""
+    respond(flow, s.v, terms, s.X, s.term, s.product)
     at_quarters(flow, s.X, s.x)
 
 
@@ -112,9 +112,7 @@ def iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, w
     n = y.shape[0]
     for i in range(n):
         s.v[0, i] = h * f[i] / flow.scale[i]
-        for l in range(1, TERMS):
-            s.v[l, i] = 0.0
-    response(flow, s)
+    response(flow, s, 1)
     before = 0.0
     for sweep in range(1, _SWEEPS + 1):
         for node in range(4):
@@ -122,7 +120,7 @@ def iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, w
         status = evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts)
         if status != OK:
             return status
-        response(flow, s)
+        response(flow, s, TERMS)
         size = change(flow, s, y, rtol, atol, controlled)
         if not math.isfinite(size):
             return NONFINITE
@@ -149,7 +147,7 @@ def estimate(y, flow, s, rtol, atol, controlled):
         s.term[i] = max(abs(y[i]), abs(s.y_new[i]))
         for l in range(TERMS):
             s.v_error[l, i] = WITHOUT_MIDDLE[l] * s.v[TERMS - 1, i] / 24.0
-    respond(flow, s.v_error, s.X_error, s.error, s.product)
+    respond(flow, s.v_error, TERMS, s.X_error, s.error, s.product)
     at_quarters(flow, s.X_error, s.x_before)
     norm = 0.0
     for node in (1, 3):

@@ -171,19 +171,23 @@ def series(Z, tau, v, m, terms, x, term, product):
 
 
 @helper
-def respond(flow, v, X, term, product):
-    """X[level, m] for the polynomial sum over l of v[l] t^l / l!, v (TERMS,n), at all levels kept."""
+def respond(flow, v, terms, X, term, product):
+    """X[level, m] for the polynomial sum over l < terms of v[l] t^l / l!, at all levels kept."""
     finest = flow.finest[0]
     n = v.shape[1]
     for m in range(TERMS):
         x = X[finest, m]
         for i in range(n):
             x[i] = 0.0
-        series(flow.Z, 2.0**-finest, v, m, TERMS, x, term, product)
+        if m < terms:
+            series(flow.Z, 2.0**-finest, v, m, terms, x, term, product)
     for level in range(finest, QUARTER, -1):
         tau = 2.0**-level
-        for m in range(TERMS):
+        for m in range(terms):
             advance(flow.E[level], X[level, m], X[level], m, tau, X[level - 1, m])
+        for m in range(terms, TERMS):
+            for i in range(n):
+                X[level - 1, m, i] = 0.0
 
 
 @helper

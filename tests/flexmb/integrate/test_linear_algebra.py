@@ -31,7 +31,7 @@ def flow_at(A, h, v, theta, out):
     for l in range(TERMS):
         for i in range(n):
             v[l, i] /= flow.scale[i]
-    respond(flow, v, X, term, product)
+    respond(flow, v, TERMS, X, term, product)
     at_quarters(flow, X, x)
     at_fraction(flow, v, X, x, theta, out, term, product)
     for i in range(n):

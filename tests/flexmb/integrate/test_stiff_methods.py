@@ -67,8 +67,8 @@ def test_coefficients_of_radau5_equal_those_in_scipy():
     theirs = _ivp.radau
     for name in ("C", "E", "P"):
         assert np.allclose(getattr(tableau, name), getattr(theirs, name), rtol=0, atol=1e-14)
-    assert tableau.REAL == pytest.approx(theirs.MU_REAL, abs=2e-14)
-    assert tableau.COMPLEX == pytest.approx(np.conj(theirs.MU_COMPLEX), abs=2e-14)
+    assert abs(tableau.REAL - theirs.MU_REAL) < 2e-14
+    assert abs(tableau.COMPLEX - np.conj(theirs.MU_COMPLEX)) < 2e-14
 
 
 def test_radau5_takes_about_the_steps_of_scipy():
@@ -196,11 +196,10 @@ def test_generalised_alpha_is_of_order_2_and_damps_as_it_should(radius):
     """Damped oscillator; and per period of an undamped one at low frequency the loss of theory, from eigenvalues."""
     exact = expm(2.0 * np.array([[0.0, 1.0], [-9.0, -0.6]])) @ [1.2, -0.3]
     steps = 2.0 / 2 ** np.arange(5, 11)
-    errors = [
-        np.abs(solve(run_generalised_alpha, data(OSCILLATOR, 3.0, 0.1), [1.2, -0.3], [0, 2], h, radius, 1, 2).last - exact)
-        for h in steps
-    ]
-    assert observed_order(steps, np.max(errors, axis=1), 1e-12) == pytest.approx(2.0, abs=0.05)
+    start, problem = [1.2, -0.3], data(OSCILLATOR, 3.0, 0.1)
+    ends = [solve(run_generalised_alpha, problem, start, [0.0, 2.0], h, radius, 1, 2).last for h in steps]
+    errors = np.abs(np.array(ends) - exact).max(1)
+    assert observed_order(steps, errors, 1e-12) == pytest.approx(2.0, abs=0.05)
     h, periods = 2 * np.pi / 20, 10
     done = solve(run_generalised_alpha, data(OSCILLATOR, 1.0), [1.0, 0.0], [0, 20 * h * periods], h, radius, 1, 2)
     values = np.linalg.eigvals(amplification(radius, h))
