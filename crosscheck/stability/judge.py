@@ -79,8 +79,9 @@ def measured_class(what: StabilityMap, record: CellRecord) -> int:
 
 def label(what: StabilityMap, record: CellRecord) -> str:
     """What a cell is called and coloured by: its class, or its status where there is no value."""
-    measured = record.status == "measured" and record.value is not None
-    return what.kinds[what.kind(record.value)].name if measured else record.status
+    if record.status == "measured" and record.value is not None:
+        return what.kinds[what.kind(record.value)].name
+    return record.status
 
 
 def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray[np.intp]) -> NDArray[np.intp]:

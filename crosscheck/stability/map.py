@@ -108,8 +108,7 @@ class StabilityMap:
     `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds` lie
     between the `thresholds` (increasing, one fewer). `depth` halvings are made where class or status changes. A cell
     that `failed` counts as class number `failure` in the comparison with the overlay; without one no failure is right.
-    Where `skips`, cells that did not finish are no evidence. `shows` is for the gallery; `amplitude(x, y)` is the
-    largest amplitude over 1000 periods relative to the start's, where the map calls a motion stable.
+    Where `skips`, cells that did not finish are no evidence. `shows` is for the gallery.
     """
 
     name: str
@@ -126,7 +125,6 @@ class StabilityMap:
     depth: int = 3
     failure: int | None = None
     skips: bool = False
-    amplitude: Callable[[float, float], float] | None = None
 
     def __post_init__(self) -> None:
         if not len(self.kinds) == len(self.thresholds) + 1 == len(self.overlay.levels) + 1:

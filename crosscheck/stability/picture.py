@@ -18,6 +18,7 @@ from crosscheck.stability.run import Finished
 
 STATUSES = {"failed": "#756bb1", "did not finish": "#fdd835", "did not run": "#969696"}
 LINE_POINTS = 400
+FEW_DECADES = 60.0  # ratio of an axis's ends below which its ticks are plain numbers
 STYLE = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
 
 
@@ -78,6 +79,9 @@ def _frame(axes: Axes, what: StabilityMap) -> None:
     ):
         if axis.log:
             scale("log")
+            if axis.high / axis.low < FEW_DECADES:
+                (axes.xaxis if axis is what.x else axes.yaxis).set_major_formatter("{x:g}")
+                (axes.xaxis if axis is what.x else axes.yaxis).set_minor_formatter("{x:g}")
         limits(axis.low, axis.high)
         title(axis.label)
     if what.y.categories:
@@ -101,10 +105,12 @@ def _sentence(done: Finished) -> str:
     verdict, what = done.verdict, done.map
     cells = sum(verdict.cells.values())
     size = " x ".join(_size(axis, verdict.depth) for axis in (what.x, what.y) if not axis.categories)
-    if verdict.status == "agree":
-        where = "exactly" if verdict.distance == 0 else f"to {verdict.distance} cell{'s' * (verdict.distance > 1)}"
-        return f"{what.quantity}: {cells} cells, the overlay is met {where} (of {size})"
-    return f"{what.quantity}: {cells} cells, {verdict.status}"
+    outcome = {
+        "agree": "no cell exceeds the bound" if what.overlay.bound else "the boundary is within a cell of the line",
+        "differ": "the boundary is not where the line is",
+        "did not run": "some cells did not run",
+    }
+    return f"{what.quantity}\n{cells} cells, the finest {size}: {outcome[verdict.status]}"
 
 
 def _size(axis: Axis, depth: int) -> str:

@@ -70,7 +70,7 @@ def gap(step: float, time: float, rate: float) -> Outcome:
 
 # ---- Where stabilisation is stable
 
-STEPS = 1024
+STEPS = 512
 
 
 def measure_stability(scene: Scene, step: float, rate: float) -> Outcome:
@@ -89,8 +89,8 @@ STABILISATION = StabilityMap(
     quantity="log10 of the loop's opening over its size",
     scene=scene,
     measure=measure_stability,
-    x=Axis("step", "s", 1e-4, 1e-2, 8, log=True),
-    y=Axis("rate of stabilisation", "1/s", 1e2, 1e5, 9, log=True),
+    x=Axis("step", "s", 1e-4, 2e-3, 6, log=True),
+    y=Axis("rate of stabilisation", "1/s", 5e2, 5e4, 8, log=True),
     thresholds=(-3.0,),
     kinds=growth_kinds(),
     overlay=Overlay(

@@ -140,6 +140,7 @@ MAPS = (
             levels=(-12.0, -8.0, -4.0),
         ),
         shows="A three-axis gimbal loses three digits for each factor of ten nearer to lock, a quaternion none.",
+        depth=1,
         failure=3,
     ),
 )

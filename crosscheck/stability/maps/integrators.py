@@ -11,6 +11,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from flexmb.methods import Method as MethodName
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import InertiaPoint, ModalNode, Scene
 from flexmb.simulation import simulate
@@ -101,11 +102,6 @@ def step_map(method: Method) -> StabilityMap:
     def measure(scene: Scene, step: float, frequency: float) -> Outcome:
         return growth(method.run(scene, step, STEPS), frequency, STEPS)
 
-    def amplitude(step: float, frequency: float) -> float:
-        steps = int(np.ceil(1000.0 * 2.0 * np.pi / (frequency * step) / PARTS)) * PARTS
-        x, v, why = method.run(method.scene(step, frequency), step, steps)
-        return np.inf if why else float(np.max(np.hypot(x, v / frequency)) / START)
-
     limit = "no step is stable" if method.limit == NEVER else "every step is stable"
     if method.limit not in (NEVER, UNLIMITED):
         limit = f"step x frequency = {method.limit:.4g}"
@@ -127,7 +123,6 @@ def step_map(method: Method) -> StabilityMap:
         shows=f"Steps with which {method.name} of {method.engine} keeps an undamped mode bounded.",
         depth=3 if method.limit not in (NEVER, UNLIMITED) else 1,
         failure=1,
-        amplitude=amplitude,
     )
 
 
@@ -137,14 +132,58 @@ def _triple(values: Array) -> tuple[float, float, float]:
 
 HAIRER = "Hairer, Wanner, Solving Ordinary Differential Equations II, IV.2: the imaginary axis"
 SYMPLECTIC = "semi-implicit Euler: Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1"
+CHUNG = "Chung, Hulbert 1993: unconditionally stable"
 METHODS = (
     Method("flexmb", "rk4", IMAGINARY_RK4, HAIRER, slides),
+    Method("flexmb", "generalised_alpha", UNLIMITED, CHUNG, slides),
     Method("mujoco", "RK4", IMAGINARY_RK4, HAIRER, slides),
     Method("mujoco", "Euler", 2.0, SYMPLECTIC, slides),
     Method("mujoco", "implicit", 2.0, "MuJoCo documentation, Computation: implicit in velocities only", slides),
-    Method("exudyn", "GeneralizedAlpha", UNLIMITED, "Chung, Hulbert 1993: unconditionally stable", slides),
+    Method("exudyn", "GeneralizedAlpha", UNLIMITED, CHUNG, slides),
     Method("exudyn", "TrapezoidalIndex2", UNLIMITED, "the trapezoidal rule is A-stable (Dahlquist 1963)", slides),
     Method("exudyn", "RK44", IMAGINARY_RK4, HAIRER, breathing_body),
     Method("exudyn", "ExplicitEuler", NEVER, HAIRER + ", of which Euler's method has only the origin", breathing_body),
 )
-MAPS = tuple(map(step_map, METHODS))
+
+
+# ---- Methods that choose their steps: how accurate they are asked to be takes the place of the step
+
+PERIODS = 1000
+BOUNDED = 2.0  # times the start
+ADAPTIVE: dict[MethodName, str] = {
+    "dop853": "the error control keeps h omega inside the stability region: Hairer, Wanner II, IV.2",
+    "radau5": "L-stable: Hairer, Wanner II, IV.5",
+    "exponential": "exact for linear motion: Hochbruck, Ostermann 2010",
+}
+
+
+def tolerance_map(name: MethodName, source: str) -> StabilityMap:
+    """The map of one method with error control."""
+
+    def measure(scene: Scene, tolerance: float, frequency: float) -> Outcome:
+        span = PERIODS * 2.0 * np.pi / frequency
+        times = np.linspace(0.0, span, 257)
+        done = simulate(scene, span, name, rtol=tolerance, atol=0.01 * tolerance * START, samples=times)
+        if not done.finished:
+            unfinished = done.status is Status.MAX_STEPS
+            return Outcome(status="did not finish" if unfinished else "failed", message=done.message)
+        path = done.markers["fast"]
+        return Outcome(float(np.max(np.hypot(path.position[:, 0], path.velocity[:, 3] / frequency)) / START))
+
+    return StabilityMap(
+        name=f"integrator_flexmb_{name}",
+        title=f"{name} of flexmb: tolerance against the highest frequency",
+        quantity="largest amplitude over the start's in 1000 periods",
+        scene=slides,
+        measure=measure,
+        x=Axis("relative tolerance", "", 1e-7, 1e-3, 4, log=True),
+        y=Axis("highest modal frequency", "rad/s", 10.0, 1000.0, 4, log=True),
+        thresholds=(BOUNDED,),
+        kinds=growth_kinds(),
+        overlay=Overlay("every tolerance is stable", source, lambda tolerance, frequency: -np.ones_like(tolerance)),
+        shows=f"{name} with error control keeps an undamped mode bounded, however loose the tolerance.",
+        depth=1,
+    )
+
+
+MAPS = (*map(step_map, METHODS), *(tolerance_map(name, source) for name, source in ADAPTIVE.items()))

@@ -1,0 +1,134 @@
+"""Every map meets its overlay on coarse cells, and would not meet a wrong one; what is called stable stays bounded."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.stability.catalogue import stability_maps
+from crosscheck.stability.flow import flow
+from crosscheck.stability.judge import judge
+from crosscheck.stability.map import Axis, StabilityMap
+from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
+from crosscheck.stability.run import Finished, run_here, run_map
+from flexmb.state import pack
+from flexmb.system import compile
+
+PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
+LARGEST = {"many_bodies": 150.0}  # largest value of x in these tests, where cells beyond it take long
+NAMES = tuple(stability_maps())
+WITHOUT_BOUNDARY = {name for name in NAMES if stability_maps()[name].overlay.name.startswith(("every", "no "))}
+
+
+def coarse(axis: Axis, high: float | None = None) -> Axis:
+    """An axis of about half the cells, five at least; categories as they are."""
+    if axis.categories:
+        return axis
+    return replace(axis, cells=min(axis.cells, max(5, axis.cells // 2)), high=high or axis.high)
+
+
+def coarse_maps() -> dict[str, StabilityMap]:
+    """All maps, coarser and not refined."""
+    return {
+        name: replace(what, x=coarse(what.x, LARGEST.get(name)), y=coarse(what.y), depth=0)
+        for name, what in stability_maps().items()
+    }
+
+
+@pytest.fixture(scope="module")
+def finished(tmp_path_factory: pytest.TempPathFactory):
+    """Maps that were run, each once."""
+    folder: Path = tmp_path_factory.mktemp("maps")
+    known: dict[str, Finished] = {}
+
+    def run(name: str) -> Finished:
+        if name not in known:
+            known[name] = run_map(name, folder / f"{name}.jsonl", provider=PROVIDER, scheduler=run_here)
+        if known[name].verdict.status == "did not run":
+            pytest.skip(known[name].verdict.worst)
+        return known[name]
+
+    return run
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_map_agrees_with_its_overlay(name: str, finished) -> None:
+    verdict = finished(name).verdict
+    assert verdict.status == "agree", verdict.worst
+
+
+@pytest.mark.parametrize("name", [name for name in NAMES if name not in WITHOUT_BOUNDARY])
+def test_an_overlay_somewhere_else_is_noticed(name: str, finished) -> None:
+    """Moved by three cells along x, to the side where a bound forbids what it allowed."""
+    done = finished(name)
+    what, overlay = done.map, done.map.overlay
+    part = 3.2 / what.x.cells * (-1.0 if overlay.bound else 1.0)
+
+    def moved(x, y):
+        if what.x.log:
+            return overlay.predict(x * (what.x.high / what.x.low) ** part, y)
+        return overlay.predict(x + part * (what.x.high - what.x.low), y)
+
+    wrong = replace(what, overlay=replace(overlay, predict=moved))
+    if overlay.bound:  # far from what is measured: a wrong bound is one that is too small by far
+        wrong = replace(what, overlay=replace(overlay, predict=lambda x, y: overlay.predict(x, y) - 3.0))
+    assert judge(wrong, done.mesh, done.records).status == "differ"
+
+
+@pytest.mark.parametrize("name", sorted(WITHOUT_BOUNDARY))
+def test_a_map_without_boundary_could_show_one(name: str, finished) -> None:
+    """What is stable, or unstable, everywhere is not what the opposite prediction says."""
+    done = finished(name)
+    overlay = replace(done.map.overlay, predict=lambda x, y: -done.map.overlay.predict(x, y))
+    assert judge(replace(done.map, overlay=overlay), done.mesh, done.records).status == "differ"
+
+
+# ---- 1000 periods
+
+STEPPING = [method for method in integrators.METHODS if method.limit > 0.0]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("method", STEPPING, ids=lambda method: method.key)
+def test_a_method_called_stable_stays_bounded_for_a_thousand_periods(method: integrators.Method) -> None:
+    """Up to nine tenths of its limit: a symplectic method's invariant is an ellipse of axes (1 + 0.9)/(1 - 0.9)."""
+    limit = min(method.limit, 50.0)
+    for product in (0.3 * min(limit, 3.0), 0.9 * limit):
+        step, frequency = 0.01, product / 0.01
+        steps = int(np.ceil(1000.0 * 2.0 * np.pi / product / integrators.PARTS)) * integrators.PARTS
+        try:
+            x, v, why = method.run(method.scene(step, frequency), step, steps)
+        except RuntimeError as error:
+            pytest.skip(str(error))
+        assert not why
+        assert np.max(np.hypot(x, v / frequency)) <= 1.01 * integrators.START * np.sqrt(1.9 / 0.1)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("scene", "place", "period"),
+    [
+        (vibrating_hinge.scene(20.0, 0.09), "pivot", 2.0 * np.pi / (20.0 * vibrating_hinge.OMEGA_0)),
+        (spinning_beam.scene(2.4, 3.0), "beam.modes", 2.0 * np.pi / spinning_beam.OMEGA_1),
+        (spinning_beam.scene(0.98, 2.0), "beam.modes", 2.0 * np.pi / spinning_beam.OMEGA_1),
+        (free_spin.scene(0.97, 0.9), "base", 2.0 * np.pi / free_spin.SPIN),
+    ],
+    ids=["vibrating hinge", "stiffened", "full", "free spin"],
+)
+def test_a_motion_called_stable_stays_bounded_for_a_thousand_periods(scene, place: str, period: float) -> None:
+    """Near the boundary: a disturbance of 1e-6 grows by no more than stiffness lets it, a factor of 30."""
+    system = compile(scene)
+    start = pack(system.initial_state)
+    at = slice(system.nq + system.speed(place).start, system.nq + system.speed(place).start + 1)
+    moved = start.copy()
+    moved[at] += 1e-6
+    speeds = slice(system.nq, system.nq + system.speed(place).stop)
+    reference, y = start, moved
+    largest = 0.0
+    for _ in range(50):
+        reference, y = flow(system, reference, 20.0 * period), flow(system, y, 20.0 * period)
+        largest = max(largest, float(np.max(np.abs(y[speeds] - reference[speeds]))))
+    assert 1e-8 < largest < 3e-5

@@ -1,0 +1,84 @@
+"""docs/gallery.md: every picture with what it shows, the command that draws it, and what was measured. Write it with
+
+    python -m tests.repo.gallery
+
+Stability maps come from the catalogue and from docs/pictures/maps.json, the other pictures from docs/gallery.toml.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from typing import NamedTuple
+
+from crosscheck.stability.catalogue import stability_maps
+from crosscheck.stability.console import VERDICTS, read_verdicts
+from crosscheck.stability.judge import MapVerdict
+from crosscheck.stability.map import StabilityMap
+from tests.repo.project import ROOT
+
+PAGE = ROOT / "docs" / "gallery.md"
+OTHERS = ROOT / "docs" / "gallery.toml"
+PICTURES = ROOT / "docs" / "pictures"
+INTRODUCTION = """# Gallery
+
+Every picture with what it shows, the command that draws it, and what was found. This page is generated:
+`python -m tests.repo.gallery`.
+
+## Stability maps
+
+A map is one case, one quantity and two axes. Cells are refined where the class or the status changes; what failed or
+did not finish has colours of its own; the black line is a boundary known from elsewhere, and a map *agrees* where every
+cell lies within one of the finest cells of where that line has its class. All of them, with their verdicts:
+
+```sh
+crosscheck stability all --pictures docs/pictures
+```
+"""
+
+
+class Picture(NamedTuple):
+    """A picture of another room."""
+
+    file: str
+    title: str
+    text: str
+    command: str
+
+
+def other_pictures() -> list[Picture]:
+    """What docs/gallery.toml lists."""
+    return [Picture(**entry) for entry in tomllib.loads(OTHERS.read_text(encoding="utf-8"))["picture"]]
+
+
+def page() -> str:
+    """The text of docs/gallery.md."""
+    verdicts = {verdict.map: verdict for verdict in read_verdicts(PICTURES / VERDICTS)}
+    maps = [_map(what, verdicts[name]) for name, what in stability_maps().items()]
+    others = [
+        f"### {each.title}\n\n![{each.title}](pictures/{each.file})\n\n{each.text} `{each.command}`\n"
+        for each in other_pictures()
+    ]
+    return "\n".join([INTRODUCTION, *maps, "## Other pictures\n", *others])
+
+
+def _map(what: StabilityMap, verdict: MapVerdict) -> str:
+    cells = ", ".join(f"{count} {name}" for name, count in verdict.cells.items())
+    found = {
+        "agree": "no cell exceeds the bound" if what.overlay.bound else f"farthest cell: {verdict.distance}",
+        "differ": verdict.worst,
+        "did not run": verdict.worst,
+    }[verdict.status]
+    return (
+        f"### {what.title}\n\n![{what.title}](pictures/{what.name}.svg)\n\n"
+        f"{what.shows} Line: {what.overlay.name} ({what.overlay.source}). Verdict: **{verdict.status}** ({found}; cells: "
+        f"{cells}). `crosscheck stability {what.name}`\n"
+    )
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
