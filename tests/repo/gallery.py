@@ -70,8 +70,8 @@ def _map(what: StabilityMap, verdict: MapVerdict) -> str:
     }[verdict.status]
     return (
         f"### {what.title}\n\n![{what.title}](pictures/{what.name}.svg)\n\n"
-        f"{what.shows} Line: {what.overlay.name} ({what.overlay.source}). Verdict: **{verdict.status}** ({found}; cells: "
-        f"{cells}). `crosscheck stability {what.name}`\n"
+        f"{what.shows} Line: {what.overlay.name} ({what.overlay.source}). Verdict: **{verdict.status}** ({found}; "
+        f"cells: {cells}). `crosscheck stability {what.name}`\n"
     )
 
 

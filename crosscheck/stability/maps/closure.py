@@ -6,17 +6,20 @@ from functools import cache
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.registry import engine
+from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, digit_kinds, growth_kinds
 from flexmb.closed_system import ClosedSystem
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.simulation import simulate
-from flexmb.system import compile
+from flexmb.system import System, compile
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.7, 1.0  # m
 SIZE = GROUND
 RATE = 2.0  # rad/s of the crank at the start
 SAMPLES = 33
+LEAST = 1e-17
 REAL_RK4 = 2.785293563405282  # |R(z)| = 1 at z = -2.785 on the real axis
 
 
@@ -41,7 +44,9 @@ def scene(step: float, other: float) -> Scene:
         builder.revolute("drive", "ground", "crank", angle=crank, rate=RATE)
         .revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - crank)
         .revolute("pivot", "ground", "rocker", parent_position=(GROUND, 0.0, 0.0), angle=rocker)
-        .closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
+        .closure("loop", "spherical", "coupler", "rocker", node_a="tip", node_b="tip")
+        .marker("a", "coupler", node="tip")
+        .marker("b", "rocker", node="tip")
         .scene()
     )
 
@@ -55,17 +60,17 @@ def system() -> ClosedSystem:
 
 
 def gap(step: float, time: float, rate: float) -> Outcome:
-    """log10 of the largest opening of the loop over its size, in the second half of a run of RK4."""
-    mechanism = system()
-    done = simulate(
-        mechanism, time, "rk4", step=step, samples=np.linspace(0.0, time, SAMPLES), stabilise=rate
-    )
+    """`opening` of a run of flexmb with RK4; `rate` 0 projects."""
+    done = simulate(system(), time, "rk4", step=step, samples=np.linspace(0.0, time, SAMPLES), stabilise=rate)
     if not done.finished:
         return Outcome(status="failed", message=done.message)
-    half = slice(SAMPLES // 2, None)
-    states = zip(done.t[half], done.q[half], done.u[half], strict=True)
-    gaps = [mechanism.closure_gaps(mechanism.state(q, u, t))["loop"] for t, q, u in states]
-    return Outcome(float(np.log10(max(max(distance / SIZE, angle) for distance, angle in gaps) + 1e-17)))
+    return opening(done.markers["a"].position, done.markers["b"].position)
+
+
+def opening(a: Array, b: Array) -> Outcome:
+    """log10 of the largest distance of the joined points over the size of the loop, in the second half of a run."""
+    distance = np.linalg.norm(a - b, axis=1)[SAMPLES // 2 :]
+    return Outcome(float(np.log10(np.max(distance) / SIZE + LEAST)))
 
 
 # ---- Where stabilisation is stable
@@ -102,4 +107,83 @@ STABILISATION = StabilityMap(
     depth=2,
     failure=1,
 )
-MAPS = (STABILISATION,)
+
+# ---- Drift
+
+SPAN = 3.0  # s
+KEPT = ("projection", "stabilised 20/s", "MuJoCo's soft constraint")
+SLOW_RATE = 20.0  # 1/s
+PROJECTED = 6e-14  # of the size of the mechanism: where projection stops
+SOFT_TIME, SOFT_IMPEDANCE = 0.02, 0.9  # s; MuJoCo's defaults (solref, solimp)
+ANCHOR = 1e-3  # s
+LEVELS = (-12.0, -8.0, -4.0)
+
+
+def measure_drift(scene: Scene, step: float, kept: float) -> Outcome:
+    """The opening within `SPAN`."""
+    match KEPT[round(kept)]:
+        case "projection":
+            return gap(step, SPAN, 0.0)
+        case "stabilised 20/s":
+            return gap(step, SPAN, SLOW_RATE)
+    found = engine("mujoco").compile(scene).simulate(
+        Run(np.linspace(0.0, SPAN, SAMPLES)), Effort("step", step, "RK4")
+    )
+    if found.status != "finished":
+        return Outcome(status="failed", message=found.message)
+    return opening(found.markers["a"].position, found.markers["b"].position)
+
+
+@cache
+def anchored() -> float:
+    """log10 of the stabilised drift with steps of `ANCHOR`."""
+    return gap(ANCHOR, SPAN, SLOW_RATE).value
+
+
+@cache
+def pulled_apart() -> float:
+    """Acceleration (m/s^2) at which the joined points would part if nothing joined them, the largest of a run."""
+    mechanism, tree = system(), System(system().scene)
+    done = simulate(mechanism, SPAN, samples=SAMPLES, rtol=1e-8, atol=1e-10)
+    largest = 0.0
+    for q, u in zip(done.q, done.u, strict=True):
+        seen = tree.evaluate(0.0, q, u).markers
+        largest = max(largest, float(np.linalg.norm((seen["a"].acceleration - seen["b"].acceleration)[3:])))
+    return largest
+
+
+def drift(step: Array, kept: Array) -> Array:
+    """log10 of the opening: where projection stops, fourth order in the step, and the yield of a soft constraint.
+
+    MuJoCo's constraint is a critically damped spring of its time constant T, not shorter than two steps, whose force is
+    scaled by its impedance d: it yields (1 - d) T^2 a under what would part the points with the acceleration a.
+    """
+    time = np.maximum(SOFT_TIME, 2.0 * step)
+    table = np.array([
+        np.full_like(step, np.log10(PROJECTED)),
+        anchored() + 4.0 * np.log10(step / ANCHOR),
+        np.log10((1.0 - SOFT_IMPEDANCE) * time**2 * pulled_apart() / SIZE),
+    ])  # fmt: skip
+    return np.asarray(np.choose(np.round(kept).astype(int), table))
+
+
+DRIFT = StabilityMap(
+    name="closure_drift",
+    title="A loop that should stay closed: four-bar by RK4",
+    quantity="log10 of the loop's opening over its size",
+    scene=scene,
+    measure=measure_drift,
+    x=Axis("step", "s", 3e-4, 3e-2, 6, log=True),
+    y=Axis.of("how it is kept closed", *KEPT),
+    thresholds=LEVELS,
+    kinds=digit_kinds("below 1e-12", "1e-12 to 1e-8", "1e-8 to 1e-4", "above 1e-4"),
+    overlay=Overlay(
+        "6e-14; fourth order; (1 - d) T^2 a",
+        "projection; RK4 (Kutta 1901) through the run with 1 ms; MuJoCo documentation, Computation: constraint model",
+        drift,
+        levels=LEVELS,
+    ),
+    shows="Projection closes a loop to rounding whatever the step, stabilisation to the order of the method.",
+    depth=1,
+)
+MAPS = (STABILISATION, DRIFT)

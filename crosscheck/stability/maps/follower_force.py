@@ -18,7 +18,7 @@ from flexmb.system import compile
 LENGTH, STIFFNESS, MASS = 1.0, 1.0, 1.0  # m, N m^2, kg/m: loads are P L^2/EI, times sqrt(mass L^4/EI)
 MODES, ELEMENTS = 6, 12
 NEUTRAL = 1e-7  # 1/s; below is rounding
-KNOTS = 21
+KNOTS = 65
 
 
 def column(load: float, tip_mass: float = 0.0, damping: float = 0.0) -> Scene:

@@ -17,10 +17,12 @@ RADIUS = 0.6
 CORNER = 0.8
 
 
+ANY = SceneBuilder("any").rigid_body("body", mass=1.0, inertia=(1.0,) * 3).free("base", "ground", "body").scene()
+
+
 def scene(x: float, y: float) -> Scene:
     """Any."""
-    builder = SceneBuilder("any").rigid_body("body", mass=1.0, inertia=(1.0, 1.0, 1.0))
-    return builder.free("base", "ground", "body").scene()
+    return ANY
 
 
 def circle(x: Array, y: Array) -> Array:

@@ -24,10 +24,8 @@ WITHOUT_BOUNDARY = {name for name in NAMES if stability_maps()[name].overlay.nam
 
 
 def coarse(axis: Axis, high: float | None = None) -> Axis:
-    """An axis of about half the cells, five at least; categories as they are."""
-    if axis.categories:
-        return axis
-    return replace(axis, cells=min(axis.cells, max(5, axis.cells // 2)), high=high or axis.high)
+    """An axis of five cells; categories as they are."""
+    return axis if axis.categories else replace(axis, cells=min(axis.cells, 5), high=high or axis.high)
 
 
 def coarse_maps() -> dict[str, StabilityMap]:
