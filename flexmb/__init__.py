@@ -21,6 +21,11 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.system import ClosureError
+    from flexmb.linear.campbell import Campbell, campbell
+    from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+    from flexmb.linear.linearize import linearize
+    from flexmb.linear.model import LinearModel
+    from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.simulation import simulate
     from flexmb.state import DynamicsError, State
     from flexmb.status import Status
@@ -30,7 +35,15 @@ if TYPE_CHECKING:
 _LATER = {
     "Advice": "flexmb.advisor.advice",
     "advise": "flexmb.advisor.advice",
+    "Campbell": "flexmb.linear.campbell",
+    "campbell": "flexmb.linear.campbell",
     "ClosureError": "flexmb.closure.system",
+    "equilibrium": "flexmb.linear.equilibrium",
+    "EquilibriumError": "flexmb.linear.equilibrium",
+    "linearize": "flexmb.linear.linearize",
+    "LinearModel": "flexmb.linear.model",
+    "steady_spin": "flexmb.linear.spin",
+    "SteadySpin": "flexmb.linear.spin",
     "simulate": "flexmb.simulation",
     "Status": "flexmb.status",
     "DynamicsError": "flexmb.state",
@@ -42,8 +55,10 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "ClosureError", "DynamicsError", "Evaluation", "SceneBuilder", "SceneError", "State", "Status", "System",
-    "Trajectory", "advise", "check_scene", "compile", "load_scene", "save_scene", "simulate", *schema.__all__,
+    "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "LinearModel",
+    "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
+    "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "steady_spin",
+    *schema.__all__,
 ]  # fmt: skip
 
 

@@ -1,0 +1,121 @@
+"""Campbell diagrams: eigenvalues of steady spins against the rate, modes followed from rate to rate by their shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import linear_sum_assignment
+
+from flexmb.arrays import Real
+from flexmb.linear.model import Complex, LinearModel, Stability
+from flexmb.linear.spin import steady_spin
+from flexmb.scene.schema import Scene
+from flexmb.state import State
+from flexmb.system import System, compile
+
+
+@dataclass(frozen=True, eq=False)
+class Campbell:
+    """Modes of a system whose `hinge` spins steadily, seen from the turning bodies.
+
+    rates (R,) rad/s; eigenvalues (R,n) rad/s, column j one mode followed along the rates; mac (R,n): how alike its
+    shape is to that at the rate before, 1 for equal ones; names (n,): the displacement that dominates it at the first
+    rate; stability: one verdict per rate.
+    """
+
+    scene: str
+    hinge: str
+    rates: Real
+    eigenvalues: Complex
+    mac: Real
+    names: tuple[str, ...]
+    stability: tuple[Stability, ...]
+
+    @property
+    def frequencies_hz(self) -> Real:
+        """(R,n) of the damped oscillations; 0 where a mode does not oscillate."""
+        return self.eigenvalues.imag / (2.0 * np.pi)
+
+    @property
+    def unstable(self) -> NDArray[np.bool_]:
+        """(R,) where the linear model is unstable."""
+        return np.array([found.verdict == "unstable" for found in self.stability])
+
+    def to_csv(self, path: Path | str) -> Path:
+        """Rates, and of every mode the frequency (Hz) and the growth rate (1/s), named as in `names`."""
+        columns = ["rate [rad/s]"]
+        for number, name in enumerate(self.names, 1):
+            columns += [f"{number} {name} frequency [Hz]", f"{number} {name} growth [1/s]"]
+        pairs = np.stack([self.frequencies_hz, self.eigenvalues.real], axis=2).reshape(len(self.rates), -1)
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        table = np.column_stack([self.rates, pairs])
+        np.savetxt(path, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
+        return path
+
+
+def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
+    """Eigenvalues against the spin rate (rad/s) of a revolute hinge or wheel, in the order of `rates`.
+
+    Every steady state is found from that of the rate before. Raises what `steady_spin` does.
+    """
+    if isinstance(system, Scene):
+        system = compile(system)
+    rates = np.atleast_1d(np.asarray(rates, float))
+    guess: State | None = None
+    values: list[Complex] = []
+    macs: list[Real] = []
+    verdicts: list[Stability] = []
+    names: tuple[str, ...] = ()
+    shapes: Complex | None = None
+    for rate in rates:
+        spin = steady_spin(system, hinge, float(rate), guess)
+        model, guess = spin.linearize(), spin.state
+        found, current = _spectrum(model)
+        if shapes is None:
+            names = tuple(_dominant(model, shape) for shape in current.T)
+            macs.append(np.ones(len(found)))
+        else:
+            alike = _mac(shapes, current)
+            order = _followed(alike, values[-1], found)
+            macs.append(alike[np.arange(len(order)), order])
+            found, current = found[order], current[:, order]
+        values.append(found)
+        shapes = current
+        verdicts.append(model.stability)
+    return Campbell(
+        system.scene.name, hinge, rates, np.array(values), np.array(macs), names, tuple(verdicts)
+    )  # fmt: skip
+
+
+def _spectrum(model: LinearModel) -> tuple[Complex, Complex]:
+    """n eigenvalues, one of each pair (above, or on the right), and shapes (n,n) of unit kinetic energy."""
+    modes = [mode for mode in model.modes if mode.eigenvalue.imag > 0.0]
+    real = sorted(
+        (mode for mode in model.modes if mode.eigenvalue.imag == 0.0), key=lambda mode: -mode.eigenvalue.real
+    )
+    modes += real[: len(model.rates) - len(modes)]
+    modes.sort(key=lambda mode: mode.natural_rad_s)
+    root = np.linalg.cholesky(model.mass).T
+    shapes = root @ np.array([mode.shape for mode in modes]).T
+    return np.array([mode.eigenvalue for mode in modes]), shapes / np.linalg.norm(shapes, axis=0)
+
+
+def _dominant(model: LinearModel, shape: Complex) -> str:
+    return model.displacements[int(np.argmax(np.abs(shape)))]
+
+
+def _mac(before: Complex, after: Complex) -> Real:
+    """Modal assurance criterion (n,n) of shapes of unit norm."""
+    return np.abs(before.conj().T @ after) ** 2
+
+
+def _followed(alike: Real, before: Sequence[complex] | Complex, after: Complex) -> NDArray[np.int64]:
+    """For each mode before, its number after: one to one, alike in shape, and near in frequency where shapes mix."""
+    a, b = np.asarray(before)[:, None], after[None]
+    apart = np.abs(a - b) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
+    return linear_sum_assignment(1.0 - alike + apart)[1]

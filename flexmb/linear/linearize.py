@@ -1,0 +1,100 @@
+"""Linear models from systems: matrices, inputs and outputs with names."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.arrays import Real
+from flexmb.hinges.catalogue import quaternion_offset
+from flexmb.labels import state_names
+from flexmb.linear.model import LinearModel
+from flexmb.linear.variations import Equations
+from flexmb.scene.schema import Scene
+from flexmb.state import State
+from flexmb.system import System, compile
+
+_ROTATION = tuple((f"rotation.{axis}", "rad") for axis in "xyz")
+_POSITION = tuple((f"position.{axis}", "m") for axis in "xyz")
+_FORCE = {"rad/s": "N m", "m/s": "N", "1/s": "1"}
+
+
+def linearize(system: System | Scene, state: State | None = None, *, held: bool = False) -> LinearModel:
+    """The linear model about a state (default: the initial one), by exact derivatives.
+
+    Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
+    state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` is what is left.
+    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains.
+    """
+    if isinstance(system, Scene):
+        system = compile(system)
+    equations = Equations(system)  # before all else: it refuses closed chains
+    state = system.initial_state if state is None else state
+    return linear_model(equations.held(state.t) if held else equations, state)
+
+
+def linear_model(equations: Equations, state: State) -> LinearModel:
+    """The model of equations whose functions of time are what they shall be."""
+    system, free = equations.system, equations.free
+    state = equations.on_functions(state)
+    at, mass, n = equations.variations(state), equations.mass(state), len(free)
+    names, units = displacement_names(equations)
+    speeds = [state_names(system)[1][j] for j in free]
+    driven = _driven(equations)
+    B = np.zeros((2 * n, len(driven)))
+    B[n:] = np.linalg.solve(mass, np.eye(n)[:, driven])
+    markers, C = _markers(equations, state)
+    states = (*zip(names, units, strict=True), *speeds)
+    return LinearModel(
+        scene=system.scene.name, state=state, states=states,
+        inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven), outputs=(*states, *markers),
+        A=at.A, B=B, C=np.vstack([np.eye(2 * n), C]), D=np.zeros((2 * n + len(C), len(driven))),
+        mass=mass, motion=at.motion, rates=at.rates, drift=at.drift,
+    )  # fmt: skip
+
+
+def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
+    """Names and units of xi: those of the coordinates, "<hinge>.rotation.x" and "<hinge>.position.x" of quaternions."""
+    system = equations.system
+    named = [("", "")] * system.nu
+    coordinates = state_names(system)[0]
+    for j, speed in enumerate(equations.constants.speed):
+        if speed["coordinate"] >= 0:
+            named[j] = coordinates[speed["coordinate"]]
+    for name, body in zip(system.body_names, equations.constants.body, strict=True):
+        modes = slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
+        named[modes] = coordinates[int(body["eta_index"]) : int(body["eta_index"] + body["modes"])]
+        start = quaternion_offset.py_func(int(body["hinge_kind"]))
+        if start >= 0:
+            hinge = next(hinge.name for hinge in system.scene.hinges if hinge.child == name)
+            labels = _ROTATION if start == 0 else _ROTATION + _POSITION
+            j = int(body["u_index"])
+            named[j : j + len(labels)] = [(f"{hinge}.{label}", unit) for label, unit in labels]
+    chosen = [named[j] for j in equations.free]
+    return [name for name, _ in chosen], [unit for _, unit in chosen]
+
+
+def _driven(equations: Equations) -> list[int]:
+    """Places among the free speeds of those that a motor can drive: all but modal ones."""
+    modal = np.zeros(equations.system.nu, bool)
+    for body in equations.constants.body:
+        modal[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = True
+    return np.flatnonzero(~modal[equations.free]).tolist()
+
+
+def _markers(equations: Equations, state: State) -> tuple[list[tuple[str, str]], Real]:
+    """Names and rows (6 K, 2n): displacement and rotation of markers by xi, from velocities, which are linear in u."""
+    system, n = equations.system, len(equations.free)
+    labels = [*zip("xyz", "mmm", strict=True), *_ROTATION]
+    names = [(f"{marker.name}.{label}", unit) for marker in system.scene.markers for label, unit in labels]
+    rows = np.zeros((len(names), 2 * n))
+    if names:
+        driven = _velocities(system, state, np.zeros(system.nu))
+        for i, j in enumerate(equations.free):
+            rows[:, i] = _velocities(system, state, np.eye(system.nu)[j]) - driven
+    return names, rows
+
+
+def _velocities(system: System, state: State, u: Real) -> Real:
+    """(6 K,) of all markers, [linear; angular]."""
+    found = system.evaluate(state.t, state.q, u).markers.values()
+    return np.concatenate([np.roll(marker.velocity, 3) for marker in found])

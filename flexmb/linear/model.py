@@ -1,0 +1,207 @@
+"""A linear model of a system about one state: matrices by name, modes, stability, frequency response, export."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import eig, matrix_balance
+
+from flexmb.arrays import Real
+from flexmb.state import State
+
+Complex = NDArray[np.complex128]
+ROUNDOFF = 2.0**-53
+
+
+@dataclass(frozen=True, eq=False)
+class Mode:
+    """One eigenvalue (rad/s); of a conjugate pair the one with positive imaginary part.
+
+    shape (n,): displacements, largest entry 1. tolerance (rad/s): what rounding of A leaves open of the eigenvalue.
+    participation (n,): part of the kinetic energy in each displacement, by the diagonal of the mass matrix.
+    """
+
+    eigenvalue: complex
+    shape: Complex
+    tolerance: float
+    participation: Real
+
+    @property
+    def natural_rad_s(self) -> float:
+        """|eigenvalue|."""
+        return abs(self.eigenvalue)
+
+    @property
+    def frequency_rad_s(self) -> float:
+        """Frequency of the damped oscillation; 0 for a real eigenvalue."""
+        return self.eigenvalue.imag
+
+    @property
+    def frequency_hz(self) -> float:
+        """The same in Hz."""
+        return self.eigenvalue.imag / (2.0 * np.pi)
+
+    @property
+    def damping_ratio(self) -> float:
+        """-Re / |eigenvalue|; NaN for an eigenvalue that is zero."""
+        return -self.eigenvalue.real / abs(self.eigenvalue) if abs(self.eigenvalue) > self.tolerance else np.nan
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the eigenvalues say, up to rounding: `eigenvalue` is the one that decides, known to `tolerance` (rad/s).
+
+    "neutral": some eigenvalues have no real part beyond rounding, none a positive one: terms that a linear model leaves
+    out decide.
+    """
+
+    verdict: Literal["asymptotically stable", "neutral", "unstable"]
+    eigenvalue: complex
+    tolerance: float
+
+    def __str__(self) -> str:
+        found = f"largest real part {self.eigenvalue.real:.6g} rad/s, known to {self.tolerance:.1g}"
+        return f"{self.verdict}: {found}"
+
+
+@dataclass(frozen=True, eq=False)
+class LinearModel:
+    """x' = A x + B f, y = C x + D f about `state`, x = [xi; du]: displacements (n,) and changes of the speeds (n,).
+
+    Names and units: `states` (2n), `inputs` (loads of hinges and wheels along their free speeds), `outputs` (the
+    states, then displacement and rotation vector of every marker, World axes). mass (n,n): mass matrix. motion (nq,n):
+    dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit derivative by time.
+    """
+
+    scene: str
+    state: State
+    states: tuple[tuple[str, str], ...]
+    inputs: tuple[tuple[str, str], ...]
+    outputs: tuple[tuple[str, str], ...]
+    A: Real
+    B: Real
+    C: Real
+    D: Real
+    mass: Real
+    motion: Real
+    rates: Real
+    drift: Real
+
+    @property
+    def displacements(self) -> tuple[str, ...]:
+        """Names of the first half of x."""
+        return tuple(name for name, _ in self.states[: len(self.rates)])
+
+    @cached_property
+    def eigenvalues(self) -> Complex:
+        """All 2n (rad/s), by modulus."""
+        return self._decomposition[0]
+
+    @cached_property
+    def modes(self) -> tuple[Mode, ...]:
+        """One for each conjugate pair and for each real eigenvalue, by modulus."""
+        values, vectors, tolerances = self._decomposition
+        n, found = len(self.rates), []
+        for value, vector, tolerance in zip(values, vectors.T, tolerances, strict=True):
+            if value.imag >= 0.0:
+                shape = vector[:n] / vector[:n][np.argmax(np.abs(vector[:n]))]
+                energy = np.abs(shape) ** 2 * np.diag(self.mass)
+                found.append(Mode(complex(value), shape, float(tolerance), energy / np.sum(energy)))
+        return tuple(found)
+
+    @property
+    def stability(self) -> Stability:
+        """Verdict by the eigenvalues and how well each of them is known."""
+        values, _, tolerances = self._decomposition
+        worst = int(np.argmax(values.real - tolerances))
+        if values[worst].real > tolerances[worst]:
+            return Stability("unstable", complex(values[worst]), float(tolerances[worst]))
+        worst = int(np.argmax(values.real + tolerances))
+        verdict = "asymptotically stable" if values[worst].real < -tolerances[worst] else "neutral"
+        return Stability(verdict, complex(values[worst]), float(tolerances[worst]))  # type: ignore[arg-type]
+
+    def frequency_response(self, input: str, omega: ArrayLike, outputs: tuple[str, ...] = ()) -> Complex:
+        """Response (W, outputs) of all, or the named, outputs to a unit harmonic load at each omega (rad/s).
+
+        (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names that do not exist,
+        ValueError at an undamped resonance.
+        """
+        b = self.B[:, _place(self.inputs, input, "input")]
+        rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
+        frequencies = np.atleast_1d(np.asarray(omega, float))
+        out, unit = np.empty((len(frequencies), len(rows)), complex), np.eye(len(self.A))
+        for i, frequency in enumerate(frequencies):
+            try:
+                out[i] = self.C[rows] @ np.linalg.solve(1j * frequency * unit - self.A, b)
+            except np.linalg.LinAlgError:
+                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite") from None
+        return out
+
+    def marker_shape(self, mode: Mode, marker: str) -> Complex:
+        """Displacement and rotation vector (6,) of a marker, World axes, in a mode as `Mode.shape` scales it."""
+        first = _place(self.outputs, f"{marker}.x", "output")
+        return self.C[first : first + 6, : len(self.rates)] @ mode.shape
+
+    def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
+        """The state displaced along a mode, its largest displacement `size` (rad, m), for display; `phase` in rad."""
+        xi = np.real(mode.shape * size * np.exp(1j * phase))
+        return State(self.state.q + self.motion @ xi, self.state.u.copy(), self.state.t)
+
+    def to_scipy(self) -> Any:
+        """As `scipy.signal.StateSpace`."""
+        from scipy.signal import StateSpace
+
+        return StateSpace(self.A, self.B, self.C, self.D)
+
+    def to_control(self) -> Any:
+        """As a named `control.StateSpace`; ImportError where python-control is not installed."""
+        try:
+            import control
+        except ImportError:
+            raise ImportError("python-control is not installed: pip install control, or use to_scipy()") from None
+        names = {key: [name for name, _ in getattr(self, key)] for key in ("states", "inputs", "outputs")}
+        return control.ss(self.A, self.B, self.C, self.D, **names)
+
+    def save(self, path: Path | str) -> Path:
+        """Matrices, names, units and eigenvalues as `.npz` or `.mat`; ValueError for another ending."""
+        path = Path(path)
+        data: dict[str, Any] = {key: getattr(self, key) for key in ("A", "B", "C", "D", "mass", "eigenvalues")}
+        for key in ("states", "inputs", "outputs"):
+            data[key] = np.array([f"{name} [{unit}]" for name, unit in getattr(self, key)], dtype=np.str_)
+        if path.suffix not in (".npz", ".mat"):
+            raise ValueError(f"{path}: linear models are written as .npz or .mat")
+        path.parent.mkdir(parents=True, exist_ok=True)
+        if path.suffix == ".npz":
+            np.savez(path, **data)
+        else:
+            from scipy.io import savemat
+
+            cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
+            savemat(path, data | cells)
+        return path
+
+    @cached_property
+    def _decomposition(self) -> tuple[Complex, Complex, Real]:
+        """Eigenvalues by modulus, right eigenvectors, and bounds n u |A| / |y'x| of what rounding of A changes.
+
+        Of the matrix balanced by powers of two, hence without rounding: entries of A differ by squares of frequencies.
+        """
+        balanced, (scale, _) = matrix_balance(self.A, permute=False, separate=1)
+        values, left, right = eig(balanced, left=True, right=True)
+        overlap = np.abs(np.sum(left.conj() * right, axis=0))
+        size = len(values) * ROUNDOFF * np.linalg.norm(balanced, 2)
+        tolerance = size / np.maximum(overlap, np.sqrt(ROUNDOFF))
+        order = np.lexsort((-values.imag, np.abs(values)))
+        return values[order], (scale[:, None] * right)[:, order], tolerance[order]
+
+
+def _place(names: tuple[tuple[str, str], ...], name: str, kind: str) -> int:
+    known = [found for found, _ in names]
+    if name not in known:
+        raise KeyError(f"no {kind} {name!r}; there are {', '.join(known)}")
+    return known.index(name)

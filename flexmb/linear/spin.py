@@ -1,0 +1,68 @@
+"""Steady spins: one hinge or wheel turns at a constant rate, and nothing else accelerates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexmb.linear.equilibrium import balanced
+from flexmb.linear.linearize import linear_model
+from flexmb.linear.model import LinearModel
+from flexmb.linear.variations import Equations
+from flexmb.scene.schema import Revolute, Scene
+from flexmb.state import State
+from flexmb.system import System, compile
+
+DEPENDENT = 1e-9  # change of the accelerations with the angle, part of their derivatives' size
+
+
+@dataclass(frozen=True, eq=False)
+class SteadySpin:
+    """A relative equilibrium: `state` with `hinge` at `rate` (rad/s), which is driven, other wheels at their speeds."""
+
+    hinge: str
+    rate: float
+    state: State
+    equations: Equations
+
+    def linearize(self) -> LinearModel:
+        """The linear model about it: displacements seen from the turning bodies. Its coefficients are constant."""
+        return linear_model(self.equations, self.state)
+
+
+def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | None = None) -> SteadySpin:
+    """The deformation in which nothing accelerates while `hinge` (revolute, or a wheel) turns at `rate` (rad/s).
+
+    Whatever else turns it in the scene is replaced by this drive; other prescribed coordinates stand still, other
+    wheels keep the speeds they have in the guess (default: the initial state), other speeds are zero. ValueError where
+    the motion of what turns depends on the angle (gravity across the axis, loads in World axes): there is no steady
+    spin. EquilibriumError where no deformation is found.
+    """
+    if isinstance(system, Scene):
+        system = compile(system)
+    base = Equations(system)  # before all else: it refuses closed chains
+    guess = system.initial_state if guess is None else guess
+    speed = _turning(system, hinge)
+    equations = base.spinning(speed, rate, guess)
+    u = np.zeros(system.nu)
+    for wheel in system.scene.wheels:
+        u[system.speed(wheel.name)] = guess.u[system.speed(wheel.name)]
+    state = balanced(equations, State(guess.q, u, guess.t))
+    at = equations.variations(state)
+    size = np.sum(np.abs(at.by_displacement), axis=1) + rate**2
+    if np.any(np.abs(at.drift) > DEPENDENT * abs(rate) * size):
+        raise ValueError(
+            f'"{hinge}": what turns feels the angle it is at (gravity across the axis, or a load in World axes): no '
+            "deformation is steady; remove gravity, or linearize about the states of a run"
+        )
+    return SteadySpin(hinge, rate, state, equations)
+
+
+def _turning(system: System, hinge: str) -> int:
+    """Number of the speed of a hinge or wheel with one angle; ValueError for others."""
+    angles = [found.name for found in system.scene.hinges if isinstance(found, Revolute)]
+    angles += [wheel.name for wheel in system.scene.wheels]
+    if hinge not in angles:
+        raise ValueError(f"{hinge!r} does not spin about one axis; there are {', '.join(angles) or 'none'}")
+    return system.speed(hinge).start

@@ -1,0 +1,140 @@
+"""Static and relative equilibria against closed forms, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import flexmb as fm
+from flexmb.scene.shapes import beam_section
+from tests import trees
+from tests.bounds import UNIT_ROUNDOFF
+
+ROUNDING = 2.0**10 * UNIT_ROUNDOFF
+G = 9.81
+
+
+def pendulum(angle: float, **hinge) -> fm.Scene:
+    return (
+        fm.SceneBuilder("pendulum", gravity=(0.0, 0.0, -G))
+        .rigid_body("bob", mass=2.0, com=(0.7, 0.0, 0.0), inertia=(0.05, 0.05, 0.05))
+        .revolute("pivot", "ground", "bob", axis=(0.0, 1.0, 0.0), angle=angle, **hinge)
+        .scene()
+    )
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3, 1.5, 3.0])
+def test_pendulum_hangs(angle):
+    """Also from where Newton's method has no direction to go (0: gravity does not stiffen)."""
+    found = fm.equilibrium(pendulum(angle))
+    assert found.q[0] == pytest.approx(np.pi / 2, rel=ROUNDING)
+    assert fm.linearize(fm.compile(pendulum(angle)), found).stability.verdict == "neutral"
+
+
+def test_pendulum_on_a_spring():
+    """k theta = m g l cos(theta), starting at speed: an equilibrium has none."""
+    found = fm.equilibrium(pendulum(0.0, stiffness=15.0, rate=2.0))
+    expected = brentq(lambda x: 15.0 * x - 2.0 * G * 0.7 * np.cos(x), 0.0, 1.5, xtol=1e-15)
+    assert found.q[0] == pytest.approx(expected, rel=ROUNDING)
+    assert not found.u.any()
+
+
+@pytest.mark.parametrize("level", ["ruthless", "full", "stiffened"])
+def test_cantilever_sags(level):
+    """K eta = gravity on the modes, at levels where nothing stiffens; Euler's w = rho A g L^4 / 8 EI at its tip."""
+    section = beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7, Iz=1e-7, rho=2700.0)
+    scene = (
+        fm.SceneBuilder("cantilever", gravity=(0.0, -0.01, 0.0))
+        .beam("beam", length=8.0, elements=16, section=section, modes=8, level=level, points="line")
+        .weld("clamp", "ground", "beam")
+        .marker("tip", "beam", node="tip")
+        .scene()
+    )
+    system = fm.compile(scene)
+    found = fm.equilibrium(system)
+    tip = system.evaluate(found.t, found.q, found.u).markers["tip"].position
+    w = 2.7 * 0.01 * 8.0**4 / (8.0 * 7e10 * 1e-7)
+    # markers move with the true deformation; four bending modes a plane leave out 1e-5 of it, finite deflection w^2/L^2
+    assert tip[1] == pytest.approx(-w, rel=1e-4)
+    model = fm.linearize(system, found, held=True)
+    assert np.max(np.abs(model.rates)) <= ROUNDING * np.max(np.abs(model.A)) * np.max(np.abs(found.q))
+
+
+@pytest.mark.parametrize("seed", [0, 2, 4])
+def test_random_trees_come_to_rest(seed):
+    """Springs, balls, modes, wheels without springs, point masses, gravity: nothing accelerates any more."""
+    hinges = ("spherical", "revolute", "prismatic", "universal")
+    recipe = replace(trees.CONSERVATIVE, hinges=hinges, bodies=5, point_masses=1)
+    system = fm.compile(trees.random_scene(seed, recipe))
+    found = fm.equilibrium(system)
+    model = fm.linearize(system, found, held=True)
+    started = fm.linearize(system, system.initial_state, held=True)
+    assert np.max(np.abs(model.rates)) <= 1e-9 * np.max(np.abs(started.rates))
+    assert model.stability.verdict == "neutral"  # an undamped one that is stable
+    wheel = system.coordinate("w0")
+    assert found.q[wheel] == system.initial_state.q[wheel]
+
+
+def test_what_falls_is_refused():
+    scene = fm.SceneBuilder("stone", gravity=(0.0, 0.0, -G)).rigid_body("stone", mass=2.0, inertia=(1.0, 1.0, 1.0))
+    with pytest.raises(fm.EquilibriumError, match=r"-19\.6 N.*fly\.position\.z"):
+        fm.equilibrium(scene.free("fly", "ground", "stone").scene())
+
+
+def test_closed_chains_are_refused():
+    scene = (
+        fm.SceneBuilder("loop")
+        .rigid_body("bar", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+        .revolute("h", "ground", "bar")
+        .closure("c", "revolute", "ground", "bar")
+        .scene()
+    )
+    for call in (fm.linearize, fm.equilibrium):
+        with pytest.raises(NotImplementedError, match="closures"):
+            call(scene)
+
+
+def bead(k: float = 50.0, gravity=(0.0, 0.0, 0.0)) -> fm.Scene:
+    """A mass on a radial spring, at rest at radius 1."""
+    return (
+        fm.SceneBuilder("centrifuge", gravity=gravity)
+        .rigid_body("rail", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        .rigid_body("bead", mass=2.0, inertia=(0.1, 0.1, 0.1))
+        .revolute("drive", "ground", "rail")
+        .prismatic("slide", "rail", "bead", axis=(1, 0, 0), stiffness=k, rest=0.0, parent_position=(1, 0, 0))
+        .marker("centre", "bead")
+        .scene()
+    )
+
+
+def test_bead_on_a_spinning_rail():
+    """r = k r0 / (k - m Omega^2); w^2 = k/m - Omega^2. The hinge is free in the scene, driven in the spin."""
+    Omega = 3.0
+    spin = fm.steady_spin(bead(), "drive", Omega)
+    assert 1.0 + spin.state.q[1] == pytest.approx(50.0 / (50.0 - 2.0 * Omega**2), rel=ROUNDING)
+    model = spin.linearize()
+    assert model.displacements == ("slide.translation",)
+    assert model.modes[0].frequency_rad_s == pytest.approx(np.sqrt(25.0 - Omega**2), rel=ROUNDING)
+
+
+def test_spin_along_gravity_and_across():
+    assert fm.steady_spin(bead(gravity=(0.0, 0.0, -G)), "drive", 2.0).state.q[1] > 0.0
+    with pytest.raises(ValueError, match='"drive".*angle'):
+        fm.steady_spin(bead(gravity=(0.0, -1e-3, 0.0)), "drive", 2.0)
+
+
+def test_hinges_that_do_not_spin_are_named():
+    with pytest.raises(ValueError, match="'slide'.*drive"):
+        fm.steady_spin(bead(), "slide", 1.0)
+
+
+def test_rail_too_fast_for_its_spring():
+    """Above sqrt(k/m) the only equilibrium is on the other side, unstable."""
+    spin = fm.steady_spin(bead(), "drive", 6.0)
+    assert 1.0 + spin.state.q[1] == pytest.approx(50.0 / (50.0 - 2.0 * 36.0), rel=ROUNDING)
+    assert spin.linearize().stability.verdict == "unstable"
+    with pytest.raises(fm.EquilibriumError):
+        fm.steady_spin(bead(), "drive", 5.0)

@@ -1,0 +1,138 @@
+"""Eigenvalues of linear models against closed forms and against the modal data they are made from."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import flexmb as fm
+from flexmb.scene.shapes import beam_section
+from tests.bounds import UNIT_ROUNDOFF
+
+ROUNDING = 2.0**10 * UNIT_ROUNDOFF  # of some hundred operations, each on numbers of the size of the result
+G = 9.81
+
+
+def section(flat: float = 1.0):
+    return beam_section(E=7e10, G=2.7e10, A=1e-3, Iy=2e-7 * flat, Iz=1e-7, rho=2700.0)
+
+
+def frequencies(model: fm.LinearModel) -> np.ndarray:
+    return np.array([mode.frequency_rad_s for mode in model.modes if mode.frequency_rad_s > 0.0])
+
+
+def pendulum(**hinge) -> fm.Scene:
+    return (
+        fm.SceneBuilder("pendulum", gravity=(G, 0.0, 0.0))
+        .rigid_body("bob", mass=2.0, com=(0.7, 0.0, 0.0), inertia=(0.05, 0.05, 0.05))
+        .revolute("pivot", "ground", "bob", **hinge)
+        .marker("centre", "bob", offset=(0.7, 0.0, 0.0))
+        .scene()
+    )
+
+
+def test_damped_pendulum():
+    """lambda^2 + 2 zeta w0 lambda + w0^2 = 0, by names: one displacement, one speed, one input."""
+    k, d, inertia = 3.0, 0.8, 0.05 + 2.0 * 0.7**2
+    model = fm.linearize(pendulum(stiffness=k, damping=d))
+    w0 = np.sqrt((k + 2.0 * G * 0.7) / inertia)
+    (mode,) = model.modes
+    assert mode.natural_rad_s == pytest.approx(w0, rel=ROUNDING)
+    assert mode.damping_ratio == pytest.approx(d / (2.0 * inertia * w0), rel=ROUNDING)
+    assert mode.frequency_hz == pytest.approx(w0 * np.sqrt(1.0 - mode.damping_ratio**2) / (2.0 * np.pi), rel=ROUNDING)
+    assert [name for name, _ in model.states] == ["pivot.rotation", "pivot.rotation.rate"]
+    assert model.inputs == (("pivot.rotation", "N m"),)
+    assert model.stability.verdict == "asymptotically stable"
+    assert not model.rates.any()
+
+
+def test_pendulum_upside_down():
+    model = fm.linearize(pendulum(angle=np.pi))
+    growth = np.sqrt(2.0 * G * 0.7 / (0.05 + 2.0 * 0.7**2))
+    np.testing.assert_allclose(sorted(model.eigenvalues.real), [-growth, growth], rtol=ROUNDING)
+    assert model.stability.verdict == "unstable"
+    assert "unstable: largest real part" in str(model.stability)
+
+
+def test_double_pendulum():
+    """Two point masses on strings of equal length: w^2 = (2 +- sqrt 2) g / l."""
+    scene = fm.SceneBuilder("double pendulum", gravity=(G, 0.0, 0.0))
+    for name, parent, at in (("a", "ground", 0.0), ("b", "a", 1.0)):
+        scene.rigid_body(name, mass=1.0, com=(1.0, 0.0, 0.0), inertia=(0.0, 0.0, 0.0))
+        scene.revolute(f"h{name}", parent, name, parent_position=(at, 0.0, 0.0))
+    model = fm.linearize(scene.scene())
+    expected = np.sqrt((2.0 + np.array([-1.0, 1.0]) * np.sqrt(2.0)) * G)
+    np.testing.assert_allclose(frequencies(model), expected, rtol=ROUNDING)
+    ratio = model.modes[0].shape[1] / model.modes[0].shape[0]  # b relative to a: sqrt 2 - 1
+    assert ratio == pytest.approx(np.sqrt(2.0) - 1.0, rel=ROUNDING)
+    assert model.modes[0].participation.sum() == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("level", ["ruthless", "linear", "full", "stiffened"])
+def test_clamped_beam_has_its_modal_frequencies(level):
+    """Those of its own K and M to rounding, and (beta L)^2 sqrt(EI / rho A L^4) as far as 16 elements know them."""
+    scene = (
+        fm.SceneBuilder("cantilever")
+        .beam("beam", length=8.0, elements=16, section=section(), modes=6, level=level, points="line")
+        .weld("clamp", "ground", "beam")
+        .scene()
+    )
+    system = fm.compile(scene)
+    found = frequencies(fm.linearize(system))
+    pair = system.constants.pair[0]
+    expected = np.sqrt(eigh(pair["stiffness"], pair["mff"], eigvals_only=True))
+    np.testing.assert_allclose(found, expected, rtol=ROUNDING * expected[-1] / expected[0])
+    exact = 1.875104069**2 * np.sqrt(7e10 * 1e-7 / (2.7 * 8.0**4))
+    assert found[0] == pytest.approx(exact, rel=1e-5)
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_free_asymmetric_body_about_its_axes(axis):
+    """+- Omega sqrt((I_a - I_c)(I_c - I_b) / (I_a I_b)): real about the intermediate axis only; in turning axes a
+    displacement turns with -Omega."""
+    I, Omega = np.array([1.5, 2.0, 3.0]), 1.3
+    spin = Omega * np.eye(3)[axis]
+    scene = fm.SceneBuilder("top").rigid_body("body", mass=2.0, inertia=tuple(I))
+    model = fm.linearize(scene.free("fly", "ground", "body", angular_velocity=spin).scene())
+    a, b = (i for i in range(3) if i != axis)
+    square = Omega**2 * (I[a] - I[axis]) * (I[axis] - I[b]) / (I[a] * I[b])
+    root = np.emath.sqrt(square)
+    assert len(model.eigenvalues) == 12  # 6 displacements, no quaternion's norm
+    assert np.min(np.abs(model.eigenvalues - root)) < 1e-14
+    others = {round(abs(x.imag), 5) for x in model.eigenvalues if abs(x - root) > 1e-6 and abs(x + root) > 1e-6}
+    assert others == {0.0, Omega}
+    assert model.stability.verdict == ("unstable" if axis == 1 else "neutral")
+    assert not model.rates.any()
+
+
+def test_gyrostat_nutates():
+    """A body at rest with a wheel: h / I_t, the wheel's momentum over the transverse inertia of both."""
+    speed, axial, transverse, I_t = 40.0, 0.02, 0.011, 3.0
+    scene = (
+        fm.SceneBuilder("gyrostat")
+        .rigid_body("bus", mass=10.0, inertia=(I_t, I_t, 2.0))
+        .free("fly", "ground", "bus")
+        .wheel("w", "bus", axis=(0, 0, 1), mass=0.0, axial_inertia=axial, transverse_inertia=transverse, speed=speed)
+        .scene()
+    )
+    model = fm.linearize(scene)
+    assert model.modes[-1].frequency_rad_s == pytest.approx(axial * speed / (I_t + transverse), rel=ROUNDING)
+    assert model.stability.verdict == "neutral"
+    (place,) = [i for i, (name, _) in enumerate(model.inputs) if name == "w.angle"]
+    b = model.B[len(model.rates) :, place]
+    np.testing.assert_allclose(b[[2, 6]], [-1.0 / 2.0, 1.0 / axial + 1.0 / 2.0], rtol=ROUNDING)
+
+
+def test_spherical_pendulum_is_two_plane_ones():
+    """A rotation vector stands for the quaternion: three displacements, one of them without a frequency."""
+    scene = (
+        fm.SceneBuilder("spherical", gravity=(G, 0.0, 0.0))
+        .rigid_body("bob", mass=2.0, com=(0.7, 0.0, 0.0), inertia=(0.03, 0.04, 0.05))
+        .spherical("pivot", "ground", "bob", stiffness=0.0)
+        .scene()
+    )
+    model = fm.linearize(scene)
+    assert model.displacements == ("pivot.rotation.x", "pivot.rotation.y", "pivot.rotation.z")
+    expected = sorted(np.sqrt(2.0 * G * 0.7 / (I + 2.0 * 0.7**2)) for I in (0.04, 0.05))
+    np.testing.assert_allclose(frequencies(model), expected, rtol=ROUNDING)
