@@ -131,9 +131,9 @@ class Variant(_Strict, frozen=True, kw_only=True):
 
     `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes), "segments" (every
     beam, or `split_body` only, as `segments` rigid segments) or "substructures" (likewise as `pieces` flexible pieces
-    welded together). `level` replaces the level of every flexible body. `engines` are compared engine by engine; those
-    in `also` run the variant too, for its charts and for what names them. `duration_s` and `samples` replace the
-    case's. `note` is shown in the report.
+    welded together, each with `eigenmodes` besides its attachment modes). `level` replaces the level of every flexible
+    body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
+    names them. `duration_s` and `samples` replace the case's. `note` is shown in the report.
     """
 
     name: str
@@ -141,6 +141,7 @@ class Variant(_Strict, frozen=True, kw_only=True):
     transform: Transform = "none"
     segments: int | None = None
     pieces: int | None = None
+    eigenmodes: int = 0
     split_body: str | None = None
     level: Level | None = None
     refined: Refined | None = None
@@ -282,6 +283,8 @@ def _check_variant(variant: Variant, where: str) -> None:
         _require(given == (variant.transform == transform), f"{where}.{key}", f'give it exactly with "{transform}"')
         finer = variant.refined is not None and getattr(variant.refined, key) is not None
         _require(given or not finer, f"{where}.refined.{key}", f'give it with "{transform}" only')
+    pieces = variant.transform == "substructures"
+    _require(pieces or not variant.eigenmodes, f"{where}.eigenmodes", 'give it with "substructures" only')
     split = variant.transform in ("segments", "substructures")
     _require(split or variant.split_body is None, f"{where}.split_body", 'give it with "segments" or "substructures"')
     for i, ladder in enumerate(variant.efforts):

@@ -92,7 +92,7 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "segments":
             return finite_segments(scene, variant.split_body, variant.segments)
         case "substructures":
-            return substructured(scene, variant.split_body, variant.pieces)
+            return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
     return scene
 
 

@@ -155,7 +155,8 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
     for variant in case.run.variants:
         if variant.refined is None:
             continue
-        ratio = variant.refined.segments / variant.segments if variant.refined.segments else 2.0
+        counts = [(getattr(variant, key), getattr(variant.refined, key)) for key in ("segments", "pieces")]
+        ratio = next((fine / coarse for coarse, fine in counts if fine is not None), 2.0)
         for engine in variant.engines:
             main, refined = results.get((variant.name, engine, "main")), results.get((variant.name, engine, "refined"))
             if main is not None and refined is not None and refined.status == "finished":

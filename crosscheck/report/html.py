@@ -86,16 +86,20 @@ def _variant_view(case: CaseResults, variant: Any) -> dict[str, Any]:
         "name": variant.name,
         "level": info.level,
         "engines": ", ".join(variant.engines),
-        "how": "" if variant.transform == "none" else _transformation(variant),
+        "how": _transformation(variant),
         "duration": variant.duration_s or case.case.run.duration_s,
         "note": info.error or variant.note,
     }
 
 
 def _transformation(variant: Any) -> str:
-    if variant.transform == "segments":
-        return f"{variant.segments} rigid segments per flexible body"
-    return {"rigidify": "flexible bodies made rigid", "modal_points": "beams as points and modes"}[variant.transform]
+    return {
+        "none": "",
+        "rigidify": "flexible bodies made rigid",
+        "modal_points": "beams as points and modes",
+        "segments": f"{variant.segments} rigid segments per beam",
+        "substructures": f"{variant.pieces} flexible pieces per beam",
+    }[variant.transform]
 
 
 def _timings(case: CaseResults) -> list[dict[str, Any]]:

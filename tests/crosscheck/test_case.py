@@ -43,6 +43,7 @@ def test_the_documented_example_is_valid() -> None:
         ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments: give it exactly"),
         ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces: give it exactly"),
         ("refined = { segments = 32 }", "refined = { pieces = 32 }", r"\$.variant\[2\].refined.pieces"),
+        ('scene = "flexible.toml"', "eigenmodes = 1", r"\$.variant\[1\].eigenmodes"),
         ('scene = "flexible.toml"', 'split_body = "a"', r"\$.variant\[1\].split_body"),
         ('engines = ["native"]', "engines = []", "name at least one engine"),
         ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also: native is among the engines already"),
@@ -153,13 +154,14 @@ def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
 def test_a_variant_of_pieces_is_refined_by_more_pieces() -> None:
     scene = beam_scene()
     variant = Variant(
-        name="pieces", transform="substructures", pieces=2, refined=Refined(pieces=3), level="linear",
+        name="pieces", transform="substructures", pieces=2, eigenmodes=1, refined=Refined(pieces=3), level="linear",
         engines=("native",),
     )  # fmt: skip
     coarse, fine = (variant_scene(scene, each) for each in (variant, refine(variant, variant.refined)))
     assert [body.name for body in coarse.bodies] == ["boom.p00", "boom.p01", "panel"]
     assert [body.name for body in fine.bodies] == ["boom.p00", "boom.p01", "boom.p02", "panel"]
     assert fine.bodies[0].level == "linear"
+    assert [body.modes.count for body in coarse.bodies[:2]] == [1, 1]
     elsewhere = msgspec.structs.replace(variant, split_body="panel")
     with pytest.raises(ValueError, match="no beam"):
         variant_scene(scene, elsewhere)

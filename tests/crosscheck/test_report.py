@@ -6,14 +6,16 @@ import base64
 import json
 import re
 from pathlib import Path
+from typing import get_args
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 
+from crosscheck.case import Transform, Variant
 from crosscheck.library import load_case
 from crosscheck.report import Outcome, write_all
-from crosscheck.report.html import _code
+from crosscheck.report.html import _code, _transformation
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.sweep import sweep
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
@@ -140,3 +142,9 @@ def test_the_summary_says_it_all(mixed: tuple[Outcome, Path], sound: tuple[Outco
 
 def test_backticks_become_code_and_nothing_else_becomes_markup() -> None:
     assert _code("as `a < b`, <b>not</b> bold") == "as <code>a &lt; b</code>, &lt;b&gt;not&lt;/b&gt; bold"
+
+
+@pytest.mark.parametrize("transform", get_args(Transform))
+def test_every_transformation_has_words(transform: str) -> None:
+    words = _transformation(Variant(name="a", engines=("native",), transform=transform, segments=7, pieces=7))
+    assert bool(words) == (transform != "none") and ("7" in words) == (transform in ("segments", "substructures"))
