@@ -18,11 +18,11 @@ from crosscheck.library import load_case
 from crosscheck.plan import variant_scene
 from crosscheck.report import write_all
 from crosscheck.sweep import sweep
+from flexmb.linear.equilibrium import equilibrium
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamBody, Scene
 from flexmb.simulation import simulate
-from flexmb.state import State
 from flexmb.surrogate import substructured
 from flexmb.system import System, compile
 
@@ -53,25 +53,8 @@ def tip_at_rest(system: System, loads: tuple[float, ...]) -> np.ndarray:
     """Position (3,) of the tip in static equilibrium under the last of `loads`, reached through the others."""
     state = system.initial_state
     for load in loads:
-        state = settled(system, system.state(state.q, state.u, load))
+        state = equilibrium(system, system.state(state.q, state.u, load))
     return system.evaluate(state.t, state.q, state.u).markers["tip"].position
-
-
-def settled(system: System, guess: State) -> State:
-    """The equilibrium near a guess: Newton's method for inverse dynamics = 0, the Jacobian by central differences."""
-    rest, q = np.zeros(system.nu), guess.q
-
-    def force(q: np.ndarray) -> np.ndarray:
-        return system.inverse_dynamics(system.state(q, rest, guess.t), rest)
-
-    step = 1e-6  # of modal coordinates of some 1e-2: the error of the Jacobian only slows the convergence
-    for _ in range(30):
-        columns = [(force(q + step * e) - force(q - step * e)) / (2.0 * step) for e in np.eye(len(q))]
-        change = np.linalg.solve(np.array(columns).T, -force(q))
-        q = q + change * min(1.0, 0.5 / np.abs(change).max())
-        if np.abs(change).max() < 1e-10:
-            return system.state(q, rest, guess.t)
-    raise AssertionError("no equilibrium found")
 
 
 @cache
