@@ -53,11 +53,10 @@ BODY = _record(
     ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
     ("placement_position", _F, (3,)),  # O+ in the parent's frame
     ("placement_rotation", _F, (9,)),  # R_parent_O+
-    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full, linear and
-    # stiffened: without the summed points
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
+    # without the summed points
     ("rigid", _F, (10,)),
     ("slope", _I),  # level linear: row of `slope`
-    ("second", _I),  # level stiffened: row of `second_moment`
     ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
     ("ball_spring", _F),  # stiffness of a spherical hinge
     ("point_start", _I),
@@ -76,7 +75,7 @@ MODE = _record(  # mode n of a body
 )
 PAIR = _record(  # modes n, i of a body
     ("mff", _F),  # modal mass matrix
-    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'; level stiffened: sum m (phi_n phi_i' + G_ni r')
+    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'
     ("stiffness", _F),
     ("damping", _F),
 )
@@ -85,11 +84,13 @@ SLOPE = _record(  # level linear: mode n of a body by eta_k
     ("coriolis", _F, (3,)),  # C1_kn - C1_nk, velocity-dependent force w . coriolis etad_k on the mode
     ("gyration", _F, (6,)),  # symmetric G_nk = 1/2 d2J/(deta_n deta_k)
 )
-POINT = _record(  # summed at run time: points with rotating inertia or an offset mass centre; level linear: wheels
-    ("mass", _F),  # 0 where the mass is in the polynomial part
+# Summed at run time: points with rotating inertia or an offset mass centre; level linear: wheels; level stiffened: all.
+POINT = _record(
+    ("mass", _F),  # 0 where the mass is in the polynomial part, or in points of its own
     ("position", _F, (3,)),
     ("offset", _F, (3,)),  # mass centre from the point, in point axes
     ("inertia", _F, (6,)),  # about the mass centre
+    ("turning", _I),  # whether it has an inertia or an offset
     ("second", _I),  # level stiffened: row of `second_shape`, else -1
 )
 PORT = _record(
@@ -145,7 +146,6 @@ class Constants:
     point_mode: Record  # (S,m) SHAPE
     port: Record  # (P,) PORT
     port_mode: Record  # (P,m) SHAPE
-    second_moment: Real  # (bodies of level stiffened,m,m,3) sum m G_ni
     second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flexmb import arrays as a
 from flexmb.links import Link
 from flexmb.modal.first_order import FirstOrder, first_order, inertia_slope
-from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
+from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals, stacked, still_points
 from flexmb.modal.model import FlexibleModel, SecondOrder
 
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -28,7 +28,6 @@ class _Body:
     slope: a.Record | None
     mass_slope: a.Real | None
     summed: TurningPoints | None
-    second_moment: a.Real | None = None
 
 
 def inertia_arrays(
@@ -48,18 +47,15 @@ def inertia_arrays(
     mass_slopes = [each.mass_slope for each in bodies]
     body["slope"], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
     body["mass_slope"], mass_slope = _rows(mass_slopes, np.zeros((m, m, m)))
-    body["second"], second_moment = _rows([each.second_moment for each in bodies], np.zeros((m, m, 3)))
     turning = [(p, i) for p in (each.summed for each in bodies) if p is not None for i in range(len(p.mass))]
     group(body, "point", [0 if each.summed is None else len(each.summed.mass) for each in bodies])
     point = np.zeros(len(turning), a.POINT)
     for row, (p, i) in zip(point, turning, strict=True):
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
         row["inertia"] = six(p.inertia[i])
+        row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))
     shapes = shape_records([(p.translation[i], p.rotation[i]) for p, i in turning], m)
-    tables = {
-        "body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope,
-        "second_moment": second_moment,
-    }  # fmt: skip
+    tables = {"body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope}
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
     return tables, {"point": point, "point_mode": shapes}, seconds
 
@@ -126,7 +122,7 @@ def _tables(link: Link) -> _Body:
     if link.level == a.FULL:
         return _full(integrals, mode, pair)
     if link.level == a.STIFFENED:
-        return _stiffened(integrals, mode, pair)
+        return _stiffened(link, integrals, mode, pair)
     return _at_rest(link, integrals, mode, pair)
 
 
@@ -138,11 +134,10 @@ def _full(i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
     return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, None, None, i.turning)
 
 
-def _stiffened(i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
-    """That of level full with the integrals of the second-order field."""
-    full = _full(i, mode, pair)
-    pair["product"] += i.Q.reshape(*pair.shape, 9)  # type: ignore[union-attr]  # the level asks for a field
-    return replace(full, second_moment=i.Z)
+def _stiffened(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
+    """Every mass is a point to be summed, what turns another; the tables have the masses at rest."""
+    masses = np.flatnonzero((link.model.mass > 0.0) & ~np.any(link.model.com_offset != 0.0, axis=1))
+    return replace(_full(i, mode, pair), summed=stacked(still_points(link.model, masses), i.turning))
 
 
 def _at_rest(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:

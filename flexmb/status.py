@@ -28,8 +28,8 @@ _ADVICE = {
     Status.OK: "finished",
     Status.NOT_POSITIVE_DEFINITE: (
         "the inertia of body {body} with all it carries is not positive definite: it moves without mass, its gimbal is "
-        "at its singular angle, or its mass matrix, cut off at levels linear and stiffened, left its range of validity;"
-        ' give it mass, use a spherical hinge, or use level "full"'
+        "at its singular angle, or its first-order mass matrix left its range of validity; give it mass, use a "
+        'spherical hinge, or use level "full"'
     ),
     Status.NONFINITE: (
         "the state is no longer finite: the motion diverged; look for an instability (level, negative stiffness or "

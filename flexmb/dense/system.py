@@ -1,8 +1,8 @@
 """Mass matrix, bias, accelerations, loads, energy and momentum of a scene as sums over its inertia points.
 
 At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
-Rodriguez, Appendix B); markers move with the true deformation. Bodies of levels linear and stiffened are not summed
-point by point: each has a modal mass matrix and bias that are cut off (`flexmb.dense.truncated`).
+Rodriguez, Appendix B); markers move with the true deformation. Bodies of level linear are not summed point by point:
+each has a modal mass matrix and bias of first order (`flexmb.dense.first_order`).
 """
 
 from __future__ import annotations
@@ -15,11 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from flexmb.dense.first_order import FirstOrderBody, body_jacobian, first_order_body
 from flexmb.dense.jets import Frame
 from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames, points, seat_frame
 from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Scalar, Seat, Tree, build, untruncated_tree
-from flexmb.dense.truncated import TruncatedBody, body_jacobian, truncated_body
+from flexmb.dense.tree import Scalar, Seat, Tree, build
 from flexmb.scene import schema as s
 
 Array = NDArray[np.float64]
@@ -59,10 +59,10 @@ class Snapshot:
         return point_frames(self._tree, self._frames, self._motion).first
 
     @property
-    def truncated(self) -> dict[int, TruncatedBody]:
-        """Members whose mass matrix is cut off, by number."""
+    def first_order(self) -> dict[int, FirstOrderBody]:
+        """Members of level linear by number."""
         tree = self._tree
-        return {k: truncated_body(tree, k, self._frames[k], self._motion) for k in tree.truncated}
+        return {k: first_order_body(tree, k, self._frames[k], self._motion) for k in tree.linear}
 
     def seat(self, k: int, seat: Seat) -> Frame:
         """One frame on member k."""
@@ -80,16 +80,11 @@ class SiteMotion(NamedTuple):
 
 
 class DenseSystem:
-    """A scene for the dense route. q and u are ordered as in `flexmb.dense.tree`; SI, World axes.
+    """A scene for the dense route. q and u are ordered as in `flexmb.dense.tree`; SI, World axes."""
 
-    `untruncated`: level stiffened by its definition, all products of the second-order field kept.
-    """
-
-    def __init__(self, scene: s.Scene, folder: Path | None = None, untruncated: bool = False) -> None:
+    def __init__(self, scene: s.Scene, folder: Path | None = None) -> None:
         self.scene = scene
         self.tree: Tree = build(scene, folder)
-        if untruncated:
-            self.tree = untruncated_tree(self.tree)
         self.nq, self.nu = self.tree.nq, self.tree.nu
         self._gravity = np.array(scene.gravity_m_s2)
 
@@ -100,26 +95,26 @@ class DenseSystem:
 
     @cached_property
     def _summed(self) -> Points:
-        """The same without the elements of truncated bodies; of their wheels the rotary inertia is left."""
-        truncated = np.isin(self.points.member, self.tree.truncated)
+        """The same without the elements of bodies of level linear; of their wheels the rotary inertia is left."""
+        truncated = np.isin(self.points.member, self.tree.linear)
         elements = truncated & (np.arange(len(truncated)) < len(truncated) - len(self.tree.rotors))
         inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
         return Points(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
 
     def mass_matrix(self, q: Array) -> Array:
-        """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of truncated bodies."""
+        """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of bodies of level linear."""
         J, now = self._jacobian(q), self._at(q)
         M = np.einsum("p,pai,paj->ij", self._summed.mass, J.linear, J.linear)
         M += np.einsum("pai,pab,pbj->ij", J.angular, _turned(self._summed, now.points), J.angular)
         S = self._body_jacobians(q)
-        return M + sum((S[k].T @ body.M @ S[k] for k, body in now.truncated.items()), start=np.zeros_like(M))
+        return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
 
     def bias(self, q: Array, u: Array, t: float = 0.0) -> Array:
         """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes."""
         J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
         inertial = self._inertial(now, self._summed)
         c = np.einsum("pai,pa->i", J.linear, inertial.force) + np.einsum("pai,pa->i", J.angular, inertial.torque)
-        for k, body in now.truncated.items():
+        for k, body in now.first_order.items():
             c += S[k].T @ body.force(self._gravity)
         for name, load in self._loads(q, t).items():
             site = self._site_jacobian(f"load:{name}", q)
@@ -179,7 +174,7 @@ class DenseSystem:
         q, u = self.on_profile(q, u, t)
         now = self._seen(q, u, rates)
         inertial, loads = self._inertial(now, self._summed), self._loads(q, t)
-        bodies = {k: Wrenches(*body.world(body.force(self._gravity))) for k, body in now.truncated.items()}
+        bodies = {k: Wrenches(*body.world(body.force(self._gravity))) for k, body in now.first_order.items()}
         found = {}
         for k, member in enumerate(self.tree.members):
             outboard = self._outboard(k)
@@ -218,7 +213,7 @@ class DenseSystem:
     def energy(self, q: Array, u: Array) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
         now = self._at(q, u)
-        frames, bodies = now.points, now.truncated.values()
+        frames, bodies = now.points, now.first_order.values()
         w, v = frames.angular_velocity(), frames.position.rate
         mass, inertia = self._summed.mass, _turned(self._summed, frames)
         first_moment = mass @ frames.position.value + sum((body.mass_moment() for body in bodies), start=np.zeros(3))
@@ -245,7 +240,7 @@ class DenseSystem:
         spin = np.einsum("pab,pb->pa", _turned(self._summed, frames), frames.angular_velocity())
         linear = self._summed.mass[:, None] * frames.position.rate
         total = Wrenches(spin, linear, frames.position.value).about(np.zeros(3), np.ones(len(linear), dtype=bool))
-        for body in now.truncated.values():
+        for body in now.first_order.values():
             total += Wrenches(*body.world(body.M @ body.speeds)).about(np.zeros(3), np.array([True]))
         return total
 
@@ -283,9 +278,9 @@ class DenseSystem:
         return _columns(point_frames(self.tree, member_frames(self.tree, motion), motion))
 
     def _body_jacobians(self, q: Array) -> dict[int, Array]:
-        """Of truncated bodies by number, (m+6,nu)."""
-        frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.truncated else []
-        return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.truncated}
+        """Of the bodies of level linear by number, (m+6,nu)."""
+        frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.linear else []
+        return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.linear}
 
     def _site_jacobian(self, name: str, q: Array) -> Jacobian:
         """Of one load's node."""

@@ -22,7 +22,6 @@ from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_fra
 Array = NDArray[np.float64]
 
 LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
-TRUNCATED = ("linear", "stiffened")
 
 
 @dataclass(frozen=True)
@@ -95,9 +94,9 @@ class Tree:
     nu: int
 
     @property
-    def truncated(self) -> list[int]:
-        """Numbers of the members whose mass matrix is cut off."""
-        return [k for k, member in enumerate(self.members) if member.level in TRUNCATED]
+    def linear(self) -> list[int]:
+        """Numbers of the members of level linear."""
+        return [k for k, member in enumerate(self.members) if member.level == "linear"]
 
     def index(self, name: str) -> int:
         """Number of a member; -1 for the ground."""
@@ -125,12 +124,6 @@ def build(scene: s.Scene, folder: Path | None = None) -> Tree:
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
     return replace(tree, sites=sites)
-
-
-def untruncated_tree(tree: Tree) -> Tree:
-    """Bodies of level stiffened as those of level full, which are summed point by point, with their own field."""
-    members = [replace(m, level="full") if m.level == "stiffened" else m for m in tree.members]
-    return replace(tree, members=members)
 
 
 def hinge_sizes(hinge: s.Hinge | s.PointMass) -> tuple[int, int]:

@@ -174,9 +174,9 @@ def with_wheels(tree: Tree) -> Tree:
 
 
 def _wheel(tree: Tree, rotor: Rotor) -> Member:
-    """At levels linear and stiffened its mass is an element of the body that carries it, its own body has inertia."""
+    """At level linear a wheel's mass is an element of the body that carries it: its own body has inertia only."""
     wheel = rotor.wheel
-    mass = 0.0 if rotor.member in tree.truncated else wheel.mass_kg
+    mass = 0.0 if rotor.member in tree.linear else wheel.mass_kg
     model = rigid_model(mass, np.zeros(3), rotor.inertia, {"origin": ((0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0))})
     hinge = s.Revolute(name=wheel.name, parent=wheel.body, child=wheel.name, axis=wheel.axis)
     q, u, none = slice(rotor.q, rotor.q + 1), slice(rotor.u, rotor.u + 1), slice(0, 0)

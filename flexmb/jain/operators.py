@@ -261,14 +261,14 @@ class SpatialOperators:
         )
 
     def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Array) -> tuple[Array, Array]:
-        """M_m (nbar,nbar) and b_m (nbar,); levels linear and stiffened cut off, in the body's own frame."""
+        """M_m (nbar,nbar) and b_m (nbar,); level linear cut off after the first order, in its own body's frame."""
         M_m, b_m = np.zeros((len(V_m), len(V_m))), np.zeros(len(V_m))
         tree = self._dense.tree
-        truncated = Snapshot(tree, now.q, now.u, np.zeros(tree.nu)).truncated if tree.truncated else {}
+        linear = Snapshot(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}
         for k, at in enumerate(columns):
-            if k in truncated:
-                to_world = block_diag(np.eye(at.stop - at.start - 6), truncated[k].rotation, truncated[k].rotation)
-                M_m[at, at], b_m[at] = to_world @ truncated[k].M @ to_world.T, to_world @ truncated[k].bias
+            if k in linear:
+                to_world = block_diag(np.eye(at.stop - at.start - 6), linear[k].rotation, linear[k].rotation)
+                M_m[at, at], b_m[at] = to_world @ linear[k].M @ to_world.T, to_world @ linear[k].bias
             else:
                 body = now.nodal_body(k)
                 M_m[at, at], b_m[at] = body.M_m, body.b_m(V_m[at])

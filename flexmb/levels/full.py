@@ -26,13 +26,13 @@ from flexmb.spatial.vector import (
 
 
 @helper
-def axial(m):
+def _axial(m):
     """sum m_j b_j x a_j of a matrix sum m_j a_j b_j'."""
     return m[7] - m[5], m[2] - m[6], m[3] - m[1]
 
 
 @helper
-def mat_axpy(s, a, b):
+def _mat_axpy(s, a, b):
     """s A + B for 9-tuples."""
     return (
         s * a[0] + b[0],
@@ -72,19 +72,19 @@ def _polynomial(c, w, k):
         swirl = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m phi_n (phi etadot)'
         for i in range(nm):
             p1 = mat3(c.pair[k, n, i].product, 0)
-            p = mat_axpy(w.mode[k, i].eta, p1, p)
-            swirl = mat_axpy(w.mode[k, i].etad, p1, swirl)
+            p = _mat_axpy(w.mode[k, i].eta, p1, p)
+            swirl = _mat_axpy(w.mode[k, i].etad, p1, swirl)
             w.pff[k, n, i] = c.pair[k, n, i].mff
         translation = vec3(c.mode[k, n].mfr, 3)
-        store3(w.mode[k, n].pfr, 0, axial(p))
+        store3(w.mode[k, n].pfr, 0, _axial(p))
         store3(w.mode[k, n].pfr, 3, translation)
         centrifugal = dot(omega, times(p, omega)) - w2 * (p[0] + p[4] + p[8])
-        w.mode[k, n].zf = centrifugal + 2.0 * dot(omega, axial(swirl))
+        w.mode[k, n].zf = centrifugal + 2.0 * dot(omega, _axial(swirl))
         eta = w.mode[k, n].eta
         etad = w.mode[k, n].etad
         transposed = (p0[0], p0[3], p0[6], p0[1], p0[4], p0[7], p0[2], p0[5], p0[8])
-        stretch = mat_axpy(eta, transposed, mat_axpy(eta, p, stretch))
-        flow = mat_axpy(etad, p, flow)
+        stretch = _mat_axpy(eta, transposed, _mat_axpy(eta, p, stretch))
+        flow = _mat_axpy(etad, p, flow)
         s = axpy(eta, translation, s)
         momentum = axpy(etad, translation, momentum)
     xx, yy, zz = stretch[0], stretch[4], stretch[8]

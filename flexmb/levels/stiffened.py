@@ -1,94 +1,88 @@
-"""Level stiffened: level full with the second-order field u = phi eta + 1/2 eta' G eta, hence geometric stiffness.
+"""Level stiffened: level full with a second-order field, displacements phi eta + 1/2 eta' G eta.
 
-The kinetic energy of the masses is cut off after the terms of G that are of second order in (eta, etadot): it stays one
-function, and with r for places at rest and Z_ni = sum m G_ni
+The kinetic energy is the sum over inertia points that move so, all products kept: nothing is truncated, and it is
+positive. Centrifugal, gyroscopic and gravity stiffness follow from it, as the velocity of a point is
 
-    first moment   s     = s0 + sum eta_n L0_n + 1/2 sum eta_n eta_i Z_ni
-    coupling       L_n   = L0_n + sum eta_i Z_ni
-                   C_n   = C0_n + sum eta_i sum m (phi_i x phi_n + r x G_ni)
-    inertia        as that of full, with u r' + r u' of the whole displacement u
-    M_ff           constant
+    v + w x rho + sum_n (phi_n + (G eta)_n) etadot_n
 
-Lagrange's equations of it differ from those of full by sum m G_ni r' beside P1_ni = sum m phi_n phi_i', except in the
-Coriolis force on the modes, which has P1 alone, and by the force etadot' Z etadot with its torque sum m r x etadot' G
-etadot. Spin stiffens through the inertia; gravity, the acceleration of the ground, through s and L. What is dropped is
-of third order. Points that are summed move with the second-order field exactly.
+and its acceleration at wdot = vdot = etaddot = 0 is w x (w x rho) + 2 w x rho' + etadot' G etadot. The points of a beam
+are few (`flexmb.modal.equivalent`).
 """
 
 from flexmb.kernel import helper
-from flexmb.levels.full import axial, mat_axpy
 from flexmb.levels.summed_point import add_point
-from flexmb.spatial.inertia import rigid_inertia, store_inertia
-from flexmb.spatial.vector import add, axpy, cross, dot, mat3, scale, store3, sub, sym6, sym_add, sym_times, times, vec3
+from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
+from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3
 
 
 @helper
 def inertia_and_bias(c, w, k):
-    """Polynomial part, then the summed points."""
-    _polynomial(c, w, k)
-    for j in range(c.body[k].point_start, c.body[k].point_stop):
-        add_point(c, w, k, j)
-
-
-@helper
-def _polynomial(c, w, k):
-    """Rigid block and bias; `_mode` leaves the coupling and the force of every mode."""
-    omega = vec3(w.body[k].velocity, 0)
-    body = c.body[k].rigid
-    s = vec3(body, 1)
-    stretch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # symmetric part: sum m (u r' + x u')
-    flow = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m rho_dot rho'
-    momentum = (0.0, 0.0, 0.0)  # sum m rho_dot
-    bend = (0.0, 0.0, 0.0)  # etadot' Z etadot
-    swing = (0.0, 0.0, 0.0)  # sum m r x (etadot' G etadot)
+    """The sum over all points of body k."""
+    zero = (0.0, 0.0, 0.0)
+    store_inertia(w.body[k].inertia, 0, rigid_inertia(0.0, zero, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
+    store3(w.body[k].force, 0, zero)
+    store3(w.body[k].force, 3, zero)
     for n in range(c.body[k].modes):
-        p0 = mat3(c.mode[k, n].moment, 0)
-        p, translation, bend_n, swing_n = _mode(c, w, k, n, omega)
-        eta = w.mode[k, n].eta
-        etad = w.mode[k, n].etad
-        transposed = (p0[0], p0[3], p0[6], p0[1], p0[4], p0[7], p0[2], p0[5], p0[8])
-        stretch = mat_axpy(eta, transposed, mat_axpy(eta, p, stretch))
-        flow = mat_axpy(etad, p, flow)
-        s = axpy(0.5 * eta, add(vec3(c.mode[k, n].mfr, 3), translation), s)
-        momentum = axpy(etad, translation, momentum)
-        bend = axpy(etad, bend_n, bend)
-        swing = axpy(etad, swing_n, swing)
-    xx, yy, zz = stretch[0], stretch[4], stretch[8]
-    xy, xz, yz = stretch[1] + stretch[3], stretch[2] + stretch[6], stretch[5] + stretch[7]
-    j = sym_add(sym6(body, 4), (yy + zz, xx + zz, xx + yy, -0.5 * xy, -0.5 * xz, -0.5 * yz))
-    store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
-    coriolis = sub(scale(flow[0] + flow[4] + flow[8], omega), times(flow, omega))
-    torque = add(cross(omega, sym_times(j, omega)), scale(2.0, coriolis))
-    store3(w.body[k].force, 0, add(torque, swing))
-    store3(w.body[k].force, 3, add(cross(omega, add(cross(omega, s), scale(2.0, momentum))), bend))
+        store3(w.mode[k, n].pfr, 0, zero)
+        store3(w.mode[k, n].pfr, 3, zero)
+        w.mode[k, n].zf = 0.0
+        for i in range(c.body[k].modes):
+            w.pff[k, n, i] = c.pair[k, n, i].mff
+    for j in range(c.body[k].point_start, c.body[k].point_stop):
+        if c.point[j].turning:
+            add_point(c, w, k, j)
+        else:
+            _add_mass(c, w, k, j)
 
 
 @helper
-def _mode(c, w, k, n, omega):
-    """Coupling, modal masses and force of mode n.
+def _add_mass(c, w, k, j):
+    """Add point j to body k: a mass that does not turn. The table of modal masses has it at rest already."""
+    nm = c.body[k].modes
+    omega = vec3(w.body[k].velocity, 0)
+    mass = c.point[j].mass
+    r, v, bend = _motion(c, w, k, j)
+    s = scale(mass, r)
+    steiner = (
+        s[1] * r[1] + s[2] * r[2],
+        s[0] * r[0] + s[2] * r[2],
+        s[0] * r[0] + s[1] * r[1],
+        -s[0] * r[1],
+        -s[0] * r[2],
+        -s[1] * r[2],
+    )
+    add_inertia(w.body[k].inertia, 0, rigid_inertia(mass, s, steiner))
+    force = scale(mass, add(bend, cross(omega, add(cross(omega, r), scale(2.0, v)))))
+    add3(w.body[k].force, 0, cross(r, force))
+    add3(w.body[k].force, 3, force)
+    for n in range(nm):
+        ln = vec3(w.point_mode[n].L, 0)
+        add3(w.mode[k, n].pfr, 0, cross(s, ln))
+        add3(w.mode[k, n].pfr, 3, scale(mass, ln))
+        w.mode[k, n].zf += dot(ln, force)
+        at_rest = vec3(c.point_mode[j, n].translation, 0)
+        for i in range(nm):
+            change = dot(ln, vec3(w.point_mode[i].L, 0)) - dot(at_rest, vec3(c.point_mode[j, i].translation, 0))
+            w.pff[k, n, i] += mass * change
 
-    Returns sum m L_n rho' (9) to first order, L_n (3), and what the mode adds by its speed to `bend` and `swing`.
-    """
-    row = c.body[k].second
-    p = mat3(c.mode[k, n].moment, 0)
-    translation = vec3(c.mode[k, n].mfr, 3)
+
+@helper
+def _motion(c, w, k, j):
+    """Position, velocity and acceleration of point j in the body at etaddot = 0; columns L in w.point_mode."""
+    second = c.second_shape[c.point[j].second]
+    r = vec3(c.point[j].position, 0)
+    v = (0.0, 0.0, 0.0)
     bend = (0.0, 0.0, 0.0)
-    swing = (0.0, 0.0, 0.0)  # sum_i etadot_i sum m (phi_i x phi_n + r x G_ni)
-    against = (0.0, 0.0, 0.0)  # the same with n and i exchanged in each term
-    for i in range(c.body[k].modes):
-        eta = w.mode[k, i].eta
-        etad = w.mode[k, i].etad
-        product = mat3(c.pair[k, n, i].product, 0)
-        z = vec3(c.second_moment[row, n, i], 0)
-        p = mat_axpy(eta, product, p)
-        translation = axpy(eta, z, translation)
-        bend = axpy(etad, z, bend)
-        swing = axpy(etad, axial(product), swing)
-        against = axpy(etad, axial(mat3(c.pair[k, i, n].product, 0)), against)
-        w.pff[k, n, i] = c.pair[k, n, i].mff
-    store3(w.mode[k, n].pfr, 0, axial(p))
-    store3(w.mode[k, n].pfr, 3, translation)
-    centrifugal = dot(omega, times(p, omega)) - dot(omega, omega) * (p[0] + p[4] + p[8])
-    # phi_i x phi_n is antisymmetric in the modes, r x G_ni symmetric
-    w.mode[k, n].zf = centrifugal + dot(omega, sub(swing, against))
-    return p, translation, bend, swing
+    for n in range(c.body[k].modes):
+        at_rest = vec3(c.point_mode[j, n].translation, 0)
+        phi = at_rest
+        rate = (0.0, 0.0, 0.0)
+        for i in range(c.body[k].modes):
+            G = vec3(second[n, i].translation, 0)
+            phi = axpy(w.mode[k, i].eta, G, phi)
+            rate = axpy(w.mode[k, i].etad, G, rate)
+        r = axpy(0.5 * w.mode[k, n].eta, add(at_rest, phi), r)
+        v = axpy(w.mode[k, n].etad, phi, v)
+        bend = axpy(w.mode[k, n].etad, rate, bend)
+        store3(w.point_mode[n].L, 0, phi)
+    return r, v, bend

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
+from flexmb.modal.equivalent import with_equivalent_masses
 from flexmb.modal.model import FlexibleModel, ModalNode, SecondOrder, undeforming_node
 from flexmb.modal.points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.raw import raw_model
@@ -24,11 +25,10 @@ def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> Fl
     """Inertia points, modes, stiffness, damping and nodes of one flexible body.
 
     `folder` is where a modal body's `.npz` lies (the scene file's folder). Node "origin" is the body frame, which does
-    not deform; a beam also has "root" and "tip". Raises ValueError for data no model can be made of.
+    not deform; a beam also has "root" and "tip". At level "stiffened" the points are few that are as good as the many
+    (`flexmb.modal.equivalent`). Raises ValueError for data no model can be made of.
     """
-    if isinstance(body, ModalBody):
-        return raw_model(body, folder)
-    return beam_model(body)
+    return with_equivalent_masses(raw_model(body, folder) if isinstance(body, ModalBody) else beam_model(body))
 
 
 def beam_model(body: BeamBody) -> FlexibleModel:

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.model import FlexibleModel, SecondOrder
+from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
 
 Array = NDArray[np.float64]
 
@@ -57,7 +57,6 @@ class ModalIntegrals:
     spatial_mass   (m+6,m+6)   mass matrix at eta = 0 of the whole body, turning points included,
                                order [modes; angular; linear] about the body origin
     stiffness, damping (m,m)   as in the model
-    Z, Q           (m,m,3)     sum m G_nk, and (m,m,3,3) sum m G_nk r', of the second-order field; None without one
     """
 
     mass: float
@@ -73,8 +72,6 @@ class ModalIntegrals:
     spatial_mass: Array
     stiffness: Array
     damping: Array
-    Z: Array | None = None
-    Q: Array | None = None
 
     @property
     def mode_count(self) -> int:
@@ -87,7 +84,6 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
     m = np.where(offset, 0.0, model.mass)
     r, phi = model.position, model.translation
     r_cross, phi_cross = cross_matrix(r), cross_matrix(np.swapaxes(phi, 1, 2))
-    G = None if model.second is None else model.second.translation
     return ModalIntegrals(
         mass=float(m.sum()),
         s0=m @ r,
@@ -102,8 +98,6 @@ def modal_integrals(model: FlexibleModel) -> ModalIntegrals:
         spatial_mass=_spatial_mass(model),
         stiffness=model.stiffness,
         damping=model.damping,
-        Z=None if G is None else np.einsum("p,pank->nka", m, G),
-        Q=None if G is None else np.einsum("p,pank,pb->nkab", m, G, r, optimize=True),
     )
 
 
@@ -131,3 +125,26 @@ def _spatial_mass(model: FlexibleModel) -> Array:
     W = np.concatenate([model.rotation, one, np.zeros((count, 3, 3))], axis=2)
     weighted = np.einsum("p,pai,paj->ij", model.mass, U, U, optimize=True)
     return weighted + np.einsum("pai,pab,pbj->ij", W, model.inertia, W, optimize=True)
+
+
+def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
+    """Masses without offset, as points to be summed that do not turn."""
+    return TurningPoints(
+        mass=model.mass[chosen],
+        position=model.position[chosen],
+        com_offset=np.zeros((len(chosen), 3)),
+        inertia=np.zeros((len(chosen), 3, 3)),
+        translation=model.translation[chosen],
+        rotation=np.zeros_like(model.rotation[chosen]),
+        second=None if model.second is None else model.second.map(lambda G: G[chosen]),
+    )
+
+
+def stacked(first: TurningPoints, then: TurningPoints) -> TurningPoints:
+    """Two sets of points as one; both have a second-order field, or none."""
+
+    def along(name: str) -> Array:
+        return np.concatenate([getattr(first, name), getattr(then, name)])
+
+    names = ("mass", "position", "com_offset", "inertia", "translation", "rotation")
+    return TurningPoints(*map(along, names), second=join_second(first.second, then.second))

@@ -88,6 +88,15 @@ class FlexibleModel:
         return self.translation.shape[2]
 
 
+def join_second(first: SecondOrder | None, then: SecondOrder | None) -> SecondOrder | None:
+    """The fields of more points; None unless all have one."""
+    if first is None or then is None:
+        return None
+    return SecondOrder(
+        np.concatenate([first.translation, then.translation]), np.concatenate([first.rotation, then.rotation])
+    )
+
+
 def with_node(model: FlexibleModel, node: ModalNode) -> SecondOrder | None:
     """The second-order field of the points of `model` and, as one more point, of `node`; None where it has none.
 
@@ -97,7 +106,4 @@ def with_node(model: FlexibleModel, node: ModalNode) -> SecondOrder | None:
         return None
     m = model.mode_count
     last = node.second or SecondOrder(np.zeros((3, m, m)), np.zeros((3, m, m)))
-    return SecondOrder(
-        np.concatenate([model.second.translation, last.translation[None]]),
-        np.concatenate([model.second.rotation, last.rotation[None]]),
-    )
+    return join_second(model.second, last.map(lambda G: G[None]))

@@ -51,18 +51,18 @@ def _axis(elements: BeamElements, columns: Array, x: Array) -> SecondOrder:
     s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     half = np.diff(breaks) / 2.0
     at = (breaks[:-1] + half)[:, None] + half[:, None] * s
-    turning, slope = _rates(elements, columns, at.ravel())
-
-    def up_to_x(rate: Array) -> Array:
-        """Integral (n,m,m,3) from the root of `rate` (points,m,m,3)."""
-        pieces = np.einsum("pg,pgmna->pmna", half[:, None] * w, rate.reshape(*at.shape, *rate.shape[1:]))
-        total = np.concatenate([np.zeros((1, *pieces.shape[1:])), np.cumsum(pieces, axis=0)])
-        return total[np.searchsorted(breaks, x)]
-
-    rotation = up_to_x(turning)
-    of_rotation = x[:, None, None, None] * rotation - up_to_x(at.reshape(-1, 1, 1, 1) * turning)
-    translation = up_to_x(slope) + np.cross(of_rotation, _X)
+    pieces = np.array([_integrals(elements, columns, *piece) for piece in zip(at, half[:, None] * w, strict=True)])
+    total = np.concatenate([np.zeros((1, *pieces.shape[1:])), np.cumsum(pieces, axis=0)])
+    rotation, moment, slope = np.moveaxis(total[np.searchsorted(breaks, x)], 1, 0)
+    translation = slope + np.cross(x[:, None, None, None] * rotation - moment, _X)
     return SecondOrder(np.moveaxis(translation, -1, 1), np.moveaxis(rotation, -1, 1))
+
+
+def _integrals(elements: BeamElements, columns: Array, x: Array, weight: Array) -> Array:
+    """Over the points x of one piece (3,m,m,3): of theta_2', x theta_2', u_2' - theta_2 x e_x."""
+    turning, slope = _rates(elements, columns, x)
+    sums = (weight, turning), (weight * x, turning), (weight, slope)
+    return np.array([np.tensordot(w, rate, axes=1) for w, rate in sums])
 
 
 def _rates(elements: BeamElements, columns: Array, x: Array) -> tuple[Array, Array]:

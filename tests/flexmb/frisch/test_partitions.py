@@ -14,8 +14,8 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.dense.first_order import first_order_body
 from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.dense.truncated import truncated_body
 from flexmb.frisch.system import Partitions
 from tests.bounds import algebra, relative
 from tests.flexmb.frisch import contiguous, labels
@@ -165,8 +165,8 @@ def rates_of_momentum(case: Case, rates: np.ndarray) -> np.ndarray:
     frames = member_frames(tree, motion)
     acceleration = point_frames(tree, frames, motion).first.position.acceleration
     found = np.array([points.mass * (points.member == k) @ acceleration for k in case.nests.labels])
-    for k in tree.truncated:
-        body = truncated_body(tree, k, frames[k], motion)
+    for k in tree.linear:
+        body = first_order_body(tree, k, frames[k], motion)
         found[k] = body.rotation @ body.force(np.zeros(3))[-3:]
     return found
 

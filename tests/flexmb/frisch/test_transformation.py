@@ -15,8 +15,8 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.dense.first_order import first_order_body
 from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.dense.truncated import truncated_body
 from flexmb.frisch.system import RelativeMotion
 from flexmb.scene.schema import PointMass
 from tests.bounds import algebra, relative
@@ -264,7 +264,7 @@ def test_mass_centres(case):
     at = point_frames(tree, frames, motion).first.position.value
     mass = np.bincount(points.member, points.mass)
     moments = np.array([points.mass * (points.member == k) @ at for k in range(case.bodies)])
-    for k in tree.truncated:
-        moments[k] = truncated_body(tree, k, frames[k], motion).mass_moment()
+    for k in tree.linear:
+        moments[k] = first_order_body(tree, k, frames[k], motion).mass_moment()
     exact = moments / mass[:, None] - np.array([f.position.value[0, 0] for f in origins])
     assert agree(case.found.alpha, exact, case)

@@ -1,0 +1,82 @@
+"""Few masses that move as the many inertia points of a body do, as far as its kinetic energy is concerned.
+
+All integrals of the masses are sums m a b of two scalar fields on the points: 1, components of the rest position r, of
+mode shapes phi_n, of the second-order field G_ni. The coefficients of these fields in a basis orthonormal under sum m a
+b, times one over the square root of a mass, are again a position, shapes and a field of points: one of this mass for
+each basis function. If the basis spans 1, r and phi, every integral with one of them is exact: the kinetic energy loses
+but the part of G beyond the basis, which it has squared only, a term of fourth order in (eta, etadot) that is no less
+than zero. So a mass matrix summed over the new points is positive, and exact to the third order.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import qr
+
+from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
+
+Array = NDArray[np.float64]
+
+NEGLIGIBLE = 1e-12
+"""What is left of a field of unit size beyond the others is rounding below it."""
+
+
+def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
+    """A body with a second-order field on as few masses without offset as its modes allow.
+
+    Offset masses stay what they are, and so do inertia tensors, on points without mass.
+    """
+    if model.second is None:
+        return model
+    still = (model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1)
+    m, count = model.mass[still], int(np.count_nonzero(still))
+    if count == 0:
+        return model
+    fields = [np.ones((count, 1)), model.position[still], model.translation[still].reshape(count, -1)]
+    basis = _basis(np.concatenate(fields, axis=1) * np.sqrt(m)[:, None])
+    if basis.shape[1] >= count:
+        return model
+    to_points = _equal_masses(basis, m) * np.sqrt(m)
+    turning = ~still | np.any(model.inertia != 0.0, axis=(1, 2))
+    size, none = len(to_points), np.zeros_like
+
+    def joined(new: Array, old: Array) -> Array:
+        return np.concatenate([new, old[turning]])
+
+    def moved(field: Array) -> Array:
+        return np.tensordot(to_points, field[still], axes=1)
+
+    position, translation, G = moved(model.position), moved(model.translation), moved(model.second.translation)
+    return replace(
+        model,
+        mass=joined(np.full(size, m.sum() / size), np.where(still, 0.0, model.mass)),
+        position=joined(position, model.position),
+        com_offset=joined(none(position), model.com_offset),
+        inertia=joined(np.zeros((size, 3, 3)), model.inertia),
+        translation=joined(translation, model.translation),
+        rotation=joined(none(translation), model.rotation),
+        second=join_second(SecondOrder(G, none(G)), model.second.map(lambda each: each[turning])),
+    )
+
+
+def _basis(fields: Array) -> Array:
+    """Orthonormal columns that span those of `fields` (points, n), each taken in its own size."""
+    size = np.linalg.norm(fields, axis=0)
+    Q, R, _ = qr(fields[:, size > 0.0] / size[size > 0.0], mode="economic", pivoting=True)
+    return np.asarray(Q[:, np.abs(np.diag(R)) > NEGLIGIBLE])
+
+
+def _equal_masses(basis: Array, m: Array) -> Array:
+    """Rows (r, points) that take a field times sqrt(m) to its values at r points of mass sum(m) / r.
+
+    The field 1 must have equal coefficients: a reflection brings those it has, of the same norm, to these.
+    """
+    r = basis.shape[1]
+    coefficients, equal = basis.T @ np.sqrt(m), np.full(r, np.sqrt(m.sum() / r))
+    normal = coefficients - equal
+    if np.any(normal):
+        basis = basis - 2.0 * np.outer(basis @ normal, normal) / (normal @ normal)
+    return np.asarray(basis.T / np.sqrt(m.sum() / r))
