@@ -45,6 +45,12 @@ class Campbell:
         """(R,) where the linear model is unstable."""
         return np.array([found.verdict == "unstable" for found in self.stability])
 
+    def plot(self, path: Path | str, modes: int | None = None) -> Path:
+        """Write the diagram as a picture: frequencies and growth rates of the lowest `modes`, by default of all."""
+        from flexmb.linear.picture import write_campbell_plot  # loads matplotlib
+
+        return write_campbell_plot(self, Path(path), modes)
+
     def to_csv(self, path: Path | str) -> Path:
         """Rates, and of every mode the frequency (Hz) and the growth rate (1/s), named as in `names`."""
         columns = ["rate [rad/s]"]

@@ -35,10 +35,11 @@ def write_campbell_plot(result: Campbell, path: Path, modes: int | None = None) 
     below.set_ylabel("Re (1/s)")
     below.set_xlabel(f'rate of "{result.hinge}" (rad/s)')
     below.axhline(0.0, color="black", linewidth=0.6)
-    above.legend(fontsize="small", loc="best")
+    figure.legend(*above.get_legend_handles_labels(), fontsize="small", loc="outside right upper")
+    above.set_title("seen from the turning bodies; red crosses grow, dotted: multiples of the rate", fontsize="medium")
     for axes in (above, below):
         axes.grid(alpha=0.3)
-    figure.suptitle(f"{result.scene}: modes seen from turning bodies; red crosses grow, dotted: multiples of the rate")
+    figure.suptitle(f"Modes of {result.scene}")
     path.parent.mkdir(parents=True, exist_ok=True)
     figure.savefig(path, dpi=_RESOLUTION)
     return path

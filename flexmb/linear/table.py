@@ -23,7 +23,7 @@ def modes_table(model: LinearModel) -> RenderableType:
     table.add_column("dominant displacements")
     for number, mode in enumerate(model.modes, 1):
         real = mode.eigenvalue.real if abs(mode.eigenvalue.real) > mode.tolerance else 0.0
-        ratio = "" if np.isnan(mode.damping_ratio) else f"{-real / mode.natural_rad_s:.3g}"
+        ratio = "" if np.isnan(mode.damping_ratio) else f"{0.0 - real / mode.natural_rad_s:.3g}"
         table.add_row(
             str(number), f"{mode.frequency_hz:.6g}", f"{mode.frequency_rad_s:.6g}", ratio,
             f"{real:.4g}", _dominant(model, mode),

@@ -18,7 +18,8 @@ from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 
 H = 2.0**-100
-# Bodies of level linear are found by a complex step in the dense route, which cannot be nested: differences check them.
+# The dense route finds bodies of levels linear and stiffened by a complex step, which cannot be nested: differences
+# check these.
 RECIPES = {"rigid": trees.RIGID, "full": trees.FULL, "ruthless": trees.RUTHLESS, "mixed": trees.MIXED}
 
 
@@ -116,13 +117,13 @@ def extrapolated(f, h: float, levels: int = 6) -> tuple[np.ndarray, np.ndarray]:
     return table[-1][-1], np.abs(table[-1][-1] - table[-1][-2])
 
 
-@pytest.mark.parametrize("seed", range(2))
-def test_every_level_hinge_and_row_against_differences(seed):
+@pytest.mark.parametrize(("recipe", "seed"), [(trees.EVERY_LEVEL, 0), (trees.EVERY_LEVEL, 1), (trees.STIFFENED, 2)])
+def test_every_level_hinge_and_row_against_differences(recipe, seed):
     """Whole columns, also of qdot and of the work's rate, up to what rounding of the right side leaves of differences.
 
     A solution rounds as cond(M) u, a rate of a coordinate as few u; the smallest step divides both.
     """
-    found, h = linearised(trees.random_scene(seed, trees.EVERY_LEVEL)), 1e-2
+    found, h = linearised(trees.random_scene(seed, recipe)), 1e-2
     system, nq = found.system, found.system.nq
     free = system.constants.speed["prescribed"] < 0
     M = system.mass_matrix(flexmb.State(found.y[:nq], found.y[nq:-1]))[np.ix_(free, free)]

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.linear.picture import write_campbell_plot
 from flexmb.scene.shapes import beam_section
 from tests.bounds import UNIT_ROUNDOFF
 
@@ -96,4 +95,4 @@ def test_csv_and_picture(tmp_path):
     assert lines[0].startswith("rate [rad/s],1 beam.mode[0] frequency [Hz],1 beam.mode[0] growth [1/s],2 ")
     assert len(lines) == 3
     assert float(lines[2].split(",")[1]) == found.frequencies_hz[1, 0]
-    assert write_campbell_plot(found, tmp_path / "blade.png", modes=4).stat().st_size > 10_000
+    assert found.plot(tmp_path / "blade.png", modes=4).stat().st_size > 10_000

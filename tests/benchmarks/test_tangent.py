@@ -1,0 +1,39 @@
+"""Exact Jacobians against central differences of the same right-hand side, with the same columns."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb import dynamics
+from flexmb.tangent import jacobian, tangent_workspace
+from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
+
+SCENES = {"rigid": lambda: rigid_chain(20), "flexible": lambda: flexible_chain(10, 5, "full")}
+
+
+@pytest.mark.parametrize("kind", SCENES)
+def test_jacobian(benchmark, kind):
+    """Per column: one complex evaluation against two real ones."""
+    system = flexmb.compile(SCENES[kind]())
+    state, c, w = system.initial_state, system.constants, system.workspace()
+    y = np.concatenate([state.q, state.u, [0.0]])
+    n, complex_w = len(y), tangent_workspace(system.constants, system.nq, system.nu)
+    J, plus, minus = np.empty((n, n)), np.empty(n), np.empty(n)
+
+    def exact() -> None:
+        jacobian(0.0, y, J, c, complex_w)
+
+    def differences() -> None:
+        for j in complex_w.column:
+            moved = y[j]
+            y[j] = moved + 1e-6
+            dynamics.rhs(0.0, y, plus, c, w)
+            y[j] = moved - 1e-6
+            dynamics.rhs(0.0, y, minus, c, w)
+            y[j] = moved
+
+    native, rival = interleaved(exact, differences)
+    record(benchmark, native, central_differences=rival)
+    benchmark(exact)
