@@ -56,11 +56,12 @@ def quaternion_rate(w, x, y, z, omega):
 @helper
 def rotation_vector(w, x, y, z):
     """Rotation vector of a unit quaternion, angle in [0, pi]."""
-    s = sqrt(x * x + y * y + z * z)
+    s2 = x * x + y * y + z * z
     sign = 1.0 if w.real >= 0.0 else -1.0
-    if s.real < 1e-8:
-        # 2 atan(s)/s -> 2 (1 - s^2/3): the correction is below round-off here
+    if s2.real < 1e-16:
+        # 2 atan(s)/s -> 2 (1 - s^2/3): the correction is below round-off here, and s has no derivative at 0
         return scale(2.0 * sign, (x, y, z))
+    s = sqrt(s2)
     return scale(2.0 * sign * atan2(s, sign * w) / s, (x, y, z))
 
 

@@ -164,6 +164,20 @@ def test_pendulum():
     assert not found.rate.any()
 
 
+def test_ball_spring_at_rest():
+    """The rotation vector's angle has no derivative there, the vector has: -k / I about each axis."""
+    scene = (
+        SceneBuilder("ball")
+        .rigid_body("bob", mass=2.0, inertia=(0.5, 1.0, 1.25))
+        .spherical("joint", "ground", "bob", stiffness=3.0)
+        .scene()
+    )
+    found = linearised(scene)
+    expected = np.zeros((3, 4))
+    expected[:, 1:] = np.diag([-2.0 * 3.0 / inertia for inertia in (0.5, 1.0, 1.25)])
+    np.testing.assert_allclose(found.J[4:7, :4], expected, rtol=4 * UNIT_ROUNDOFF, atol=0.0)
+
+
 FUNCTIONS = (
     Constant(value=0.4), Ramp(value=0.1, rate=0.7), Sine(amplitude=0.3, angular_frequency_rad_s=2.0, phase_rad=0.3),
     SmoothStep(start_value=0.0, end_value=1.0, start_s=0.0, duration_s=1.0), SpinUp(rate=1.5, duration_s=1.0),

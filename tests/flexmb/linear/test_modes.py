@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.linalg import eigh
+from scipy.integrate import solve_ivp
+from scipy.linalg import eigh, expm
+from scipy.spatial.transform import Rotation
 
 import flexmb as fm
+from flexmb import dynamics
 from flexmb.scene.shapes import beam_section
-from tests.bounds import UNIT_ROUNDOFF
+from tests.bounds import UNIT_ROUNDOFF, observed_order
 
 ROUNDING = 2.0**10 * UNIT_ROUNDOFF  # of some hundred operations, each on numbers of the size of the result
 G = 9.81
@@ -136,3 +139,64 @@ def test_spherical_pendulum_is_two_plane_ones():
     assert model.displacements == ("pivot.rotation.x", "pivot.rotation.y", "pivot.rotation.z")
     expected = sorted(np.sqrt(2.0 * G * 0.7 / (I + 2.0 * 0.7**2)) for I in (0.04, 0.05))
     np.testing.assert_allclose(frequencies(model), expected, rtol=ROUNDING)
+
+
+def test_flow_of_a_free_flying_spinner():
+    """exp(A T) x0 against two runs whose starts differ by eps x0: what is left of the difference is of order eps^2.
+
+    A free body with a wheel and a swinging arm screws along its axis: a relative equilibrium, hence constant A, in axes
+    that turn and move.
+    """
+    scene = (
+        fm.SceneBuilder("screw")
+        .rigid_body("bus", mass=3.0, inertia=(2.0, 2.0, 1.5))
+        .free("fly", "ground", "bus", position=(0.3, 0.1, -0.2), angular_velocity=(0.0, 0.0, 1.1), velocity=(0, 0, 0.7))
+        .wheel("w", "bus", axis=(0, 0, 1), mass=0.0, axial_inertia=0.1, transverse_inertia=0.05, speed=5.0)
+        .rigid_body("arm", mass=0.5, com=(0.0, 0.0, 0.2), inertia=(0.02, 0.02, 0.02))
+        .spherical("ball", "bus", "arm", parent_position=(0.0, 0.0, 0.4), stiffness=0.8)
+        .scene()
+    )
+    system = fm.compile(scene)
+    model, start = fm.linearize(system), system.initial_state
+    assert not model.rates.any() and not model.drift.any()
+    x0, T, n = np.random.default_rng(5).normal(size=len(model.A)), 1.5, len(model.rates)
+    expected = expm(T * model.A) @ x0
+    sizes, errors = np.array([4e-2, 2e-2, 1e-2, 5e-3]), []
+    base = ends(system, start, T)
+    for size in sizes:
+        y = np.concatenate([start.q + size * model.motion @ x0[:n], start.u + size * x0[n:], [0.0]])
+        system.project(0.0, y, system.constants)
+        moved = ends(system, fm.State(y[: system.nq], y[system.nq : -1]), T)
+        found = np.concatenate([displacement(system, base[0], moved[0]), moved[1] - base[1]])
+        errors.append(np.max(np.abs(found - size * expected)))
+    assert observed_order(sizes, errors, 1e-10) == pytest.approx(2.0, abs=0.1)
+
+
+def ends(system: fm.System, start: fm.State, T: float) -> tuple[np.ndarray, np.ndarray]:
+    """q and u after a time T."""
+    nq, w = system.nq, system.workspace()
+
+    def rhs(t, y):
+        dy = np.empty(len(y) + 1)
+        assert dynamics.rhs(t, np.append(y, 0.0), dy, system.constants, w) == 0
+        return dy[:-1]
+
+    y = solve_ivp(rhs, (0.0, T), np.concatenate([start.q, start.u]), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
+    return y[:nq], y[nq:]
+
+
+def displacement(system: fm.System, q0: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """xi from q0 to q: rotation vectors R0'R, positions in the axes of q0."""
+    out = np.zeros(system.nu)
+    free, ball, wheel = (system.speed(name) for name in ("fly", "ball", "w"))
+    at = system.coordinate("fly").start
+    R0 = Rotation.from_quat(q0[at + 3 : at + 7], scalar_first=True)
+    out[free] = np.concatenate([turned(q0, q, at + 3), R0.apply(q[at : at + 3] - q0[at : at + 3], inverse=True)])
+    out[ball] = turned(q0, q, system.coordinate("ball").start)
+    out[wheel] = (q - q0)[system.coordinate("w")]
+    return out
+
+
+def turned(q0: np.ndarray, q: np.ndarray, at: int) -> np.ndarray:
+    R0, R = (Rotation.from_quat(x[at : at + 4], scalar_first=True) for x in (q0, q))
+    return (R0.inv() * R).as_rotvec()
