@@ -20,9 +20,9 @@ from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 
-BUDGET = 3e10
-"""Operations that all runs of one advice may take before the walk down ends; about 20 s."""
-REFERENCE_SHARE = 0.15
+BUDGET = 4e10
+"""Operations that all runs of one advice may take before the walk down ends; about 25 s."""
+REFERENCE_SHARE = 0.25
 """Of the budget: the most that one reference may be expected to cost."""
 STIRRED = 1e-3
 """Of the tolerance: families of modes that add less than that are not excited."""

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb import composite, dynamics
-from flexmb.advisor.methods import Method, simulated
+from flexmb.advisor.methods import Method, operations, simulated
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure.system import ClosureError
@@ -95,7 +95,7 @@ class Bench:
             signals=measured(self.wanted, done) if len(done.t) else {},
             message="" if done.finished else done.message,
             evaluations=cost.evaluations,
-            operations=float(each) * cost.evaluations,
+            operations=operations(method, each, system.nq + system.nu + 1, cost),
             seconds=cost.run_s,
         )
 

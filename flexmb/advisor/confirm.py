@@ -1,8 +1,9 @@
 """Errors that were measured: candidates against the finest models that can be run, integration errors by refinement.
 
-The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance; what they
-differ by is the uncertainty U of the finer. A candidate is adequate if its distance to that one, plus U, plus what its
-integrator adds, is within the tolerance: the triangle inequality, no luck in it.
+The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. What they
+differ by is the uncertainty U of the finer; where differences of pieces and half pieces are seen to fall by a factor of
+1/r > 2, what is left of the geometric series, r/(1 - r) of the last, r no less than 1/4. A candidate is adequate if its
+distance to that one, plus U, plus what its integrator adds, is within the tolerance: the triangle inequality, no luck.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from flexmb.advisor.quantity import Signals, error, scales
 
 AGREED = 0.25
 """Of the tolerance: two references that differ by less are good enough."""
+SECOND_ORDER = 0.25
+"""Least ratio of successive differences that is believed: halved pieces converge by the second order at least."""
 MOST = 0.5
 """Of the tolerance: with an uncertainty beyond that nothing can be told."""
 INTEGRATION = 0.1
@@ -95,9 +98,10 @@ class Confirmation:
         In the ladder of every integrator, loose to tight, the first that fits and whose successor fits as well.
         """
         room = self.tolerance - self.error(model)
-        highest = max(highest_frequency(self.bench.scene, model), self.cost.slow / (STAGES * self.bench.t_end))
+        scene, algorithm = self.bench.scene, self.bench.algorithm(model)
+        highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
         found = [self.finely(model)]
-        for ladder in ladders(highest, self.bench.algorithm(model)):
+        for ladder in ladders(highest, slow, algorithm, not scene.closures):
             before: Method | None = None
             for method in ladder:
                 if method.integrator in ADAPTIVE and method.value <= self.finely(model).value:
@@ -111,6 +115,7 @@ class Confirmation:
 
     def _reference(self, hidden: float, budget: float) -> Reference:
         history: list[str] = []
+        steps: list[float] = []
         last: Reference | None = None
         known = references(self.bench.scene)
         for name, model in known:
@@ -131,7 +136,10 @@ class Confirmation:
             scale = scales(self.bench.wanted, done.signals)
             apart = error(done.signals, last.signals, scale)
             history.append(f"{last.name} and {name} differ by {apart:.2g}")
-            last = Reference(name, model, done.signals, scale, apart + hidden, tuple(history))
+            falls = max(apart / steps[-1], SECOND_ORDER) if steps and steps[-1] > 0.0 else 1.0
+            steps += [apart] if last.name.endswith("pieces") else []
+            left = apart * falls / (1.0 - falls) if falls < 0.5 else apart
+            last = Reference(name, model, done.signals, scale, left + hidden, tuple(history))
             if last.uncertainty <= AGREED * self.tolerance:
                 return last
         if last is None:

@@ -80,32 +80,26 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
 def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
     """Models that every candidate is measured against, coarse to fine; two successive ones say how sure they are.
 
-    First all bodies with more modes than the scene gives them, then beams in pieces, which converge to the
-    geometrically exact beam. A raw body has its own modes and no more; a beam that starts bent is not taken apart.
+    First all bodies with the modes that the scene gives them, and four more where it has no static shapes; then beams
+    in pieces, which converge to the geometrically exact beam. A raw body has its own modes and no more; a beam that
+    starts bent is not taken apart, but gets four more modes, and again four.
     """
     bodies = flexible_bodies(scene)
     bent = {state.body for state in scene.modal_states}
-    whole = [b for b in bodies if isinstance(b, ModalBody) or b.name in bent]
+    splits = [b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent]
 
-    def model(more: int, pieces: int) -> Model:
-        chosen = []
-        for body in bodies:
-            if isinstance(body, ModalBody):
-                rung = Rung("modes", flexible_model(body).mode_count, levels(body)[-1])
-            elif pieces and body not in whole:
-                rung = Rung("pieces", 0, LEVELS[-1], pieces=pieces)
-            else:
-                rung = Rung("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
-            chosen.append((body.name, rung))
-        return tuple(chosen)
+    def rung(body: BeamBody | ModalBody, more: int, pieces: int) -> Rung:
+        if isinstance(body, ModalBody):
+            return Rung("modes", flexible_model(body).mode_count, levels(body)[-1])
+        if pieces and body.name in splits:
+            return Rung("pieces", 0, LEVELS[-1], pieces=pieces)
+        return Rung("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
-    found = [("more modes", model(4, 0))]
-    if len(whole) < len(bodies):
-        found += [(f"{n} pieces", model(4, n)) for n in (2, 4, 8, 16)]
-    else:
-        found += [("still more modes", model(8, 0))]
-    distinct = dict.fromkeys(each for _, each in found)
-    return tuple((name, each) for name, each in found if distinct.pop(each, 0) is None)
+    first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
+    finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
+    if not splits:
+        finer = [("still more modes", tuple((b.name, rung(b, 8, 0)) for b in bodies))]
+    return (("modes", first), *((name, model) for name, model in finer if model != first))
 
 
 def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flexmb.simulation import simulate
 from flexmb.system import Algorithm, System
-from flexmb.trajectory import Trajectory
+from flexmb.trajectory import Statistics, Trajectory
 
 ABSOLUTE = 1e-2
 """Absolute over relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""
@@ -19,6 +19,15 @@ TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11)
 FINEST = 1e-12
 STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 """Fixed steps times the highest frequency; RK4 is stable up to 2.83."""
+
+
+ADAPTIVE = frozenset({"dop853", "radau5", "exponential"})
+STIFF = 50.0
+"""Highest frequency over what the rigid scene does: from there on methods that linearise are tried."""
+COMPLEX = 4
+"""Operations of an evaluation in complex numbers against one in real ones."""
+FACTORS = {"radau5": (10.0 / 3.0, 10.0), "exponential": (40.0, 10.0), "generalised_alpha": (2.0 / 3.0, 2.0)}
+"""Times n^3 for each factorisation (a real and a complex matrix; an exponential; a real one), n^2 for an evaluation."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +67,34 @@ def simulated(system: System, times: NDArray[np.float64], method: Method, max_st
     return simulate(system, t_end, samples=times, max_steps=max_steps, **options)
 
 
-ADAPTIVE = frozenset({"dop853"})
+def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[Method, ...], ...]:
+    """For each integrator its methods from loose to tight.
+
+    Fixed steps are those of the frequency `highest` (rad/s), implicit ones of `slow`, what the scene does with all
+    bodies rigid. Methods that linearise are for trees, by the recursion, and for scenes that are stiff.
+    """
+    explicit = (
+        tuple(Method("dop853", rtol, algorithm) for rtol in TOLERANCES),
+        tuple(Method("rk4", step / max(highest, slow), algorithm) for step in STEPS),
+    )
+    if not tree or highest < STIFF * slow:
+        return explicit
+    return (
+        *explicit,
+        tuple(Method("radau5", rtol) for rtol in TOLERANCES[:-3]),
+        tuple(Method("exponential", rtol) for rtol in TOLERANCES[:-3]),
+        tuple(Method("generalised_alpha", step / slow) for step in STEPS),
+    )
 
 
-def ladders(highest: float, algorithm: Algorithm) -> tuple[tuple[Method, ...], ...]:
-    """For each integrator its methods from loose to tight; fixed steps are those of the frequency `highest` (rad/s)."""
-    adaptive = tuple(Method("dop853", rtol, algorithm) for rtol in TOLERANCES)
-    fixed = tuple(Method("rk4", step / highest, algorithm) for step in STEPS)
-    return adaptive, fixed
+def operations(method: Method, each: int, size: int, done: Statistics) -> float:
+    """Operations of a run: `each` for an evaluation of the accelerations, `size` entries of the state.
+
+    A Jacobian is an evaluation in complex numbers for each of its columns; linear algebra is counted by its leading
+    terms, substitutions with every evaluation.
+    """
+    if method.integrator not in FACTORS:
+        return float(each) * done.evaluations
+    cubic, square = FACTORS[method.integrator]
+    evaluations = done.evaluations + COMPLEX * size * done.jacobians
+    return float(each * evaluations + cubic * size**3 * done.factorisations + square * size**2 * done.evaluations)

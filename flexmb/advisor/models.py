@@ -23,7 +23,7 @@ from flexmb.surrogate import finite_segments, substructured
 LEVELS: tuple[Level, ...] = ("ruthless", "linear", "full", "stiffened")
 COUNTS = (1, 2, 3, 4, 6, 8)
 SEGMENTS = (2, 4, 8)
-PIECES = (2, 4, 8)
+PIECES = (2, 4, 8, 16)
 PLURAL = {1: "mode"}
 
 Kind = Literal["rigid", "sprung", "modes", "segments", "pieces"]
