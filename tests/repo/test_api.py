@@ -16,6 +16,7 @@ FUNCTIONS = {
     "equilibrium": ["system", "guess"],
     "steady_spin": ["system", "hinge", "rate"],
     "campbell": ["system", "hinge", "rates"],
+    "advise": ["scene", "tolerance", "quantity", "t_end"],
     "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
 }
 SYSTEM = {
