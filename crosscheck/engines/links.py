@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from crosscheck.engines.conventions import (
     IDENTITY_FRAME,
     Frame,
+    frame,
     inboard_frame,
     offset_frame,
     outboard_frame,
@@ -24,6 +25,7 @@ from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
     AngularCoordinate,
     Body,
+    Closure,
     Cylindrical,
     Free,
     Gimbal,
@@ -121,10 +123,12 @@ class Attachment:
     frame: Frame
 
 
-def obstacle(scene: Scene, engine: str) -> str:
-    """Why an engine of rigid trees cannot represent the scene; empty if it can."""
-    if scene.closures:
-        return "loop closures are not supported yet"
+def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
+    """Why an engine of rigid trees with closures of some types cannot represent the scene; empty if it can."""
+    for closure in scene.closures:
+        if closure.type not in closed_by:
+            known = ", ".join(closed_by)
+            return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'
     for body in scene.bodies:
         if isinstance(body, SidBody):
             return f'body "{body.name}": SID files are not supported yet'
@@ -162,6 +166,20 @@ def attachment(scene: Scene, chain: tuple[Link, ...], item: Marker | Load) -> At
     body = next(each for each in scene.bodies if each.name == item.body)
     offset = item.offset_m if isinstance(item, Marker) else ZERO
     return Attachment(index, chain[index].body @ offset_frame(body, item.node, offset))
+
+
+def closed_frames(scene: Scene, chain: tuple[Link, ...], closure: Closure) -> tuple[Attachment, Attachment]:
+    """Frames A and B of a closure, link -1 being World."""
+    a = (closure.body_a, closure.node_a, frame(closure.position_a_m, closure.quaternion_a))
+    b = (closure.body_b, closure.node_b, frame(closure.position_b_m, closure.quaternion_b))
+    return _closed_frame(scene, chain, *a), _closed_frame(scene, chain, *b)
+
+
+def _closed_frame(scene: Scene, chain: tuple[Link, ...], body: str, node: str, offset: Frame) -> Attachment:
+    if body == GROUND:
+        return Attachment(-1, offset)
+    at = attachment(scene, chain, Marker(name="", body=body, node=node))
+    return Attachment(at.link, at.frame @ offset)
 
 
 def freedoms(hinge: Hinge) -> tuple[Freedom, ...]:

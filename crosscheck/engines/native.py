@@ -1,6 +1,7 @@
 """The native adapters: flexmb itself behind the engine contract. Conventions already agree; nothing is converted.
 
-`native` is the O(N) recursion. `native-frisch` are the nested-body equations of Frisch (1975), corrected, and
+`native` is the O(N) recursion. `native-composite` forms the mass matrix by composite bodies: another solution of the
+same equations, closed chains included. `native-frisch` are the nested-body equations of Frisch (1975), corrected, and
 `native-frisch-as-printed` the same to the letter of the print: other equations for accelerations, loads and drives, on
 the same kinematics. Frisch's are of first order in the deformation, which is what level `linear` asks for.
 
@@ -15,6 +16,7 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
+from flexmb.closed_system import ClosedSystem
 from flexmb.methods import FIXED, LINEARISING, Method
 from flexmb.scene.schema import RigidBody, Scene
 from flexmb.simulation import simulate
@@ -62,15 +64,23 @@ class NativeEngine:
         return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
-        """ValueError where the print does not apply: modes not clamped at the hinge. NotImplementedError for loops."""
+        """ValueError where the print does not apply: modes not clamped at the hinge; ClosureError where loops lock.
+
+        NotImplementedError where an algorithm or method has no loops.
+        """
         system = compile(scene)
+        if isinstance(system, ClosedSystem):
+            system.route(self._algorithm, 0.0)
         if self._algorithm in ERRATA:
-            if scene.closures:
-                raise NotImplementedError("Frisch's equations are those of trees: closures are for engine native")
             system.nested(self._algorithm)
         if scene.closures and self._method in LINEARISING:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         return NativeModel(system, self._algorithm, self._method)
+
+
+def composite() -> NativeEngine:
+    """The mass matrix and its Cholesky factors."""
+    return NativeEngine("native-composite", "composite", "flexmb: mass matrix by composite bodies, Cholesky")
 
 
 def frisch() -> NativeEngine:

@@ -12,6 +12,7 @@ GROUP = "crosscheck.engines"
 
 BUILT_IN = {
     "native": "crosscheck.engines.native:NativeEngine",
+    "native-composite": "crosscheck.engines.native:composite",
     "native-frisch": "crosscheck.engines.native:frisch",
     "native-frisch-as-printed": "crosscheck.engines.native:frisch_as_printed",
     "native-radau5": "crosscheck.engines.native:radau5",

@@ -29,7 +29,7 @@ from flexmb.scene.hinges import (
     Weld,
 )  # fmt: skip
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.schema import Body, Load, ModalBody, PointMass, Scene, Wheel
+from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 
@@ -65,7 +65,7 @@ class Placed:
 
 @dataclass(frozen=True)
 class Assembly:
-    """The assembled system. `links` holds hinges, wheel bearings and point masses' guides by their scene names."""
+    """The assembled system. `links` holds hinges, wheel bearings, point masses' guides and closures by scene names."""
 
     scene: Scene
     shop: Workshop
@@ -73,12 +73,13 @@ class Assembly:
     hinges: dict[str, Link]
     wheels: dict[str, Link]
     guides: dict[str, Link]
+    closures: dict[str, Link]
     carriers: tuple[Carrier, ...]
     sampler: int
 
     @property
     def links(self) -> dict[str, Link]:
-        return self.hinges | self.wheels | self.guides
+        return self.hinges | self.wheels | self.guides | self.closures
 
     @property
     def prescribed(self) -> list[tuple[int, Callable[[float], Profile]]]:
@@ -129,11 +130,12 @@ def assemble(scene: Scene) -> Assembly:
     for mass in scene.point_masses:
         guides[mass.name], carrier = _point_mass(shop, placed[mass.body], mass)
         carriers.append(carrier)
+    closures = {closure.name: _closure(shop, placed, closure) for closure in scene.closures}
     for load in scene.loads:
         _load(shop, placed[load.body], load)
     sampler = shop.mbs.AddSensor(shop.items.SensorUserFunction(sensorUserFunction=_nothing, storeInternal=True))
     shop.mbs.Assemble()
-    return Assembly(scene, shop, placed, hinges, wheels, guides, tuple(carriers), sampler)
+    return Assembly(scene, shop, placed, hinges, wheels, guides, closures, tuple(carriers), sampler)
 
 
 def _nothing(mbs, t, sensors, factors, configuration) -> list[float]:
@@ -147,6 +149,9 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     bodies = {body.name: body for body in scene.bodies}
     users = [(hinge.parent, hinge.parent_node) for hinge in scene.hinges if hinge.parent != GROUND]
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
+    ends = [(each.body_a, each.node_a) for each in scene.closures]
+    ends += [(each.body_b, each.node_b) for each in scene.closures]
+    users += [(body, node) for body, node in ends if body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
             held[name].add(node)
@@ -272,6 +277,19 @@ def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
             bodyNumber=parent.carrier.flexible, meshNodeNumbers=parent.crosses[node], weightingFactors=[0.25] * 4
         )
     )
+
+
+def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> Link:
+    """A joint between two frames that exist already."""
+    a = frame(closure.position_a_m, closure.quaternion_a)
+    b = frame(closure.position_b_m, closure.quaternion_b)
+    ports = []
+    for body, node, own in ((closure.body_a, closure.node_a, a), (closure.body_b, closure.node_b, b)):
+        if body == GROUND:
+            ports.append(Port(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation)))
+        else:
+            ports.append(_port(shop, placed[body], node, own))
+    return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
 
 
 def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[Link, Carrier]:

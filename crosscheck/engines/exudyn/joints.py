@@ -102,6 +102,32 @@ def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, poin
     return Link(hinge.name, (), tuple(connectors), markers[1], (hinge, port.carrier, carrier)), carrier
 
 
+CONSTRAINED = {
+    "weld": [1, 1, 1, 1, 1, 1],
+    "revolute": [1, 1, 1, 1, 1, 0],
+    "prismatic": [1, 1, 0, 1, 1, 1],
+    "cylindrical": [1, 1, 0, 1, 1, 0],
+    "universal": [1, 1, 1, 0, 0, 1],
+    "spherical": [1, 1, 1, 0, 0, 0],
+    "planar": [0, 0, 1, 1, 1, 0],
+}
+"""Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
+
+
+def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: Array) -> Link:
+    """A joint of some kind between two ports; `axis` (3,) has the same components in both frames."""
+    turn = np.eye(3) if kind in ("universal", "planar", "weld", "spherical") else _axes_with(axis, 2)
+    markers = [shop.marker(port.carrier, port.position, port.zero @ turn) for port in ports]
+    match kind:
+        case "revolute":
+            joint = shop.items.RevoluteJointZ(markerNumbers=markers)
+        case "spherical":
+            joint = shop.items.SphericalJoint(markerNumbers=markers)
+        case _:
+            joint = shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=CONSTRAINED[kind])
+    return Link(name, (), ((shop.mbs.AddObject(joint), True),), markers[1])
+
+
 def chain(
     shop: Workshop, name: str, port: Port, steps: Sequence[tuple[Array, Coordinate]], make: Outboard, point: Array
 ) -> tuple[Link, Carrier]:

@@ -37,7 +37,7 @@ class ExudynModel:
         first = {name: values[0] for name, values in loads.items()}
         return Snapshot(
             markers=markers,
-            loads={name: first[name] for name in self.assembly.hinges},
+            loads={name: first[name] for name in self._loaded},
             wheel_loads={name: first[name] for name in self.assembly.wheels},
             drives={name: values[0] for name, values in drives(self.assembly, states).items()},
             energy={kind: float(values[0]) for kind, values in energy.items()},
@@ -57,11 +57,16 @@ class ExudynModel:
                 marker.name: marker_path(*self._located(marker, paths), np.array(marker.offset_m))
                 for marker in self.scene.markers
             },
-            loads={name: loads[name] for name in self.assembly.hinges},
+            loads={name: loads[name] for name in self._loaded},
             wheel_loads={name: loads[name] for name in self.assembly.wheels},
             drives=drives(self.assembly, states), energy=energy, momentum=momentum,
             wall_s=solution.wall_s, evaluations=solution.evaluations,
         )  # fmt: skip
+
+    @property
+    def _loaded(self) -> list[str]:
+        """Hinges and closures, whose loads are outputs."""
+        return [*self.assembly.hinges, *self.assembly.closures]
 
     def mass_matrix(self, body: str | None = None) -> Array:
         """(m+6, m+6) of a flexible body, [modes; angular; linear] in its body axes; of the only one by default."""

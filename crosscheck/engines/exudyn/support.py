@@ -26,8 +26,9 @@ def supports(scene: Scene) -> Support:
 
 
 def _refusals(scene: Scene) -> Iterator[str]:
-    if scene.closures:
-        yield "loop closures are not supported yet"
+    for closure in scene.closures:
+        if closure.body_b == GROUND:
+            yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
     bodies = {body.name: body for body in scene.bodies}
     for body in scene.bodies:
         yield from _body_refusals(body)
@@ -67,6 +68,10 @@ def _approximations(scene: Scene) -> Iterator[str]:
     for item in (*scene.wheels, *scene.point_masses):
         if deforming(bodies[item.body], item.node):
             yield f'"{item.name}": {NOT_WORKLESS}'
+    for closure in scene.closures:
+        ends = ((closure.body_a, closure.node_a), (closure.body_b, closure.node_b))
+        if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
+            yield f'closure "{closure.name}": {NOT_WORKLESS}'
     for load in scene.loads:
         turning = load.type == "torque" or load.frame == "node"
         if turning and flexible(bodies[load.body]) and deforming(bodies[load.body], load.node):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 _COARSEST = 4e-3  # s
 _MOTION = 0.3  # rad a step of the fastest prescribed or initial turning, at the coarsest effort
 _ELASTIC = 1.0  # rad a step of the stiffest spring mode: RK4 is stable to 2.8
+_SOFT = "closures are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
 _LADDER = (1.0, 0.5, 0.25, 0.125)
 
 
@@ -33,10 +34,12 @@ class MujocoEngine:
         return mujoco.__version__
 
     def supports(self, scene: Scene) -> Support:
-        reason = obstacle(scene, "MuJoCo")
+        reason = obstacle(scene, "MuJoCo", ("spherical",))
         if not reason:
             reason = next(filter(None, map(_refusal, links(scene))), "")
-        return Support("no", reason) if reason else Support("exact")
+        if reason:
+            return Support("no", reason)
+        return Support("surrogate", _SOFT) if scene.closures else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         """Steps by halves, the coarsest fitting the scene's fastest motion and stiffest spring."""

@@ -10,7 +10,7 @@ from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import Tree
+from crosscheck.engines.mujoco.tree import Closed, Tree
 from flexmb.scene.schema import Scene
 
 Array = NDArray[np.float64]
@@ -24,11 +24,12 @@ class Observer:
     on the body.
     """
 
-    def __init__(self, tree: Tree, forces: Forces, scene: Scene) -> None:
+    def __init__(self, tree: Tree, forces: Forces, scene: Scene, closures: tuple[Closed, ...] = ()) -> None:
         self._tree = tree
         self._forces = forces
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._names = [(link.kind, link.joint) for link in tree.links]
+        self._closures = closures
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
 
     def observe(self, data: mujoco.MjData) -> Snapshot:
@@ -41,7 +42,7 @@ class Observer:
         mass = model.body_mass
         return Snapshot(
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
-            loads={name: load for (kind, name), load in loads.items() if kind == "body"},
+            loads={name: load for (kind, name), load in loads.items() if kind == "body"} | self._closed(data),
             wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
             drives=self._drives(data, loads),
             energy={
@@ -61,6 +62,15 @@ class Observer:
         """[torque; force] (links, 6) on each link about its frame's origin, which is the outboard hinge point."""
         bodies = self._tree.bodies
         return shift_wrench(data.cfrc_int[bodies], self._pole(bodies, data) - data.xpos[bodies])
+
+    def _closed(self, data: mujoco.MjData) -> dict[str, Array]:
+        """[torque; force] of every closure on body_b about frame B: along World's axes, of A less B."""
+        rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
+        forces = data.efc_force[: data.nefc][rows].reshape(-1, 3)
+        return {
+            closed.name: np.concatenate([np.zeros(3), -force])
+            for closed, force in zip(self._closures, forces, strict=True)
+        }
 
     def _marker(self, at: Attachment, data: mujoco.MjData) -> MarkerSnapshot:
         body = self._tree.bodies[at.link]

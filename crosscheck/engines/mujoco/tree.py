@@ -19,12 +19,21 @@ from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
+from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar
 
 Array = NDArray[np.float64]
 
 ARMATURE = 1e20
 LEAST_INERTIA = 1e-14
+
+
+@dataclass(frozen=True)
+class Closed:
+    """A ball joint that closes a loop between frames `a` and `b`, as soft as MuJoCo's defaults make it."""
+
+    name: str
+    a: Attachment
+    b: Attachment
 
 
 @dataclass(frozen=True)
@@ -49,7 +58,7 @@ class Tree:
     slots: tuple[Slot, ...]
 
 
-def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
+def build_tree(links: tuple[Link, ...], gravity: Array, closures: tuple[Closed, ...] = ()) -> Tree:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -70,6 +79,8 @@ def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
         for k, freedom in enumerate(link.freedoms):
             _add_joints(body, freedom, f"{_body_name(link)}.{k}")
         bodies.append(body)
+    for i, closed in enumerate(closures):
+        _close(spec, bodies, closed, i)
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
     return Tree(model, links, ids, _slots(model, links, ids))
@@ -92,6 +103,18 @@ def initial_state(tree: Tree) -> tuple[Array, Array]:
                 linear = rotation_matrix(freedom.quaternion) @ freedom.velocity
                 v[slot.v : slot.v + 6] = [*linear, *freedom.angular_velocity]
     return q, v
+
+
+def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: Closed, number: int) -> None:
+    """An equality constraint between two sites: with a body and an anchor it would close where coordinates are zero."""
+    names = []
+    for side, at in zip("ab", (closed.a, closed.b), strict=True):
+        names.append(f"closure {number}{side}")
+        body = bodies[at.link] if at.link >= 0 else spec.worldbody
+        body.add_site(name=names[-1], pos=at.frame.position, quat=at.frame.quaternion)
+    spec.add_equality(
+        type=mujoco.mjtEq.mjEQ_CONNECT, objtype=mujoco.mjtObj.mjOBJ_SITE, name1=names[0], name2=names[1]
+    )
 
 
 def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:

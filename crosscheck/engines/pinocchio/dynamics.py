@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
+from crosscheck.engines.pinocchio.closures import Closures
 from crosscheck.engines.pinocchio.forces import JointForces, NodeLoads
 from crosscheck.engines.pinocchio.tree import Slot, Tree, initial_state
 from flexmb.scene.schema import Scene
@@ -48,6 +49,7 @@ class Dynamics:
         self.data = tree.model.createData()
         self.forces = JointForces(tree)
         self.loads = NodeLoads(tree, scene)
+        self.closures = Closures(tree, scene)
         self.driven: list[Slot] = [slot for slot in tree.slots if _is_driven(slot)]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         self._driven_q = np.array([slot.q for slot in self.driven], dtype=np.intp)
@@ -78,13 +80,18 @@ class Dynamics:
         return State(q, v, motion[:, 2])
 
     def solve(self, t: float, state: State) -> Solution:
-        """Articulated-body accelerations; with driven coordinates, their rows of the inverse dynamics are the drives.
+        """Articulated-body accelerations, or constrained ones where loops are closed, and drive loads.
+
+        With driven coordinates, their rows of the inverse dynamics are the drives.
 
         Hybrid dynamics as a limit: a driven joint has the armature `BALLAST` and the effort BALLAST * acceleration, so
         nothing else moves it. Its acceleration is off by the drive load / BALLAST, which is below round-off.
         """
         lost = self.forces.dampers_and_motors(t, state.v)
         tau = self.forces.springs(state.q) + lost
+        if self.closures:
+            a = self.closures.solve(state.q, state.v, tau)
+            return Solution(a, np.zeros(0), float(lost @ state.v))
         wrenches = self._wrenches(t, state)
         extra = () if wrenches is None else (wrenches,)
         D = self._driven_v
@@ -104,7 +111,8 @@ class Dynamics:
 
     def resolve_loads(self, t: float, state: State, acceleration: Array) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
-        self.inverse(state, acceleration, self._wrenches(t, state))
+        wrenches = self.closures.on_joints() if self.closures else self._wrenches(t, state)
+        self.inverse(state, acceleration, wrenches)
 
     def rate(self, t: float, y: Array) -> Array:
         """dy/dt."""

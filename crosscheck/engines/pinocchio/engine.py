@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from crosscheck.engines.contract import Effort, EngineMissing, Support
-from crosscheck.engines.links import obstacle
+from crosscheck.engines.links import Scalar, links, obstacle
 from flexmb.scene.schema import Scene
 
 if TYPE_CHECKING:
@@ -26,7 +26,7 @@ class PinocchioEngine:
         return pinocchio.__version__
 
     def supports(self, scene: Scene) -> Support:
-        reason = obstacle(scene, "Pinocchio")
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical")) or (scene.closures and _beside_closures(scene))
         return Support("no", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
@@ -40,3 +40,16 @@ class PinocchioEngine:
         if support.kind == "no":
             raise ValueError(f'scene "{scene.name}": {support.reason}')
         return PinocchioModel(scene)
+
+
+def _beside_closures(scene: Scene) -> str:
+    """What this adapter does not combine with closed loops, "" if there is nothing."""
+    if scene.loads:
+        return f'load "{scene.loads[0].name}": Pinocchio\'s constrained dynamics takes none'
+    for link in links(scene):
+        if not link.freedoms:
+            return f'hinge "{link.joint}" is a weld, which takes a prescribed joint here: not beside closures'
+        for freedom in link.freedoms:
+            if isinstance(freedom, Scalar) and freedom.prescribed is not None:
+                return f'"{link.joint}" is prescribed: not beside closures in Pinocchio'
+    return ""

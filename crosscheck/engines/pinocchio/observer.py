@@ -35,6 +35,7 @@ class Observer:
         model, data, links = dynamics.tree.model, dynamics.data, dynamics.tree.links
         acceleration, drive, _ = dynamics.solve(t, state)
         dynamics.resolve_loads(t, state, acceleration)
+        closed = dynamics.closures.loads() if dynamics.closures else {}
         wrench = {}
         pin.forwardKinematics(model, data, state.q, state.v, acceleration)
         for link, joint in zip(links, dynamics.tree.joints, strict=True):
@@ -46,7 +47,7 @@ class Observer:
         linear, about_com, com = data.hg.linear, data.hg.angular, data.com[0]
         return Snapshot(
             markers=markers,
-            loads={name: load for (kind, name), load in wrench.items() if kind == "body"},
+            loads={name: load for (kind, name), load in wrench.items() if kind == "body"} | closed,
             wheel_loads={name: load for (kind, name), load in wrench.items() if kind == "wheel"},
             drives=self._drives(drive),
             energy={

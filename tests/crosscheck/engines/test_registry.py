@@ -33,7 +33,7 @@ def _plug(monkeypatch, name: str, value: str) -> None:
 def test_built_in_engines_are_found_under_their_names():
     found = registry.engines()
     assert tuple(found)[: len(registry.BUILT_IN)] == tuple(registry.BUILT_IN)
-    assert {"native", "native-frisch", "native-frisch-as-printed"} <= found.keys()
+    assert {"native", "native-composite", "native-frisch", "native-frisch-as-printed"} <= found.keys()
     assert all(engine.name == name for name, engine in found.items())
 
 
