@@ -12,7 +12,7 @@ from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.schema import Scene
 from flexmb.state import DynamicsError
-from flexmb.system import System, compile
+from flexmb.system import compile
 
 HINGES = ("gimbal xyz", "gimbal zxz", "quaternion")
 LOCK = {"gimbal xyz": 0.5 * np.pi, "gimbal zxz": 0.0}  # second angle, rad
@@ -57,12 +57,11 @@ def measure(scene: Scene, distance: float, hinge: float) -> Outcome:
     errors = []
     for body in states():
         q, u = _coordinates(name, distance, body)
-        state = system.state(q, u)
         try:
-            found = _acceleration(system, q, system.accelerations(state), u)
+            motion = system.evaluate(0.0, q, u).markers["body"]
         except DynamicsError as error:
             return Outcome(status="failed", message=str(error))
-        spin = _velocity(system, q, u)
+        spin, found = motion.rotation.T @ motion.velocity[:3], motion.rotation.T @ motion.acceleration[:3]
         exact = -np.linalg.solve(INERTIA, np.cross(spin, INERTIA @ spin))
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
     return Outcome(float(np.log10(max(max(errors), ROUNDING))))
@@ -82,16 +81,6 @@ def hinge_map(sequence: str, q: Array) -> Array:
     axes = np.eye(3)[["xyz".index(letter) for letter in sequence]]
     second, third = (Rotation.from_rotvec(-q[k] * axes[k]).as_matrix() for k in (1, 2))
     return np.array([third @ second @ axes[0], third @ axes[1], axes[2]]).T
-
-
-def _velocity(system: System, q: Array, u: Array) -> Array:
-    motion = system.evaluate(0.0, q, u).markers["body"]
-    return np.asarray(motion.rotation.T @ motion.velocity[:3])
-
-
-def _acceleration(system: System, q: Array, rates: Array, u: Array) -> Array:
-    motion = system.evaluate(0.0, q, u).markers["body"]
-    return np.asarray(motion.rotation.T @ motion.acceleration[:3])
 
 
 def predicted(distance: Array, hinge: Array) -> Array:
