@@ -99,6 +99,22 @@ def test_error_follows_the_tolerance_however_stiff(run, rate):
     assert steps[0] < steps[-1] < 600
 
 
+@pytest.mark.parametrize(("run", "order"), [(run_radau5, 5), (run_exponential, 6)], ids=["radau5", "exponential"])
+def test_orders_where_nothing_is_stiff(run, order):
+    """Error against the number of steps, of which a tolerance is but a way to change it.
+
+    Steps of one run stay in proportion to another's; errors scatter by a factor 1.5 about the power, as the last steps
+    are cut, which over a fourfold number of steps is 0.3 in the slope.
+    """
+    exact, steps, errors = np.exp([-4.0, -2.0]), [], []
+    tolerances = 10.0 ** -np.arange(7.0, 9.6, 0.5) if order == 5 else 10.0 ** -np.arange(9.5, 12.1, 0.5)
+    for tolerance in tolerances:
+        done = solve(run, data(KAPS, 1.0), [1.0, 1.0], [0.0, 2.0], tolerance, tolerance, 2)
+        steps.append(done.accepted)
+        errors.append(np.abs(done.last - exact).max())
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(order, abs=0.4)
+
+
 @ADAPTIVE
 def test_prothero_and_robinson_cost_no_more_the_stiffer_they_are(run):
     """Explicit methods would need 3e8 steps for the rate 1e8."""
