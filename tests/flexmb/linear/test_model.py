@@ -173,3 +173,21 @@ def test_campbell_command(tmp_path):
     assert (tmp_path / "rail.png").exists() and (tmp_path / "rail.csv").exists()
     for rates in ("0:4", "a:b:c", "0:4:1"):
         assert invoke(*words, "--rates", rates).exit_code == 2
+
+
+def test_functions_of_time_go_on_or_are_held():
+    """A mass on a radial spring, its rail driven: w^2 = k/m - Omega^2, or k/m where the drive stands still."""
+    scene = (
+        fm.SceneBuilder("rail")
+        .rigid_body("rail", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        .revolute("drive", "ground", "rail", prescribed=fm.Ramp(rate=3.0))
+        .rigid_body("bead", mass=1.0, inertia=(0.1, 0.1, 0.1))
+        .prismatic("slide", "rail", "bead", axis=(1, 0, 0), stiffness=25.0, force=fm.Ramp(value=0.5, rate=2.0))
+        .scene()
+    )
+    system = fm.compile(scene)
+    moving, held = fm.linearize(system), fm.linearize(system, held=True)
+    assert moving.displacements == held.displacements == ("slide.translation",)
+    np.testing.assert_allclose([model.modes[0].frequency_rad_s for model in (moving, held)], [4.0, 5.0], rtol=ROUNDING)
+    np.testing.assert_allclose([moving.rates[0], moving.drift[0], held.drift[0]], [0.5, 2.0, 0.0], rtol=ROUNDING)
+    assert fm.equilibrium(system).q[1] == pytest.approx(0.5 / 25.0, rel=ROUNDING)
