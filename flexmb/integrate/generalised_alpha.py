@@ -114,8 +114,8 @@ def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspa
     end_of_step(move, y, h, radius, nq, s, constants)
     for iteration in range(1, _ITERATIONS + 1):
         status = derivative(rhs, t_new, s.y_new, s.f_new, constants, workspace, counts)
-        if status != OK:
-            return status, iteration
+        if status != OK:  # an iterate that runs away is no motion that diverges
+            return NOT_CONVERGED if status == NONFINITE else status, iteration
         for j in range(nu):
             s.correction[j] = s.f_new[nq + j] - s.rate_new[j]
         lu_solve(s.matrix, s.pivots, s.correction)
@@ -124,7 +124,7 @@ def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspa
         copy(s.y_new, s.y_before)
         end_of_step(move, y, h, radius, nq, s, constants)
         if not all_finite(s.y_new):
-            return NONFINITE, iteration
+            return NOT_CONVERGED, iteration
         for i in range(nq + nu):
             s.y_before[i] -= s.y_new[i]
         size = scaled_norm(s.y_before, s.y_new, rtol, atol, nq + nu)

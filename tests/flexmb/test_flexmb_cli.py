@@ -48,6 +48,16 @@ def test_a_run_that_stops_early_writes_what_it_reached_and_exits_1(tmp_path):
     assert not list(tmp_path.glob("*.png"))
 
 
+def test_methods_for_stiff_scenes_tell_their_jacobians(scene_file, tmp_path):
+    words = ("simulate", scene_file, "--t-end", 0.5, "--samples", 11, "--out", tmp_path, "--no-plots")
+    result = invoke(*words, "--method", "radau5", "--rtol", 1e-6, "--atol", 1e-8)
+    assert result.exit_code == 0, result.output
+    assert " Jacobians, " in result.output
+    result = invoke(*words, "--method", "radau5", "--spectral-radius", 0.5)
+    assert result.exit_code == 2
+    assert 'spectral_radius is for method "generalised_alpha"' in result.output
+
+
 def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
     assert invoke("check", scene_file).exit_code == 0
     scene_file.write_text(scene_file.read_text().replace('child = "bob"', 'child = "bop"'))
