@@ -20,7 +20,7 @@ from crosscheck.sweep import sweep
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
 from flexmb.simulation import simulate
-from flexmb.surrogate import finite_segments
+from flexmb.surrogate import finite_segments, substructured
 from flexmb.system import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "spinning_beam"
@@ -82,6 +82,43 @@ def segmented_minimum(case: str, segments: int) -> tuple[float, float]:
     done = simulate(compile(scene), PAST_MINIMUM_S, "rk4", step=2.5e-4 * (32 / segments), samples=times)
     assert done.finished
     return minimum(times, rotating_frame(TRUTHS[case].rate, times, done.markers["tip"].position)[:, 1])
+
+
+@cache
+def minimum_of_pieces(case: str, pieces: int, level: str) -> tuple[float, float]:
+    """Tip minimum (s, m) of the beam in flexible pieces, by an implicit method that steps over their fast modes."""
+    scene = substructured(load_scene(FAMILY / case / "scene.toml"), None, pieces, level=level)
+    times = np.linspace(0.0, PAST_MINIMUM_S, 161)
+    done = simulate(scene, PAST_MINIMUM_S, "radau5", rtol=1e-7, atol=1e-9, samples=times)
+    assert done.finished
+    return minimum(times, rotating_frame(TRUTHS[case].rate, times, done.markers["tip"].position)[:, 1])
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_flexible_pieces_reach_the_published_tip_minimum(case: str) -> None:
+    """As for segments, of the published beam: its finite deflection is open. The error falls with the third power of
+    the length of a piece at level stiffened and with the square at level full; both lead to one value."""
+    truth = TRUTHS[case]
+    length = load_scene(FAMILY / case / "scene.toml").bodies[0].length_m
+    first, second, third = (minimum_of_pieces(case, n, "stiffened")[1] for n in (2, 4, 8))
+    assert np.log2(abs(second - first) / abs(third - second)) > 2.0  # towards three, where the turn of a piece is small
+    time, full = minimum_of_pieces(case, 16, "full")
+    coarse = minimum_of_pieces(case, 8, "full")[1]
+    extrapolated = full + (full - coarse) / 3.0
+    assert abs(extrapolated - third) < SAFETY * (abs(full - coarse) / 3.0 * 0.25 + abs(third - second) / 3.0)
+    finite = abs(truth.tip_minimum) * (truth.tip_minimum / length) ** 2
+    assert abs(third - truth.tip_minimum) < finite + SAFETY * abs(third - second) / 3.0
+    assert minimum_of_pieces(case, 8, "stiffened")[0] == pytest.approx(truth.minimum_time, abs=0.005)
+    assert time == pytest.approx(truth.minimum_time, abs=0.02)
+
+
+def test_flexible_pieces_and_nonlinear_beam_have_one_tip_minimum() -> None:
+    """Beam K, which both codes have without shear; beam S of the nonlinear code has shear."""
+    pytest.importorskip("exudyn")
+    case = "beam_k_supercritical"
+    (_, coarse), (_, fine) = (minimum_of_pieces(case, n, "stiffened") for n in (4, 8))
+    beam = nonlinear_beam(case)
+    assert abs(fine - beam.minima[-1]) < SAFETY * abs(fine - coarse) / 3.0 + beam.doubt
 
 
 def spinning_steadily(scene: Scene, rate: float) -> Scene:
