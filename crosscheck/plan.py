@@ -80,8 +80,7 @@ def plan(case: Case, asked: tuple[str, ...], provider: str) -> tuple[CaseRecord,
 
 def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
     """The scene with the variant's levels and its transformation; `refined` sets the number of beam elements."""
-    if variant.level is not None:
-        scene = _on_flexible(scene, level=variant.level)
+    scene = at_level(scene, variant)
     if refined is not None and refined.elements is not None:
         scene = _on_beams(scene, elements=refined.elements)
     match variant.transform:
@@ -94,6 +93,11 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "substructures":
             return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
     return scene
+
+
+def at_level(scene: Scene, variant: Variant) -> Scene:
+    """The scene with every flexible body at the level of the variant, if it has one."""
+    return scene if variant.level is None else _on_flexible(scene, level=variant.level)
 
 
 def refine(variant: Variant, refined: Refined) -> Variant:
@@ -124,8 +128,9 @@ def _attempt(
     """The checked scene of a variant, or why there is none: one bad variant must not stop the others."""
     try:
         scene = case.scene(variant)
-        if control is not None:
-            scene = mutate(scene, control.mutation, control.target)
+        if control is not None:  # a fault in what the variant models, hence at its level
+            scene = mutate(at_level(scene, variant), control.mutation, control.target)
+            variant = msgspec.structs.replace(variant, level=None)
         scene = variant_scene(scene, variant, refined)
         check_scene(scene, t_end=variant.duration_s or case.run.duration_s)
         return scene, ""

@@ -168,6 +168,64 @@ def test_unstiffened_tip_passes_the_length_of_the_beam(case: str) -> None:
     assert passing[0] == pytest.approx(truth.passes_length, abs=1e-3)
 
 
+def stiffened(case: str, **modes) -> Scene:
+    """The scene with its beam at level stiffened; `modes` replace what it says of its modes."""
+    scene = load_scene(FAMILY / case / "scene.toml")
+    (beam,) = scene.bodies
+    return replace(scene, bodies=(replace(beam, level="stiffened", modes=replace(beam.modes, **modes)),))
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_stiffened_reaches_the_published_tip_minimum(case: str) -> None:
+    """With four modes, to a fraction (w/L)^2, below 0.5 %: the published beam is linear about the turning axis."""
+    truth = TRUTHS[case]
+    times = np.linspace(0.0, PAST_MINIMUM_S, 321)
+    done = simulate(compile(stiffened(case)), PAST_MINIMUM_S, "dop853", rtol=1e-9, atol=1e-11, samples=times)
+    assert done.finished
+    time, tip = minimum(times, rotating_frame(truth.rate, times, done.markers["tip"].position)[:, 1])
+    length = load_scene(FAMILY / case / "scene.toml").bodies[0].length_m
+    assert tip == pytest.approx(truth.tip_minimum, rel=(truth.tip_minimum / length) ** 2)
+    assert time == pytest.approx(truth.minimum_time, abs=0.01)
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_stiffened_stretches_as_a_spinning_rod(case: str) -> None:
+    """With axial modes at rest under the final spin, to 0.5 %: what the third axial mode and those beyond it add.
+
+    Modal shares of a uniform rod under a load that grows along it fall with the fourth power of the mode's number.
+    """
+    truth = TRUTHS[case]
+    scene = spinning_steadily(stiffened(case, count=2, families=("axial",)), truth.rate)
+    system = compile(scene)
+    state, modes, rows = system.initial_state, system.coordinate("beam.modes"), system.speed("beam.modes")
+    zero = system.bias(state)[rows]
+    columns = []
+    for n in range(modes.start, modes.stop):  # the force is linear in axial modes
+        q = state.q.copy()
+        q[n] = 1e-3
+        columns.append((system.bias(system.state(q, state.u))[rows] - zero) / 1e-3)
+    state.q[modes] = np.linalg.solve(np.array(columns).T, -zero)
+    tip = system.evaluate(0.0, state.q, state.u).markers["tip"].position
+    stretch = float(np.linalg.norm(tip)) - scene.bodies[0].length_m
+    assert stretch == pytest.approx(truth.stretch, rel=5e-3)
+
+
+@pytest.mark.parametrize("case", TRUTHS)
+def test_stiffened_is_stable_above_the_first_clamped_frequency(case: str) -> None:
+    """Over the whole manoeuvre, with stretch: the tip comes back, and energy less work stays."""
+    truth = TRUTHS[case]
+    times = np.linspace(0.0, SPIN_UP_S, 301)
+    done = simulate(
+        compile(stiffened(case, count=14, families=("bending_y", "axial"))), SPIN_UP_S, rtol=1e-9, atol=1e-11,
+        samples=times,
+    )  # fmt: skip
+    assert done.finished
+    motion = rotating_frame(truth.rate, times, done.markers["tip"].position)
+    assert minimum(times, motion[:, 1])[1] == pytest.approx(truth.tip_minimum, rel=5e-3)
+    assert np.max(np.abs(motion[times > 14.5, 1])) < 0.02 * abs(truth.tip_minimum)
+    assert np.max(np.abs(done.energy_drift)) <= 1e-7 * done.energy_scale
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_segments_reach_the_published_tip_minimum(case: str) -> None:
     """The published beam is linear about the turning axis; finite deflection w changes it by a fraction (w/L)^2."""
