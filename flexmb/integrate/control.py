@@ -47,7 +47,9 @@ def derivative(rhs, t, y, dy, constants, workspace, counts):
 
 @helper
 def scaled_norm(values, y, rtol, atol, controlled):
-    """Root mean square of values_i / (atol + rtol |y_i|) over the controlled components."""
+    """Root mean square of values_i / (atol + rtol |y_i|) over the controlled components; 0 where there are none."""
+    if controlled == 0:
+        return 0.0  # nothing moves freely
     total = 0.0
     for i in range(controlled):
         ratio = values[i] / (atol + rtol * abs(y[i]))
