@@ -61,10 +61,8 @@ class Method:
 
 
 def simulated(system: System, times: NDArray[np.float64], method: Method, max_steps: int = 1_000_000) -> Trajectory:
-    """A run with output at `times` (s). Where nothing is free to move, no error is there to control: one step."""
-    t_end = float(times[-1])
-    options = method.options() if system.nu else {"method": "rk4", "step": t_end}
-    return simulate(system, t_end, samples=times, max_steps=max_steps, **options)
+    """A run with output at `times` (s)."""
+    return simulate(system, float(times[-1]), samples=times, max_steps=max_steps, **method.options())
 
 
 def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[Method, ...], ...]:

@@ -66,7 +66,8 @@ def centrifuge(rate: float) -> fm.Scene:
 
 @pytest.mark.parametrize("method", ["dop853", "radau5", "exponential"])
 def test_a_scene_in_which_nothing_moves_is_at_rest_to_the_end(method):
-    scene = fm.SceneBuilder("post").rigid_body("post", mass=1.0, inertia=(1, 1, 1)).weld("foot", "ground", "post").scene()
+    post = fm.SceneBuilder("post").rigid_body("post", mass=1.0, inertia=(1, 1, 1))
+    scene = post.weld("foot", "ground", "post").scene()
     trajectory = fm.simulate(scene, t_end=1.0, method=method)
     assert trajectory.status is Status.OK and trajectory.t[-1] == 1.0
 
