@@ -37,7 +37,7 @@ def run_and_draw(
         done = _run(console, name, out / f"{name}.jsonl", depth, fresh, workers)
         picture = draw(done, pictures / f"{name}.svg")
         verdicts.append(done.verdict)
-        write_verdicts(verdicts, pictures / VERDICTS)
+        write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
         console.print(_line(done, picture), highlight=False, soft_wrap=True)
     good = sum(verdict.ok for verdict in verdicts)
     colour = "green" if good == len(verdicts) else "red"

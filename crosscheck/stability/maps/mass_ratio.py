@@ -106,7 +106,10 @@ def scaled_condition(ratio: Array, slender: Array) -> Array:
 
 
 def cancellation(ratio: Array, slender: Array) -> Array:
-    """log10 of the rounding of the outer mass over what is left of it: P - P H D^-1 H' P cancels at the hinge."""
+    """log10 of the rounding of the outer mass over what is left of it: P - P H D^-1 H' P cancels at the hinge.
+
+    A bound: where what is left is the outer body's, forces and inertia have the same error, and it cancels again.
+    """
     left, _ = left_over(ratio, slender)
     return np.asarray(np.log10(ROUNDING * np.maximum(ratio * LENGTH**2 / left, 1.0)))
 
@@ -118,7 +121,7 @@ SCALED = Overlay(
 )  # fmt: skip
 CANCELLING = Overlay(
     "u x outer mass over what is left of it", "cancellation: Higham, Accuracy and Stability, 1.7",
-    cancellation, levels=LEVELS,
+    cancellation, levels=LEVELS, bound=True,
 )  # fmt: skip
 
 

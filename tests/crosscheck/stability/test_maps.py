@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -19,8 +20,14 @@ from flexmb.system import compile
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
 LARGEST = {"many_bodies": 150.0}  # largest value of x in these tests, where cells beyond it take long
+COSTLY = {"integrator_flexmb_radau5"}  # runs of a second and more
 NAMES = tuple(stability_maps())
 WITHOUT_BOUNDARY = {name for name in NAMES if stability_maps()[name].overlay.name.startswith(("every", "no "))}
+
+
+def marked(names: Iterable[str]) -> list:
+    """Parameters, the costly ones marked slow."""
+    return [pytest.param(name, marks=[pytest.mark.slow] if name in COSTLY else []) for name in names]
 
 
 def coarse(axis: Axis, high: float | None = None) -> Axis:
@@ -52,13 +59,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory):
     return run
 
 
-@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("name", marked(NAMES))
 def test_the_map_agrees_with_its_overlay(name: str, finished) -> None:
     verdict = finished(name).verdict
     assert verdict.status == "agree", verdict.worst
 
 
-@pytest.mark.parametrize("name", [name for name in NAMES if name not in WITHOUT_BOUNDARY])
+@pytest.mark.parametrize("name", marked(name for name in NAMES if name not in WITHOUT_BOUNDARY))
 def test_an_overlay_somewhere_else_is_noticed(name: str, finished) -> None:
     """Moved by three cells along x, to the side where a bound forbids what it allowed."""
     done = finished(name)
@@ -76,7 +83,7 @@ def test_an_overlay_somewhere_else_is_noticed(name: str, finished) -> None:
     assert judge(wrong, done.mesh, done.records).status == "differ"
 
 
-@pytest.mark.parametrize("name", sorted(WITHOUT_BOUNDARY))
+@pytest.mark.parametrize("name", marked(sorted(WITHOUT_BOUNDARY)))
 def test_a_map_without_boundary_could_show_one(name: str, finished) -> None:
     """What is stable, or unstable, everywhere is not what the opposite prediction says."""
     done = finished(name)

@@ -1,0 +1,25 @@
+"""docs/gallery.md is what the generator writes, shows every map and every picture, and none of them is large."""
+
+from __future__ import annotations
+
+from crosscheck.stability.catalogue import stability_maps
+from crosscheck.stability.console import VERDICTS, read_verdicts
+from tests.repo.gallery import PAGE, PICTURES, other_pictures, page
+
+LARGEST = 200_000  # bytes
+
+
+def test_the_page_is_what_the_generator_writes() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "run `python -m tests.repo.gallery`"
+
+
+def test_every_map_has_a_picture_and_a_verdict_and_every_picture_is_shown() -> None:
+    maps = {f"{name}.svg" for name in stability_maps()}
+    assert {f"{verdict.map}.svg" for verdict in read_verdicts(PICTURES / VERDICTS)} == maps
+    shown = maps | {picture.file for picture in other_pictures()}
+    assert shown == {file.name for file in PICTURES.iterdir() if file.suffix in (".svg", ".png")}
+
+
+def test_pictures_are_small() -> None:
+    large = {file.name: file.stat().st_size for file in PICTURES.iterdir() if file.stat().st_size > LARGEST}
+    assert not large
