@@ -19,6 +19,7 @@ from flexmb.state import pack
 from flexmb.system import compile
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
+DECADES = {"gimbal_lock": 1.0}  # of a cell, where classes are narrower than two
 LARGEST = {"many_bodies": 150.0}  # largest value of x in these tests, where cells beyond it take long
 COSTLY = {"integrator_flexmb_radau5"}  # runs of a second and more
 NAMES = tuple(stability_maps())
@@ -30,15 +31,18 @@ def marked(names: Iterable[str]) -> list:
     return [pytest.param(name, marks=[pytest.mark.slow] if name in COSTLY else []) for name in names]
 
 
-def coarse(axis: Axis, high: float | None = None) -> Axis:
-    """An axis of five cells; categories as they are."""
-    return axis if axis.categories else replace(axis, cells=min(axis.cells, 5), high=high or axis.high)
+def coarse(axis: Axis, high: float | None = None, decades: float = 2.0) -> Axis:
+    """An axis of five cells, or of cells of so many decades; categories as they are."""
+    if axis.categories:
+        return axis
+    count = round(np.log10(axis.high / axis.low) / decades) if axis.log else 0
+    return replace(axis, cells=min(axis.cells, max(5, count)), high=high or axis.high)
 
 
 def coarse_maps() -> dict[str, StabilityMap]:
     """All maps, coarser and not refined."""
     return {
-        name: replace(what, x=coarse(what.x, LARGEST.get(name)), y=coarse(what.y), depth=0)
+        name: replace(what, x=coarse(what.x, LARGEST.get(name), DECADES.get(name, 2.0)), y=coarse(what.y), depth=0)
         for name, what in stability_maps().items()
     }
 
