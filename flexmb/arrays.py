@@ -56,6 +56,7 @@ BODY = _record(
     # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
     # without the summed points
     ("rigid", _F, (10,)),
+    ("product", _I),  # level full: row of `product`
     ("slope", _I),  # level linear: row of `slope`
     ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
     ("ball_spring", _F),  # stiffness of a spherical hinge
@@ -70,12 +71,10 @@ BODY = _record(
 )
 MODE = _record(  # mode n of a body
     ("mfr", _F, (6,)),  # coupling to [angular; linear] at rest
-    ("moment", _F, (9,)),  # P0_n = sum m phi_n r', r at rest
     ("gyration", _F, (6,)),  # ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
 )
 PAIR = _record(  # modes n, i of a body
     ("mff", _F),  # modal mass matrix
-    ("product", _F, (9,)),  # P1_ni = sum m phi_n phi_i'
     ("stiffness", _F),
     ("damping", _F),
 )
@@ -140,6 +139,7 @@ class Constants:
     body: Record  # (N,) BODY
     mode: Record  # (N,m) MODE
     pair: Record  # (N,m,m) PAIR
+    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.integrals` has it
     slope: Record  # (bodies of level linear,m,m) SLOPE
     mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT
@@ -234,9 +234,11 @@ class Workspace:
     port: Record  # (P,) PORT_STATE
     port_mode: Record  # (P,m) COLUMN
     point_mode: Record  # (m,) COLUMN, scratch of one summed point
+    integral: Real  # (12*m,) sums of one body's `product`
     speed: Record  # (nu,) SPEED_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body where an evaluation failed
+    displaced: Index  # (1,) whether modes and ports of ruthless bodies may not be at rest
 
 
 NODE_STATE = _record(  # node of a reduced body, axes of the body

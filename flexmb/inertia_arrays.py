@@ -25,9 +25,10 @@ class _Body:
     rigid: a.Real
     mode: a.Record
     pair: a.Record
-    slope: a.Record | None
-    mass_slope: a.Real | None
-    summed: TurningPoints | None
+    summed: TurningPoints | None = None
+    product: a.Real | None = None
+    slope: a.Record | None = None
+    mass_slope: a.Real | None = None
 
 
 def inertia_arrays(
@@ -40,9 +41,11 @@ def inertia_arrays(
     mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
     for k, each in enumerate(bodies):
         n = len(each.mode)
+        _drop_rounding(each.pair["mff"], len(chain[k].model.mass))
         body["rigid"][k], mode[k, :n], pair[k, :n, :n] = each.rigid, each.mode, each.pair
         body["orthogonal"][k] = _is_diagonal(each.pair["mff"])
         body["uncoupled"][k] = _is_diagonal(each.pair["stiffness"]) and _is_diagonal(each.pair["damping"])
+    body["product"], product = _rows([each.product for each in bodies], np.zeros((1 + m) * 9 * m))
     slopes = [each.slope for each in bodies]
     mass_slopes = [each.mass_slope for each in bodies]
     body["slope"], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
@@ -55,9 +58,21 @@ def inertia_arrays(
         row["inertia"] = six(p.inertia[i])
         row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))
     shapes = shape_records([(p.translation[i], p.rotation[i]) for p, i in turning], m)
-    tables = {"body": body, "mode": mode, "pair": pair, "slope": slope, "mass_slope": mass_slope}
+    tables = {
+        "body": body, "mode": mode, "pair": pair, "product": product, "slope": slope, "mass_slope": mass_slope,
+    }  # fmt: skip
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
     return tables, {"point": point, "point_mode": shapes}, seconds
+
+
+def _drop_rounding(masses: a.Real, points: int) -> None:
+    """Zeros for modal masses off the diagonal that are rounding of their sum over points: gamma(points) of its terms.
+
+    Orthogonal modes then have diagonal modal masses, which is cheaper. |sum m phi_n . phi_i| of terms in magnitude is
+    at most the root of both diagonal elements' product (Cauchy and Schwarz).
+    """
+    size = np.sqrt(np.diag(masses))
+    masses[np.abs(masses) <= points * 2.0**-53 * np.outer(size, size)] = 0.0
 
 
 def _is_diagonal(m: a.Real) -> bool:
@@ -129,15 +144,15 @@ def _tables(link: Link) -> _Body:
 def _full(i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
     """The polynomial part; every point whose inertia turns is summed."""
     pair["mff"], mode["mfr"] = i.M_ff, np.hstack([i.C0.T, i.s1.T])
-    mode["moment"] = _from_cross_products(i.J1).reshape(-1, 9)
-    pair["product"] = _from_cross_products(i.J2).reshape(*pair.shape, 9)
-    return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, None, None, i.turning)
+    P0, P1 = _from_cross_products(i.J1), _from_cross_products(i.J2)
+    product = _blocks(_nine(P0), _nine(P1))
+    return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, i.turning, product)
 
 
 def _stiffened(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
     """Every mass is a point to be summed, what turns another; the tables have the masses at rest."""
     masses = np.flatnonzero((link.model.mass > 0.0) & ~np.any(link.model.com_offset != 0.0, axis=1))
-    return replace(_full(i, mode, pair), summed=stacked(still_points(link.model, masses), i.turning))
+    return replace(_full(i, mode, pair), product=None, summed=stacked(still_points(link.model, masses), i.turning))
 
 
 def _at_rest(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _Body:
@@ -147,7 +162,7 @@ def _at_rest(link: Link, i: ModalIntegrals, mode: a.Record, pair: a.Record) -> _
     rr = block[n:, n:]
     pair["mff"], mode["mfr"] = block[:n, :n], block[:n, n:]
     mode["gyration"] = -0.5 * _sixes(inertia_slope(link.model))
-    return _Body(np.array([rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]), mode, pair, None, None, None)
+    return _Body(np.array([rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]), mode, pair)
 
 
 def _linear(link: Link, mode: a.Record, pair: a.Record) -> _Body:
@@ -161,7 +176,7 @@ def _linear(link: Link, mode: a.Record, pair: a.Record) -> _Body:
     slope["coriolis"] = by_mode - i.C1
     slope["gyration"] = _sixes(i.G)
     mass_slope = np.moveaxis(i.M1, 0, 2) if np.any(i.M1) else None
-    return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, slope, mass_slope, wheels)
+    return _Body(np.array([i.mass, *i.s0, *six(i.J0)]), mode, pair, wheels, None, slope, mass_slope)
 
 
 def _wheels_apart(link: Link) -> tuple[FlexibleModel, TurningPoints]:
@@ -184,3 +199,14 @@ def _from_cross_products(J: a.Real) -> a.Real:
     """sum m a b' from sum m a~' b~ = (a.b) 1 - b a', over the leading axes."""
     half_trace = 0.5 * np.trace(J, axis1=-2, axis2=-1)
     return np.swapaxes(half_trace[..., None, None] * np.eye(3) - J, -1, -2)
+
+
+def _nine(P: a.Real) -> a.Real:
+    """Matrices (...,3,3) as nine numbers (...,9): [xx yy zz xy xz yz] of the symmetric part, the axial vector."""
+    axial = [P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]]
+    return np.concatenate([_sixes(0.5 * (P + np.swapaxes(P, -1, -2))), np.stack(axial, axis=-1)], axis=-1)
+
+
+def _blocks(at_rest: a.Real, slope: a.Real) -> a.Real:
+    """Row of `product`: numbers at rest (n,numbers) and their slopes [n,i] (n,n,numbers), see `levels.integrals`."""
+    return np.concatenate([at_rest[None], np.swapaxes(slope, 0, 1)]).swapaxes(1, 2).ravel()

@@ -24,9 +24,11 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "port": np.zeros(len(c.port), a.PORT_STATE),
         "port_mode": np.zeros((len(c.port), m), a.COLUMN),
         "point_mode": np.zeros(m, a.COLUMN),
+        "integral": np.zeros(12 * m),
         "speed": np.zeros(nu, a.SPEED_STATE),
         "function": np.zeros((len(c.function), 3)),
         "fault": np.zeros(1, np.int64),
+        "displaced": np.ones(1, np.int64),
     }
     w = _reduced(c, fields) if isinstance(c, a.ReducedConstants) else a.Workspace(**fields)
     w.port["r"] = c.port["position"] + c.port["offset"]

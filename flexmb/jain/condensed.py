@@ -14,11 +14,11 @@ deformation, the tables are made anew at each evaluation.
 from math import sqrt
 
 from flexmb.arrays import RUTHLESS
-from flexmb.jain.explicit import refer_rigid
+from flexmb.jain.explicit import cholesky, refer_rigid
 from flexmb.jain.reduced import node_inertia
 from flexmb.kernel import helper
-from flexmb.spatial.inertia import add_product
-from flexmb.spatial.vector import vec3
+from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
+from flexmb.spatial.vector import add_outer, axpy, dot, scale, store3, sub, vec3
 
 NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
 
@@ -35,11 +35,9 @@ def eliminate_modes(c, w, k):
     _to_orthonormal(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b] - w.zeta[r, b]
-    for b in range(6):
-        s = w.body[k].force[b]
-        for n in range(c.body[k].modes):
-            s -= w.gain[r, n, 0, b] * w.mode[k, n].zf
-        w.body[k].hinge_force[b] = s
+    tau, f = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 0)
+    store3(w.body[k].hinge_force, 0, sub(vec3(w.body[k].force, 0), tau))
+    store3(w.body[k].hinge_force, 3, sub(vec3(w.body[k].force, 3), f))
     if nodes == 0:
         return True
     if not node_inertia(w, r, nodes):
@@ -71,69 +69,88 @@ def eliminate_modes(c, w, k):
 
 @helper
 def _tables(c, w, k):
-    """L^-1 M_fr, L^-1 Pi', zeta, root of Omega and Theta at the present deformation."""
-    r = c.body[k].reduced
-    nodes = c.body[k].nodes
-    nm = c.body[k].modes
-    for b in range(21):
-        w.zeta[r, b] = 0.0
+    """L^-1 M_fr, L^-1 Pi', zeta, Theta and root of Omega at the present deformation; L is diagonal."""
+    r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
+    rows, inverse, modes = w.gain[r], c.compliance[r], w.mode[k]
     for n in range(nm):
-        first = n if c.body[k].orthogonal else 0
-        for j in range(1 + nodes):
-            for b in range(6):
-                w.gain[r, n, j, b] = 0.0
-        for i in range(first, n + 1):
-            s = c.compliance[r, n, i]
-            for b in range(6):
-                w.gain[r, n, 0, b] += s * w.mode[k, i].pfr[b]
-            for j in range(nodes):
-                column = w.port_mode[c.node[r, j].port, i]
-                for b in range(3):
-                    w.gain[r, n, 1 + j, b] += s * column.W[b]
-                    w.gain[r, n, 1 + j, 3 + b] += s * column.L[b]
-        add_product(w.zeta[r], 0, 1.0, w.gain[r, n, 0], w.gain[r, n, 0])
+        store3(rows[n, 0], 0, scale(inverse[n, n], vec3(modes[n].pfr, 0)))
+        store3(rows[n, 0], 3, scale(inverse[n, n], vec3(modes[n].pfr, 3)))
+    store_inertia(w.zeta[r], 0, _squares(rows, nm, 0))
     omega = w.scratch[0]
     for j in range(nodes):
-        _theta(c, w, k, j)
-        for i in range(nodes):
+        columns = w.port_mode[c.node[r, j].port]
+        for n in range(nm):
+            store3(rows[n, 1 + j], 0, scale(inverse[n, n], vec3(columns[n].W, 0)))
+            store3(rows[n, 1 + j], 3, scale(inverse[n, n], vec3(columns[n].L, 0)))
+        _theta(rows, nm, j, vec3(w.port[c.node[r, j].port].r, 0), w.node[r, j].theta)
+        store_full(omega, 6 * j, _squares(rows, nm, 1 + j))
+        for i in range(j):
+            _products(rows, nm, 1 + j, 1 + i, omega, 6 * j, 6 * i)
             for a in range(6):
                 for b in range(6):
-                    s = 0.0
-                    for n in range(nm):
-                        s += w.gain[r, n, 1 + j, a] * w.gain[r, n, 1 + i, b]
-                    omega[6 * j + a, 6 * i + b] = s
+                    omega[6 * i + b, 6 * j + a] = omega[6 * j + a, 6 * i + b]
     w.rank[r] = semidefinite_root(omega, w.scratch[1, 0], w.root[r], 6 * nodes)
 
 
 @helper
-def _theta(c, w, k, j):
-    """Theta = phi' - Pi Lam M_fr of node j."""
-    r = c.body[k].reduced
-    theta = w.node[r, j].theta
-    x, y, z = vec3(w.port[c.node[r, j].port].r, 0)
+def _squares(rows, nm, j):
+    """sum_n x x' of x = rows[n, j] as a spatial inertia."""
+    six, nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    found = six, nine, six
+    for n in range(nm):
+        found = sum_inertia(found, outer_inertia(vec3(rows[n, j], 0), vec3(rows[n, j], 3), 1.0))
+    return found
+
+
+@helper
+def _products(rows, nm, i, j, out, p, q):
+    """sum_n x y' of x = rows[n, i], y = rows[n, j] into the block of `out` that starts at p, q."""
+    for half in range(0, 6, 3):
+        left = right = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+        for n in range(nm):
+            x = vec3(rows[n, i], half)
+            left = add_outer(left, x, vec3(rows[n, j], 0))
+            right = add_outer(right, x, vec3(rows[n, j], 3))
+        for a in range(3):
+            for b in range(3):
+                out[p + half + a, q + b] = left[3 * a + b]
+                out[p + half + a, q + 3 + b] = right[3 * a + b]
+
+
+@helper
+def _theta(rows, nm, j, r, theta):
+    """Theta = phi' - Pi Lam M_fr of node j at r."""
+    _products(rows, nm, 1 + j, 0, theta, 0, 0)
     for a in range(6):
         for b in range(6):
-            s = 1.0 if a == b else 0.0
-            for n in range(c.body[k].modes):
-                s -= w.gain[r, n, 1 + j, a] * w.gain[r, n, 0, b]
-            theta[a, b] = s
-    theta[3, 1] += z
-    theta[3, 2] -= y
-    theta[4, 0] -= z
-    theta[4, 2] += x
-    theta[5, 0] += y
-    theta[5, 1] -= x
+            theta[a, b] = -theta[a, b]
+        theta[a, a] += 1.0
+    theta[3, 1] += r[2]
+    theta[3, 2] -= r[1]
+    theta[4, 0] -= r[2]
+    theta[4, 2] += r[0]
+    theta[5, 0] += r[1]
+    theta[5, 1] -= r[0]
 
 
 @helper
 def semidefinite_root(a, diagonal, root, n):
     """Rows root[:rank] with a[:n,:n] = root' root to round-off; returns the rank. Overwrites a and diagonal (n,).
 
-    Cholesky with complete pivoting, scaled to a unit diagonal: what is left behind is smaller than the last pivot, and
-    units do not matter.
+    Cholesky, if there is a pivot everywhere. Else with complete pivoting, scaled to a unit diagonal: what is left
+    behind is smaller than the last pivot, and units do not matter.
     """
     for i in range(n):
         diagonal[i] = a[i, i]
+    if cholesky(a, n):
+        for i in range(n):
+            for j in range(n):
+                root[j, i] = a[i, j] if j <= i else 0.0
+        return n
+    for i in range(n):
+        a[i, i] = diagonal[i]
+        for j in range(i):
+            a[i, j] = a[j, i]
     rank = 0
     while rank < n:
         best = -1
@@ -157,12 +174,23 @@ def semidefinite_root(a, diagonal, root, n):
 @helper
 def _to_orthonormal(c, w, k):
     """L^-1 z_f in place."""
-    row = c.compliance[c.body[k].reduced]
-    for n in range(c.body[k].modes - 1, -1, -1):
-        s = 0.0
-        for i in range(n if c.body[k].orthogonal else 0, n + 1):
-            s += row[n, i] * w.mode[k, i].zf
-        w.mode[k, n].zf = s
+    rows = c.compliance[c.body[k].reduced]
+    for i in range(c.body[k].modes - 1, -1, -1):
+        s = w.mode[k, i].zf
+        w.mode[k, i].zf = rows[i, i] * s
+        if not c.body[k].orthogonal:
+            for n in range(i + 1, c.body[k].modes):
+                w.mode[k, n].zf += rows[n, i] * s
+
+
+@helper
+def _sum_of_modes(rows, modes, nm, j):
+    """Psi' z_f for j = 0, Ups' z_f of node j - 1 beyond: angular and linear part."""
+    angular = linear = (0.0, 0.0, 0.0)
+    for n in range(nm):
+        angular = axpy(modes[n].zf, vec3(rows[n, j], 0), angular)
+        linear = axpy(modes[n].zf, vec3(rows[n, j], 3), linear)
+    return angular, linear
 
 
 @helper
@@ -171,11 +199,9 @@ def _responses(c, w, k):
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
-        for b in range(6):
-            s = 0.0
-            for n in range(c.body[k].modes):
-                s += w.gain[r, n, 1 + i, b] * w.mode[k, n].zf
-            w.node[r, i].response[b] = s
+        angular, linear = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 1 + i)
+        store3(w.node[r, i].response, 0, angular)
+        store3(w.node[r, i].response, 3, linear)
     for a in range(w.rank[r]):
         s = 0.0
         for i in range(nodes):
@@ -194,22 +220,19 @@ def modal_accelerations(c, w, k, alpha, a):
     for i in range(nodes):
         node = w.node[r, i]
         for b in range(6):
-            node.response[b] = node.force[b] + _row_times(node.carried[b], alpha, a)
+            node.response[b] = node.force[b] + dot(vec3(node.carried[b], 0), alpha) + dot(vec3(node.carried[b], 3), a)
+    rows, modes = w.gain[r], w.mode[k]
     for n in range(c.body[k].modes):
-        s = w.mode[k, n].zf + _row_times(w.gain[r, n, 0], alpha, a)
+        s = modes[n].zf + dot(vec3(rows[n, 0], 0), alpha) + dot(vec3(rows[n, 0], 3), a)
         for i in range(nodes):
             response = w.node[r, i].response
-            s += _row_times(w.gain[r, n, 1 + i], vec3(response, 0), vec3(response, 3))
-        w.mode[k, n].etadd = -s
+            s += dot(vec3(rows[n, 1 + i], 0), vec3(response, 0)) + dot(vec3(rows[n, 1 + i], 3), vec3(response, 3))
+        modes[n].etadd = -s
+    for i in range(c.body[k].modes):
+        row, s = c.compliance[r, i], w.mode[k, i].etadd
+        w.mode[k, i].etadd = row[i] * s
+        if not c.body[k].orthogonal:
+            for n in range(i):
+                w.mode[k, n].etadd += row[n] * s
     for n in range(c.body[k].modes):
-        s = 0.0
-        for i in range(n, n + 1 if c.body[k].orthogonal else c.body[k].modes):
-            s += c.compliance[r, i, n] * w.mode[k, i].etadd
-        w.mode[k, n].etadd = s
-        w.speed[c.body[k].etad_index + n].acceleration = s
-
-
-@helper
-def _row_times(row, x, y):
-    """Product of 6 numbers with [x; y]."""
-    return row[0] * x[0] + row[1] * x[1] + row[2] * x[2] + row[3] * y[0] + row[4] * y[1] + row[5] * y[2]
+        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd

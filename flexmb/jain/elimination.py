@@ -42,7 +42,8 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 
     Not with a free wheel, which takes a rank-one part out of D_f. A hinge on a node that its own modes move adds the
     rigid inertia to D_f: it must be constant too, so that level ruthless is needed and no outboard body may sit on a
-    point that does not deform. The Woodbury form is Appendix B's: of ruthless bodies.
+    point that does not deform. The Woodbury form is Appendix B's: of ruthless bodies. Condensed tables that are made
+    anew at each evaluation are worth their cost only where modal masses are diagonal, as those of beams are.
     """
     body = c.body[k]
     free_wheel = any(
@@ -54,6 +55,7 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
         return False
     constant = body["level"] == a.RUTHLESS or (
         variant == a.CONDENSED
+        and body["orthogonal"]
         and body["point_start"] == body["point_stop"]
         and not (body["level"] == a.LINEAR and body["mass_slope"] >= 0)
     )
@@ -63,14 +65,13 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
 def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
     """Whether condensing body k is taken to be faster than a Cholesky factor of D_f.
 
-    Measured (tests/benchmarks/test_elimination.py): chains of ruthless clamped beams, one node each, gain from 9 to 10
-    modes on; tables made anew at each evaluation with full modal masses never gain up to 40 modes. Estimated from
-    operation counts, not measured: the threshold with diagonal modal masses, and its growth with the nodes. A tip
-    counts as one node: it would gain earlier, but not what compiling costs.
+    Measured (tests/benchmarks/test_elimination.py) on chains of clamped beams, one node each: ruthless ones gain from
+    7 to 8 modes on, those of level full, whose tables are made anew at each evaluation, from 13 to 14. Estimated from
+    operation counts, not measured: the growth of the thresholds with the nodes. A tip counts as one node: it would
+    gain earlier, but not what compiling costs.
     """
     body = c.body[k]
-    constant = body["level"] == a.RUTHLESS
-    return bool((constant or body["orthogonal"]) and body["modes"] >= (10 if constant else 16) * max(1, nodes))
+    return bool(body["modes"] >= (8 if body["level"] == a.RUTHLESS else 14) * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:
@@ -105,6 +106,7 @@ def _reduced_constants(
     body["reduced"] = body["node"] = -1
     for row, k in enumerate(reduced):
         body["elimination"][k], body["reduced"][k], body["nodes"][k] = variant, row, len(nodes[k])
+        body["orthogonal"][k] &= body["outboard_port"][k] < 0  # about a node that deforms, masses couple all modes
         children = np.flatnonzero((body["parent"] == k) & (body["inboard_port"] >= 0))
         body["node"][children] = np.arange(len(children))
         _fill(c, k, row, nodes[k], variant, tables)

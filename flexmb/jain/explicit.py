@@ -13,9 +13,10 @@ from flexmb.spatial.inertia import (
     shift_force,
     shift_inertia,
     store_inertia,
+    sum_inertia,
 )
 from flexmb.spatial.scalar import sqrt
-from flexmb.spatial.vector import add3, cross, dot, mat3, scale, store3, sub, times, vec3
+from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, sub, times, vec3
 
 SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
 
@@ -26,27 +27,27 @@ def eliminate_modes(c, w, k):
     nm = c.body[k].modes
     if c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    p = load_inertia(w.body[k].inertia, 0)
-    store_inertia(w.body[k].hinge_inertia, 0, p)
-    for i in range(6):
-        w.body[k].hinge_force[i] = w.body[k].force[i]
-    if nm == 0:
-        return True
-    if not cholesky(w.pff[k], nm):
+    if nm > 0 and not cholesky(w.pff[k], nm):
         return False
+    p = load_inertia(w.body[k].inertia, 0)
+    tau, f = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
     for n in range(nm):
+        angular, linear, z = vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), w.mode[k, n].zf
         for i in range(n):
-            w.mode[k, n].zf -= w.pff[k, n, i] * w.mode[k, i].zf
-            for b in range(6):
-                w.mode[k, n].pfr[b] -= w.pff[k, n, i] * w.mode[k, i].pfr[b]
+            s = -w.pff[k, n, i]
+            z += s * w.mode[k, i].zf
+            angular = axpy(s, vec3(w.mode[k, i].pfr, 0), angular)
+            linear = axpy(s, vec3(w.mode[k, i].pfr, 3), linear)
         s = 1.0 / w.pff[k, n, n]
-        w.mode[k, n].zf *= s
-        for b in range(6):
-            w.mode[k, n].pfr[b] *= s
-            w.body[k].hinge_force[b] -= w.mode[k, n].pfr[b] * w.mode[k, n].zf
-        add_inertia(
-            w.body[k].hinge_inertia, 0, outer_inertia(vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), -1.0)
-        )
+        angular, linear, z = scale(s, angular), scale(s, linear), s * z
+        store3(w.mode[k, n].pfr, 0, angular)
+        store3(w.mode[k, n].pfr, 3, linear)
+        w.mode[k, n].zf = z
+        tau, f = axpy(-z, angular, tau), axpy(-z, linear, f)
+        p = sum_inertia(p, outer_inertia(angular, linear, -1.0))
+    store3(w.body[k].hinge_force, 0, tau)
+    store3(w.body[k].hinge_force, 3, f)
+    store_inertia(w.body[k].hinge_inertia, 0, p)
     return True
 
 
@@ -62,11 +63,12 @@ def cholesky(a, n):
             return False
         d = sqrt(d)
         a[j, j] = d
+        d = 1.0 / d
         for m in range(j + 1, n):
             s = a[m, j]
             for i in range(j):
                 s -= a[m, i] * a[j, i]
-            a[m, j] = s / d
+            a[m, j] = d * s
     return True
 
 

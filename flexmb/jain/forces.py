@@ -19,13 +19,16 @@ from flexmb.spatial.vector import (
 @helper
 def elastic_forces(c, w, k):
     """Add K eta + D etadot, at the true deformation for every level."""
-    nm = c.body[k].modes
+    nm, q, u = c.body[k].modes, c.body[k].eta_index, c.body[k].etad_index
+    if c.body[k].uncoupled:
+        for n in range(nm):
+            w.mode[k, n].zf += c.pair[k, n, n].stiffness * w.q[q + n] + c.pair[k, n, n].damping * w.u[u + n]
+        return
     for n in range(nm):
-        start, stop = (n, n + 1) if c.body[k].uncoupled else (0, nm)
-        for i in range(start, stop):
-            eta = w.q[c.body[k].eta_index + i]
-            etad = w.u[c.body[k].etad_index + i]
-            w.mode[k, n].zf += c.pair[k, n, i].stiffness * eta + c.pair[k, n, i].damping * etad
+        s = w.mode[k, n].zf
+        for i in range(nm):
+            s += c.pair[k, n, i].stiffness * w.q[q + i] + c.pair[k, n, i].damping * w.u[u + i]
+        w.mode[k, n].zf = s
 
 
 @helper

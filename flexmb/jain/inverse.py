@@ -46,9 +46,10 @@ def _inertial_force(c, w, k, tau):
         coupling = w.mode[k, n].pfr
         torque = axpy(w.mode[k, n].etadd, vec3(coupling, 0), torque)
         force = axpy(w.mode[k, n].etadd, vec3(coupling, 3), force)
-        w.mode[k, n].zf += dot(vec3(coupling, 0), alpha) + dot(vec3(coupling, 3), a)
+        s = w.mode[k, n].zf + dot(vec3(coupling, 0), alpha) + dot(vec3(coupling, 3), a)
         for i in range(c.body[k].modes):
-            w.mode[k, n].zf += w.pff[k, n, i] * w.mode[k, i].etadd
+            s += w.pff[k, n, i] * w.mode[k, i].etadd
+        w.mode[k, n].zf = s
     add_force(w, k, torque, force)
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         port = c.wheel[i].port

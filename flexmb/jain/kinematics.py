@@ -30,16 +30,19 @@ def velocity_sweep(c, w, shape, rates):
     """Poses, velocities and bias accelerations of all bodies and ports, base to tip (10), (11).
 
     `shape` and `rates` say whether a ruthless body shows its true eta and etadot or zero: neither in the equations of
-    motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers.
+    motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers. What is at rest stays so.
     """
+    displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
         exact = c.body[k].level != RUTHLESS
-        for n in range(c.body[k].modes):
-            w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-            w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
-        for i in range(c.body[k].port_start, c.body[k].port_stop):
-            _move_port(c, w, k, i)
+        if exact or displaced:
+            for n in range(c.body[k].modes):
+                w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+                w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+            for i in range(c.body[k].port_start, c.body[k].port_stop):
+                _move_port(c, w, k, i)
         _cross_hinge(c, w, k)
+    w.displaced[0] = 1 if shape or rates else 0
 
 
 @helper

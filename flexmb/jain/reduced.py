@@ -4,7 +4,9 @@ A node is a port that deforms and carries a hinge. With Gamma and y the articula
 there, A the node's acceleration, F its load on the body, modes included: F = Gamma A + y. Nodes are stacked.
 """
 
-from flexmb.jain.explicit import cholesky
+from math import sqrt
+
+from flexmb.jain.explicit import SINGULAR
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import (
     inertia_times,
@@ -49,13 +51,18 @@ def node_inertia(w, r, nodes):
             for i in range(6 * nodes):
                 s += B[a, i] * root[b, i]
             C[a, b] = s
-    if not cholesky(C, rank):
-        return False
-    for a in range(rank):
-        for b in range(a):
-            for i in range(6 * nodes):
-                B[a, i] -= C[a, b] * B[b, i]
+        T[0, a] = SINGULAR * C[a, a]
+    for a in range(rank):  # one elimination for C and B: roots are no part of its chain of divisions
+        if not C[a, a] > T[0, a]:
+            return False
         s = 1.0 / C[a, a]
+        for b in range(a + 1, rank):
+            factor = s * C[b, a]
+            for e in range(a + 1, b + 1):
+                C[b, e] -= factor * C[e, a]
+            for i in range(6 * nodes):
+                B[b, i] -= factor * B[a, i]
+        s = sqrt(s)
         for i in range(6 * nodes):
             B[a, i] *= s
     for i in range(6 * nodes):

@@ -3,10 +3,11 @@
 Scenes with other choices have ReducedConstants: the kernels are compiled again for them.
 """
 
-from flexmb.arrays import CONDENSED, EXPLICIT, RUTHLESS, WOODBURY
+from flexmb.arrays import CONDENSED, EXPLICIT, FULL, RUTHLESS, WOODBURY
 from flexmb.jain import condensed, explicit, woodbury
 from flexmb.jain.reduced import to_node
 from flexmb.kernel import by_bundle, helper
+from flexmb.levels import full
 from flexmb.levels.body import body_inertia
 from flexmb.levels.ruthless import rigid_block_and_bias
 
@@ -15,6 +16,8 @@ from flexmb.levels.ruthless import rigid_block_and_bias
 def _inertia(c, w, k):
     if c.body[k].elimination != EXPLICIT and c.body[k].level == RUTHLESS:
         rigid_block_and_bias(c, w, k)
+    elif c.body[k].elimination == CONDENSED and c.body[k].level == FULL:
+        full.coupling_and_bias(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
     else:
         body_inertia(c, w, k)
 

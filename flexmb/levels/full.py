@@ -1,11 +1,13 @@
 """Level full: exact kinematics of the linear modal field; the kinetic energy is the sum over inertia points.
 
 Point r = x + phi eta, point rotation exp(skew(psi eta)). Mass at the points themselves gives a kinetic energy that is
-polynomial in eta: it is carried by the integrals P0_n = sum m phi_n x' and P1_nm = sum m phi_n phi_m', no sum over
+polynomial in eta: it is carried by the integrals P0_n = sum m phi_n x' and P1_ni = sum m phi_n phi_i', no sum over
 points is left. Points with rotating inertia, or with a mass centre off the point, are summed.
 """
 
 from flexmb.kernel import helper
+from flexmb.levels.integrals import AXIAL, NUMBERS, sum_integrals, symmetric, vector
+from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import (
@@ -13,83 +15,77 @@ from flexmb.spatial.vector import (
     axpy,
     cross,
     dot,
-    mat3,
     scale,
     store3,
     sub,
     sym6,
     sym_add,
+    sym_axpy,
+    sym_dot,
     sym_times,
-    times,
     vec3,
 )
 
 
 @helper
-def _axial(m):
-    """sum m_j b_j x a_j of a matrix sum m_j a_j b_j'."""
-    return m[7] - m[5], m[2] - m[6], m[3] - m[1]
-
-
-@helper
-def _mat_axpy(s, a, b):
-    """s A + B for 9-tuples."""
-    return (
-        s * a[0] + b[0],
-        s * a[1] + b[1],
-        s * a[2] + b[2],
-        s * a[3] + b[3],
-        s * a[4] + b[4],
-        s * a[5] + b[5],
-        s * a[6] + b[6],
-        s * a[7] + b[7],
-        s * a[8] + b[8],
-    )
-
-
-@helper
 def inertia_and_bias(c, w, k):
-    """Polynomial part, then the summed points."""
-    _polynomial(c, w, k)
+    """Modal masses, all else of the polynomial part, then the summed points."""
+    modal_masses(c, w, k)
+    coupling_and_bias(c, w, k)
     for j in range(c.body[k].point_start, c.body[k].point_stop):
         add_point(c, w, k, j)
 
 
 @helper
-def _polynomial(c, w, k):
+def coupling_and_bias(c, w, k):
     """Integrals of r x (.) and phi_n . (.) of the point acceleration w x (w x r) + 2 w x (phi etadot)."""
     nm = c.body[k].modes
+    at_rest, p = c.product[c.body[k].product], w.integral
+    sum_integrals(at_rest, w.mode[k], nm, p)
     omega = vec3(w.body[k].velocity, 0)
-    w2 = dot(omega, omega)
+    spin = centrifugal(omega)
     body = c.body[k].rigid
     s = vec3(body, 1)
-    stretch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (u r' + x u'), u = phi eta
-    flow = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (phi etadot) r'
+    stretch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (u r' + x u'), u = phi eta
+    flow = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (phi etadot) r', symmetric part
+    turn = (0.0, 0.0, 0.0)  # and axial vector
     momentum = (0.0, 0.0, 0.0)  # sum m phi etadot
     for n in range(nm):
-        p0 = mat3(c.mode[k, n].moment, 0)
-        p = p0  # P_n = sum m phi_n r'
-        swirl = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m phi_n (phi etadot)'
-        for i in range(nm):
-            p1 = mat3(c.pair[k, n, i].product, 0)
-            p = _mat_axpy(w.mode[k, i].eta, p1, p)
-            swirl = _mat_axpy(w.mode[k, i].etad, p1, swirl)
-            w.pff[k, n, i] = c.pair[k, n, i].mff
+        eta, etad = w.mode[k, n].eta, w.mode[k, n].etad
+        P, axial = symmetric(p, n, nm), vector(p, AXIAL * nm + n, nm)  # sum m phi_n r'
+        swirl = vector(p, NUMBERS * nm + n, nm)  # axial vector of sum m phi_n (phi etadot)'
         translation = vec3(c.mode[k, n].mfr, 3)
-        store3(w.mode[k, n].pfr, 0, _axial(p))
+        store3(w.mode[k, n].pfr, 0, axial)
         store3(w.mode[k, n].pfr, 3, translation)
-        centrifugal = dot(omega, times(p, omega)) - w2 * (p[0] + p[4] + p[8])
-        w.mode[k, n].zf = centrifugal + 2.0 * dot(omega, _axial(swirl))
-        eta = w.mode[k, n].eta
-        etad = w.mode[k, n].etad
-        transposed = (p0[0], p0[3], p0[6], p0[1], p0[4], p0[7], p0[2], p0[5], p0[8])
-        stretch = _mat_axpy(eta, transposed, _mat_axpy(eta, p, stretch))
-        flow = _mat_axpy(etad, p, flow)
+        w.mode[k, n].zf = sym_dot(spin, P) + 2.0 * dot(omega, swirl)
+        stretch = sym_axpy(eta, sym_add(P, symmetric(at_rest, n, nm)), stretch)
+        flow = sym_axpy(etad, P, flow)
+        turn = axpy(etad, axial, turn)
         s = axpy(eta, translation, s)
         momentum = axpy(etad, translation, momentum)
-    xx, yy, zz = stretch[0], stretch[4], stretch[8]
-    j = sym_add(sym6(body, 4), (yy + zz, xx + zz, xx + yy, -stretch[1], -stretch[2], -stretch[5]))
+    j = stretched(sym6(body, 4), stretch)
     store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
-    coriolis = sub(scale(flow[0] + flow[4] + flow[8], omega), times(flow, omega))
-    store3(w.body[k].force, 0, add(cross(omega, sym_times(j, omega)), scale(2.0, coriolis)))
+    torque = add(cross(omega, sym_times(j, omega)), scale(2.0, coriolis(omega, flow, turn)))
+    store3(w.body[k].force, 0, torque)
     store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, momentum))))
+
+
+@helper
+def centrifugal(omega):
+    """W with w' P w - w'w tr P = W . P for symmetric P."""
+    x, y, z = omega
+    return -(y * y + z * z), -(x * x + z * z), -(x * x + y * y), 2.0 * x * y, 2.0 * x * z, 2.0 * y * z
+
+
+@helper
+def stretched(j, P):
+    """Inertia J with sum m r r' changed by the symmetric P."""
+    xx, yy, zz, xy, xz, yz = P
+    return sym_add(j, (yy + zz, xx + zz, xx + yy, -xy, -xz, -yz))
+
+
+@helper
+def coriolis(omega, flow, turn):
+    """tr(P) w - P w of P = sum m v r' with symmetric part `flow` and axial vector `turn`."""
+    moved = add(sym_times(flow, omega), scale(0.5, cross(turn, omega)))
+    return sub(scale(flow[0] + flow[1] + flow[2], omega), moved)

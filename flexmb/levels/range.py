@@ -1,5 +1,6 @@
 """How far a modal field means anything."""
 
+from flexmb.arrays import RUTHLESS
 from flexmb.kernel import helper
 
 RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
@@ -7,8 +8,11 @@ RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, no
 
 @helper
 def is_out_of_range(c, w, k):
-    """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size."""
-    if c.body[k].modes == 0:
+    """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
+
+    eta as the level sees it: a ruthless body never leaves its range.
+    """
+    if c.body[k].modes == 0 or c.body[k].level == RUTHLESS:
         return False
     body = c.body[k].rigid
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])

@@ -2,6 +2,7 @@
 
 from flexmb.kernel import helper
 from flexmb.levels import rigid
+from flexmb.levels.masses import modal_masses
 from flexmb.spatial.vector import dot, sym6, sym_times, vec3
 
 
@@ -9,9 +10,8 @@ from flexmb.spatial.vector import dot, sym6, sym_times, vec3
 def inertia_and_bias(c, w, k):
     """The rigid body at rest shape, constant modal blocks, and the centrifugal force w' B_n w on each mode."""
     rigid_block_and_bias(c, w, k)
+    modal_masses(c, w, k)
     for n in range(c.body[k].modes):
-        for i in range(c.body[k].modes):
-            w.pff[k, n, i] = c.pair[k, n, i].mff
         for i in range(6):
             w.mode[k, n].pfr[i] = c.mode[k, n].mfr[i]
 

@@ -11,6 +11,7 @@ from flexmb.spatial.vector import (
     mat3,
     rotate_mat,
     rotate_sym,
+    store3,
     store9,
     sym6,
     sym_add,
@@ -32,6 +33,15 @@ def store_inertia(a, i, p):
         a[i + n] = p[0][n]
         a[i + 15 + n] = p[2][n]
     store9(a, i + 6, p[1])
+
+
+@helper
+def store_full(a, i, p):
+    """The 6x6 matrix itself into the block of a 2-D array that starts at row and column i."""
+    for n in range(6):
+        x, y = inertia_column(p, n)
+        store3(a[i + n], i, x)
+        store3(a[i + n], i + 3, y)
 
 
 @helper

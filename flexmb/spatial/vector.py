@@ -132,6 +132,12 @@ def sym_axpy(s, a, b):
 
 
 @helper
+def sym_dot(a, b):
+    """Sum of the six products."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2] + a[3] * b[3] + a[4] * b[4] + a[5] * b[5]
+
+
+@helper
 def rotate_sym(r, s):
     """R S R' for a symmetric 6-tuple S."""
     t = matmul(r, sym_full(s))
@@ -142,6 +148,22 @@ def rotate_sym(r, s):
         t[0] * r[3] + t[1] * r[4] + t[2] * r[5],
         t[0] * r[6] + t[1] * r[7] + t[2] * r[8],
         t[3] * r[6] + t[4] * r[7] + t[5] * r[8],
+    )
+
+
+@helper
+def add_outer(m, a, b):
+    """M + a b'."""
+    return (
+        a[0] * b[0] + m[0],
+        a[0] * b[1] + m[1],
+        a[0] * b[2] + m[2],
+        a[1] * b[0] + m[3],
+        a[1] * b[1] + m[4],
+        a[1] * b[2] + m[5],
+        a[2] * b[0] + m[6],
+        a[2] * b[1] + m[7],
+        a[2] * b[2] + m[8],
     )
 
 

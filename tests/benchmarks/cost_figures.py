@@ -36,15 +36,11 @@ def chain(bodies: int, modes: int, ends: Ends) -> fm.System:
 def operations(route: str, bodies: int, modes: int, ends: Ends) -> int:
     """Executed by one evaluation, from counts of small chains: tests/flexmb/jain/test_cost.py holds the polynomials.
 
-    Articulated bodies are linear in bodies, composite ones cubic in pairs of bodies and in modes.
+    Articulated bodies are linear in bodies, composite ones cubic in pairs of bodies.
     """
     if route == "articulated":
         return _continued([_counted(route, n, modes, ends) for n in (2, 3)], bodies - 2)
-    by_modes = [
-        _continued([_counted(route, n, m, ends) for n in range(2, 9, 2)], bodies // 2 - 1)
-        for m in (range(1, 5) if modes else [0])
-    ]
-    return _continued(by_modes, max(modes - 1, 0))
+    return _continued([_counted(route, n, modes, ends) for n in range(2, 9, 2)], bodies // 2 - 1)
 
 
 @cache
@@ -69,7 +65,7 @@ def of_modes(axes: tuple[Axes, Axes]) -> None:
         for route, style in STYLES.items():
             left.semilogy(MODES, counted[route], f"{colour}{style}", label=f"{route}, counted, {ends}")
         right.plot(MODES, counted["composite"] / counted["articulated"], f"{colour}-", label=f"counted, {ends}")
-        times = [interleaved(*(route(chain(10, n, ends)) for route in ROUTES.values())) for n in MODES]
+        times = [interleaved(*(route(chain(10, n, ends)).in_a_run for route in ROUTES.values())) for n in MODES]
         right.plot(MODES, [b / a for a, b in times], f"{colour}{marker}", ms=4, label=f"measured, {ends}")
     left.set(xlabel="modes of each body", ylabel="operations of one evaluation", xticks=MODES[::3])
     right.set(xlabel="modes of each body", ylabel="composite / articulated", xticks=MODES[::3], ylim=(0.0, None))
@@ -96,5 +92,5 @@ def of_bodies(axes: tuple[Axes, Axes]) -> None:
 def _relative_time(route: str, bodies: int, modes: int) -> float:
     """Time per body over that of an articulated body in a chain of ten, in turns."""
     unit, long = chain(10, modes, "clamped-free"), chain(bodies, modes, "clamped-free")
-    seconds = interleaved(articulated(unit), ROUTES[route](long))
+    seconds = interleaved(articulated(unit).in_a_run, ROUTES[route](long).in_a_run)
     return (seconds[1] / bodies) / (seconds[0] / 10)

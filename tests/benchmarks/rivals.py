@@ -1,9 +1,9 @@
-"""Interleaved timing: rivals take turns, so that a busy machine slows both."""
+"""Interleaved timing: rivals take turns, so that a busy machine slows both; time that others had does not count."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import perf_counter
+from time import thread_time
 from typing import Literal
 
 import numpy as np
@@ -24,16 +24,16 @@ def interleaved(*rivals: Callable[[], object]) -> list[float]:
     repeats = []
     for rival in rivals:
         rival()
-        start = perf_counter()
+        start = thread_time()
         rival()
-        repeats.append(max(1, int(SAMPLE_S / max(perf_counter() - start, 1e-7))))
+        repeats.append(max(1, int(SAMPLE_S / max(thread_time() - start, 1e-7))))
     samples = np.empty((ROUNDS, len(rivals)))
     for row in samples:
         for i, (rival, repeat) in enumerate(zip(rivals, repeats, strict=True)):
-            start = perf_counter()
+            start = thread_time()
             for _ in range(repeat):
                 rival()
-            row[i] = (perf_counter() - start) / repeat
+            row[i] = (thread_time() - start) / repeat
     return np.percentile(samples, 20, axis=0).tolist()
 
 

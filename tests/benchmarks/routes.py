@@ -12,17 +12,28 @@ import flexmb as fm
 from flexmb import composite, dynamics
 from flexmb.counting import Operations, count
 from flexmb.jain.places import matrices
+from flexmb.kernel import kernel
+
+IN_A_RUN = 100
 
 
 @dataclass(frozen=True)
 class Evaluation:
-    """Accelerations at a system's initial state: a kernel and its arguments."""
+    """Accelerations at a system's initial state: a kernel, the same kernel called from compiled code, their arguments.
+
+    A call from Python unpacks the arguments each time, which takes longer than a rigid body does; a run does it once.
+    """
 
     kernel: Callable[..., int]
+    repeated: Callable[..., int]
     arguments: tuple[Any, ...]
 
     def __call__(self) -> int:
         return self.kernel(*self.arguments)
+
+    def in_a_run(self) -> int:
+        """IN_A_RUN evaluations, as an integrator makes them."""
+        return self.repeated(IN_A_RUN, *self.arguments)
 
     def operations(self) -> Operations:
         """What the kernel executes."""
@@ -32,15 +43,33 @@ class Evaluation:
 def articulated(system: fm.System) -> Evaluation:
     """By articulated bodies, their modes eliminated as the system says."""
     written = system.recursion_workspace()
-    return Evaluation(dynamics.accelerations, (0.0, _start(system), system.recursion_constants, written))
+    arguments = 0.0, _start(system), system.recursion_constants, written
+    return Evaluation(dynamics.accelerations, _articulated, arguments)
 
 
 def composite_body(system: fm.System) -> Evaluation:
     """By composite bodies and the factors of the mass matrix."""
     written = system.workspace(), matrices(system.constants)
-    return Evaluation(composite.accelerations, (0.0, _start(system), system.constants, *written))
+    arguments = 0.0, _start(system), system.constants, *written
+    return Evaluation(composite.accelerations, _composite, arguments)
 
 
 def _start(system: fm.System) -> np.ndarray:
     state = system.initial_state
     return np.concatenate([state.q, state.u, [0.0]])
+
+
+@kernel
+def _articulated(times, t, y, c, w):
+    status = 0
+    for _ in range(times):
+        status = max(status, dynamics.accelerations(t, y, c, w))
+    return status
+
+
+@kernel
+def _composite(times, t, y, c, w, m):
+    status = 0
+    for _ in range(times):
+        status = max(status, composite.accelerations(t, y, c, w, m))
+    return status

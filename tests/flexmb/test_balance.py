@@ -153,7 +153,9 @@ def test_a_scene_without_losses_has_no_power():
 
 
 def _unsymmetric_inertia(system: System) -> None:
-    system.constants.pair["product"][:, 0, 1] *= 30.0
+    c = system.constants
+    n = c.body["modes"][0]
+    c.product[0, 18 * n : 27 * n] *= 30.0  # P1_n1
 
 
 def _unsymmetric_stiffness(system: System) -> None:

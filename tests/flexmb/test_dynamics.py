@@ -118,7 +118,8 @@ def _transpose_a_placement(c):
 
 
 def _drop_coriolis(c):
-    c.pair["product"][:] = 0.0
+    for body in c.body[c.body["product"] >= 0]:
+        c.product[body["product"], 9 * body["modes"] :] = 0.0
 
 
 def _mass_one_in_a_million_more(c):

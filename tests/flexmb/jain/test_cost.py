@@ -129,10 +129,12 @@ def test_composite_bodies_are_cubic_in_bodies(chain):
         assert set(np.diff(numbers, 3)) == {speeds**3}
 
 
-@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
-def test_composite_bodies_are_cubic_in_modes(boundary):
-    """Two bodies: (2 n)^3 / 6 multiplications and as many additions are the leading terms."""
-    counts = [executed(composite_body, flexible_chain(2, n, "ruthless", boundary=boundary)) for n in range(1, 8)]
+def test_composite_bodies_are_cubic_in_modes():
+    """Two bodies: (2 n)^3 / 6 multiplications and as many additions are the leading terms.
+
+    Free-free modes: clamped ones are orthogonal also with the body hinged, and zeros of the factor are left out.
+    """
+    counts = [executed(composite_body, flexible_chain(2, n, "ruthless", boundary="free-free")) for n in range(1, 8)]
     for kind in ("multiplications", "additions"):
         numbers = [getattr(c, kind) for c in counts]
         assert degree(numbers) == 3
