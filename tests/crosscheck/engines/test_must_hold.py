@@ -20,7 +20,13 @@ from flexmb.scene import schema as s
 from flexmb.surrogate import finite_segments, modal_points, rigidify
 from tests import trees
 
-CASES = sorted((Path(__file__).parents[3] / "cases").glob("*/*/scene.toml"))
+# Trees: a random state of a closed chain leaves its closures open. Those are held at a state that closes them, in
+# tests/cases/test_closed_chains.py.
+CASES = sorted(
+    path
+    for path in (Path(__file__).parents[3] / "cases").glob("*/*/scene.toml")
+    if not flexmb.load_scene(path).closures
+)
 RANDOM = [(name, seed) for name in ("grounded", "free-flying") for seed in range(60, 63)]
 ACCELERATION = 1e-10
 LOAD = 1e-9
