@@ -63,6 +63,7 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
         return replace(body, level=level)
     mass = modal_integrals(flexible_model(body)).spatial_mass[:every, :every]
     X = eigh(arrays.stiffness, mass)[1][:, :count]
+    X = X * np.sign(X[np.argmax(np.abs(X), axis=0), np.arange(count)])  # the sign of the mode that it mostly is
     nodes = tuple(
         ModalNode(
             name=node.name, position_m=node.position_m, quaternion=node.quaternion,
@@ -116,7 +117,8 @@ def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
 
 def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
     """The initial state in the new modes: nearest in the norm of kinetic energy."""
-    before, after = flexible_model(old), flexible_model(new)
+    # at level full both have all the points of the elements: at stiffened each has masses of its own
+    before, after = (flexible_model(replace(each, level="full")) for each in (old, new))
     onto = np.linalg.solve(_products(after, after), _products(after, before))
     rates = np.array(state.rates or [0.0] * before.mode_count)
     return ModalState(
