@@ -67,7 +67,7 @@ def test_cantilever_sags(level):
 def test_random_trees_come_to_rest(seed):
     """Springs, balls, modes, wheels without springs, point masses, gravity: nothing accelerates any more.
 
-    Of the first eight of these trees two are refused: the way down leads them beyond the range of their modes.
+    Of the first eight of these trees two are refused: 3 leaves the range of its modes, of 2 no equilibrium is found.
     """
     hinges = ("spherical", "revolute", "prismatic", "universal")
     recipe = replace(trees.CONSERVATIVE, hinges=hinges, bodies=5, point_masses=1)
