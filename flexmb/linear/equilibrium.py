@@ -23,8 +23,8 @@ RESIDUAL = 1e-9  # acceleration left, part of that at the start
 ROUNDING = 2.0**-46  # the same, part of the stiffness times a displacement of 1: 128 roundings
 STEPS = 100
 SMALLEST = 2.0**-12  # damping factor
-HALVINGS = 10  # of a step of overdamped motion that ends where no accelerations exist
-RELAXATIONS, BETWEEN = 200, 4  # steps of overdamped motion, and how many between attempts of Newton's method
+SHORTENINGS = 20  # by 4, of a step of overdamped motion
+RELAXATIONS = 200  # steps of overdamped motion
 FIRST, LONGEST = 0.1, 0.5  # lengths of steps, parts of a displacement of all free coordinates by 1
 RANK = 1e-14  # directions stiffer by less than this part of the stiffest one are free to move: they are left alone
 
@@ -62,33 +62,62 @@ def balanced(equations: Equations, guess: State) -> State:
 
 
 def _relaxed(equations: Equations, start: State) -> State:
-    """Overdamped motion, M xi' = load, by implicit steps tau that grow as loads fall, until Newton's method converges.
+    """Overdamped motion, M xi' = load, by implicit steps tau that grow as far as it goes, then Newton's method.
 
-    Pseudo-transient continuation (Kelley & Keyes 1998): it goes downhill, hence to an equilibrium that is stable.
+    Pseudo-transient continuation (Kelley & Keyes 1998), with steps chosen as in a trust region (Nocedal & Wright 2006,
+    alg. 4.1): loads do work in every one of them. Newton's method is tried where no displacement grows by itself, so
+    that it does not turn aside to an equilibrium that is unstable.
     """
-    at, tau, before, moving = equations.variations(start), 0.0, 0.0, equations.movable
-    for i in range(1, RELAXATIONS + 1):
-        M = equations.mass(at.state)
-        scale, size = float(np.sqrt(np.trace(M))), float(np.sqrt(at.rates @ M @ at.rates))
-        tau = FIRST * scale / size if i == 1 else tau * before / size
-        before, step = size, np.zeros(len(M))
-        flow = (M / tau - M @ at.by_displacement)[np.ix_(moving, moving)]
-        step[moving] = np.linalg.solve(flow, (M @ at.rates)[moving])
-        length = max(float(np.sqrt(step @ M @ step)), CONVERGED * scale)
-        at = _moved(equations, at, min(1.0, LONGEST * scale / length) * step)
-        if i % BETWEEN == 0 and (found := _newton(equations, at.state)) is not None:
+    here = _Loads(equations, equations.variations(start))
+    tau = FIRST * here.scale / here.size
+    for _ in range(RELAXATIONS):
+        if here.settling and (found := _newton(equations, here.at.state)) is not None:
             return found
-    raise EquilibriumError(_report(equations, at))
+        further = _downhill(equations, here, tau)
+        if further is None:
+            break
+        here, tau = _Loads(equations, further[0]), further[1]
+    found = _newton(equations, here.at.state)
+    if found is None:
+        raise EquilibriumError(_report(equations, here.at))
+    return found
 
 
-def _moved(equations: Equations, at: Variations, step: Real) -> Variations:
-    """After a step, or a half, a quarter ... of it: the longest that ends where the accelerations exist."""
-    for halvings in range(HALVINGS):
+class _Loads:
+    """Over the movable coordinates at a state: loads (n,), their derivative and inertia (n,n).
+
+    settling: loads oppose every displacement; size of the accelerations, scale of a displacement by 1, in the metric.
+    """
+
+    def __init__(self, equations: Equations, at: Variations) -> None:
+        M, moving = equations.mass(at.state), equations.movable
+        self.at = at
+        self.loads, self.derivative = (M @ at.rates)[moving], (M @ at.by_displacement)[np.ix_(moving, moving)]
+        self.inertia, self.size = M[np.ix_(moving, moving)], float(np.sqrt(at.rates @ M @ at.rates))
+        self.scale = float(np.sqrt(np.trace(M)))
+        growth = np.linalg.eigvalsh(self.derivative + self.derivative.T)
+        self.settling = bool(np.max(growth, initial=0.0) <= -ROUNDING * np.min(growth, initial=0.0))
+
+
+def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variations, float] | None:
+    """After the longest of the steps tau, tau/4, tau/16 ... that does a quarter of the promised work; the next tau."""
+    moving, step = equations.movable, np.zeros(len(here.at.rates))
+    for _ in range(SHORTENINGS):
+        flow = here.inertia / tau - here.derivative
         try:
-            return equations.variations(equations.moved(at, 0.5**halvings * step))
-        except DynamicsError:
-            continue
-    return equations.variations(equations.moved(at, 0.5**HALVINGS * step))
+            np.linalg.cholesky(flow + flow.T)  # else the step is longer than the fastest growth, and leads uphill
+            s = np.linalg.solve(flow, here.loads)
+            if s @ here.inertia @ s <= (LONGEST * here.scale) ** 2:
+                step[moving] = s
+                there = equations.moved(here.at, step)
+                left = (equations.mass(there) @ equations.rates(there))[moving]
+                work, promised = 0.5 * s @ (here.loads + left), s @ here.loads + 0.5 * s @ here.derivative @ s
+                if work >= 0.25 * promised:
+                    return equations.variations(there), tau * (4.0 if work >= 0.75 * promised else 1.0)
+        except (DynamicsError, np.linalg.LinAlgError):
+            pass  # too long in any case
+        tau *= 0.25
+    return None
 
 
 def _newton(equations: Equations, state: State) -> State | None:

@@ -63,12 +63,9 @@ def test_cantilever_sags(level):
     assert np.max(np.abs(model.rates)) <= ROUNDING * np.max(np.abs(model.A)) * np.max(np.abs(found.q))
 
 
-@pytest.mark.parametrize("seed", [0, 1, 4])
+@pytest.mark.parametrize("seed", range(8))
 def test_random_trees_come_to_rest(seed):
-    """Springs, balls, modes, wheels without springs, point masses, gravity: nothing accelerates any more.
-
-    Of the first eight of these trees two are refused: 3 leaves the range of its modes, of 2 no equilibrium is found.
-    """
+    """Springs, balls, modes, wheels without springs, point masses, gravity: nothing accelerates any more."""
     hinges = ("spherical", "revolute", "prismatic", "universal")
     recipe = replace(trees.CONSERVATIVE, hinges=hinges, bodies=5, point_masses=1)
     system = fm.compile(trees.random_scene(seed, recipe))
