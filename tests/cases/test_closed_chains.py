@@ -10,9 +10,6 @@ import pytest
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
-from crosscheck.report import write_all
-from crosscheck.sweep import sweep
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import AngularCoordinate, Closure, Scene
@@ -112,14 +109,3 @@ def test_exudyn_takes_closures_of_every_type():
         doubled = msgspec.structs.replace(scene, closures=(*scene.closures, second))
         found = engine("exudyn").compile(doubled).evaluate().markers["slider"].acceleration
         assert np.max(np.abs(found - expected)) < 1e-9 * np.max(np.abs(expected))
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("case", [*RIGID, "flexible_four_bar"])
-def test_every_verdict_is_the_expected_one(case, tmp_path):
-    for module in ("pinocchio", "mujoco", "exudyn"):
-        pytest.importorskip(module)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(FAMILY / case)], (), records)
-    outcome, _ = write_all(records, tmp_path)
-    assert outcome.ok, outcome.headline

@@ -88,17 +88,6 @@ def test_boom_ends_straight_at_its_full_length():
     assert np.linalg.norm(tip - elbow) == pytest.approx(length / 2, rel=1e-12)
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ["deploying_boom/rigid", "deploying_boom/flexible", "free_flying/flexible_beam"])
-def test_every_verdict_is_the_expected_one(case, tmp_path):
-    for module in ("pinocchio", "mujoco", "exudyn"):
-        pytest.importorskip(module)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(CASES / case)], (), records)
-    outcome, _ = write_all(records, tmp_path)
-    assert outcome.ok, outcome.headline
-
-
 def test_negative_controls_of_the_rigid_boom_are_noticed(tmp_path):
     for module in ("pinocchio", "mujoco"):
         pytest.importorskip(module)

@@ -16,8 +16,6 @@ from msgspec.structs import replace
 
 from crosscheck.library import load_case
 from crosscheck.plan import variant_scene
-from crosscheck.report import write_all
-from crosscheck.sweep import sweep
 from flexmb.linear.equilibrium import equilibrium
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
@@ -196,14 +194,3 @@ def test_flying_spaghetti_is_thrown_by_newtons_law_and_keeps_its_energy() -> Non
     energy = sum(done.energy.values())
     assert energy - done.work == pytest.approx(np.full(len(times), energy[0]), abs=1e-5 * energy[-1])
     assert np.ptp(energy[done.t >= 2.5]) < 1e-5 * energy[-1] < 0.1 * energy[-1] < done.work[-1]
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("folder", sorted(FAMILY.iterdir()), ids=lambda folder: folder.name)
-def test_every_verdict_is_as_expected(folder: Path, tmp_path: Path) -> None:
-    for library in ("pinocchio", "exudyn"):
-        pytest.importorskip(library)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(folder)], (), records)
-    outcome, _ = write_all(records, tmp_path)
-    assert outcome.ok, outcome.unexpected

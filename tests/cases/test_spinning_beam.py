@@ -15,8 +15,6 @@ from scipy.linalg import eigh
 from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
 from crosscheck.library import load_case
-from crosscheck.report import write_all
-from crosscheck.sweep import sweep
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
 from flexmb.simulation import simulate
@@ -298,14 +296,3 @@ def nonlinear_beam(case: str) -> NonlinearBeam:
     (_, coarse), (time, fine) = found
     doubt = SAFETY * abs(fine - coarse) / 3.0
     return NonlinearBeam((coarse, fine), time, doubt, motion[-1] - [length, 0.0], length)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("folder", sorted(FAMILY.iterdir()), ids=lambda folder: folder.name)
-def test_every_verdict_is_as_expected(folder: Path, tmp_path: Path) -> None:
-    for library in ("pinocchio", "mujoco", "exudyn"):
-        pytest.importorskip(library)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(folder)], (), records)
-    outcome, _ = write_all(records, tmp_path)
-    assert outcome.ok, outcome.unexpected

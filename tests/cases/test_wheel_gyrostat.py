@@ -118,17 +118,6 @@ def test_momentum_and_energy_balance(case):
         assert np.max(np.abs(run.momentum_drift[:, part])) < 1e-10 * np.linalg.norm(run.momentum[0, part])
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("case", ["torque_free", "torque_driven", "dual_spinner", "flexible_appendage"])
-def test_every_verdict_is_the_expected_one(case, tmp_path):
-    for module in ("pinocchio", "mujoco", "exudyn"):
-        pytest.importorskip(module)
-    records = tmp_path / "records.jsonl"
-    sweep([load_case(FAMILY / case)], (), records)
-    outcome, _ = write_all(records, tmp_path)
-    assert outcome.ok, outcome.headline
-
-
 def test_negative_controls_of_the_torque_free_case_are_noticed(tmp_path):
     for module in ("pinocchio", "mujoco"):
         pytest.importorskip(module)

@@ -1,0 +1,22 @@
+"""Every case of the library, run by every engine that takes it: each verdict is the one that its file expects."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from crosscheck.library import Case, shipped_cases
+from crosscheck.report import write_all
+from crosscheck.sweep import sweep
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
+def test_every_verdict_is_as_expected(case: Case, tmp_path: Path) -> None:
+    for library in ("pinocchio", "mujoco", "exudyn"):
+        pytest.importorskip(library)
+    records = tmp_path / "records.jsonl"
+    sweep([case], (), records)
+    outcome, _ = write_all(records, tmp_path)
+    assert outcome.ok, outcome.unexpected or outcome.headline
