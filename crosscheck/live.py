@@ -75,7 +75,11 @@ class LiveProgress:
             return f"{MARKS['finished']} {title}: already recorded"
         last = records[-1]
         if last.status != "finished":
-            why = escape(last.message.splitlines()[-1]) if last.message else ""
-            return f"{MARKS[last.status]} {title}: {last.status}: {why}"
+            return f"{MARKS[last.status]} {title}: {last.status}: {escape(_in_short(last.message))}"
         efforts = f"{len(records)} effort{'s' if len(records) > 1 else ''}"
         return f"{MARKS['finished']} {title}: {efforts} in {spent:.1f} s"
+
+
+def _in_short(message: str) -> str:
+    """The headline of a message, its first problem and that one's remedy, on one line; reports have the rest."""
+    return " ".join(" ".join(message.splitlines()[:3]).split())
