@@ -74,6 +74,7 @@ from flexmb.scene.schema import Level
 
 Expectation = Literal["agree", "differ", "unresolved", "refused", "failed"]
 Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
+TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
 MutationKind = Literal[
     "mass",
     "inertia",

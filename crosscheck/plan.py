@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.case import Control, Refined, RunFile, Variant
+from crosscheck.case import TAKES_APART, Control, Refined, RunFile, Variant
 from crosscheck.controls import mutate
 from crosscheck.drawing import draw, levels
 from crosscheck.engines.contract import Effort
@@ -64,7 +64,7 @@ def plan(case: Case, asked: tuple[str, ...], provider: str) -> tuple[CaseRecord,
     jobs: list[Job] = []
     for variant in run.variants:
         scene, error = _attempt(case, variant)
-        infos[variant.name] = _info(scene, error)
+        infos[variant.name] = _info(case, variant, scene, error)
         jobs += [_job(case, run, variant, MAIN, engine, scene, error, provider) for engine in variant.engines]
         if variant.refined is not None:
             scene, error = _attempt(case, refine(variant, variant.refined), variant.refined)
@@ -175,11 +175,13 @@ def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:
     )
 
 
-def _info(scene: Scene | None, error: str) -> VariantInfo:
+def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> VariantInfo:
+    """Bodies that the variant takes to pieces are drawn whole: their markers keep their names."""
     if scene is None:
         return VariantInfo(level="", drawing=None, error=error)
-    drawable = all(not isinstance(body, SidBody) for body in scene.bodies)  # a SID body's nodes are in its file
-    return VariantInfo(level=levels(scene), drawing=draw(scene) if drawable else None)
+    drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
+    drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
+    return VariantInfo(level=levels(scene), drawing=draw(drawn) if drawable else None)
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:

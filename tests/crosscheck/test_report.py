@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 from crosscheck.case import Transform, Variant
-from crosscheck.library import load_case
+from crosscheck.library import load_case, resolve
+from crosscheck.plan import plan
 from crosscheck.report import Outcome, write_all
 from crosscheck.report.html import _code, _transformation
 from crosscheck.report.store import SAMPLES, Store
@@ -148,3 +149,14 @@ def test_backticks_become_code_and_nothing_else_becomes_markup() -> None:
 def test_every_transformation_has_words(transform: str) -> None:
     words = _transformation(Variant(name="a", engines=("native",), transform=transform, segments=7, pieces=7))
     assert bool(words) == (transform != "none") and ("7" in words) == (transform in ("segments", "substructures"))
+
+
+@pytest.mark.parametrize("variant", ["pieces", "segments"])
+def test_beams_taken_to_pieces_are_drawn_whole(variant: str) -> None:
+    """Pieces and segments have one marker at most; the line goes through those of the whole beam."""
+    (case,) = resolve(("large_deflection/driven_crank",))
+    record, _ = plan(case, ("native",), PROVIDER)
+    drawing = record.variants[variant].drawing
+    assert drawing is not None
+    (line,) = [line for line in drawing.lines if line.body == "beam"]
+    assert [point.marker for point in line.points] == ["", "middle", "tip"]
