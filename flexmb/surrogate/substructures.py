@@ -28,9 +28,11 @@ def substructured(
 
     A piece has the attachment modes of its beam's mode families (unit forces and moments at its tip: one mode for axial
     motion, one for torsion, two for each plane of bending), clamped at its own root, and as many `eigenmodes` of the
-    clamped piece besides. Its level is the beam's unless `level` is given. With it the chain converges to the
-    geometrically exact beam, at level "full" by the square of the length of a piece. Sections, theory, tip masses and
-    the choice of inertia points stay; modal damping becomes proportional to stiffness, exact for the beam's first mode.
+    clamped piece besides. Its level is the beam's unless `level` is given. The chain converges to the geometrically
+    exact beam, at level "full" by the square of the length of a piece, at "stiffened" by its third power; of a beam
+    whose twist varies by the square too, unless an eigenmode of torsion is among those of a piece. Sections, theory,
+    tip masses and the choice of inertia points stay; modal damping becomes proportional to stiffness, exact for the
+    beam's first mode.
 
     Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node on a cut, or a tip mass, belongs
     to the piece toward the tip. Raises ValueError for a body that is no beam or is rigid, for fewer than one piece, for

@@ -6,6 +6,7 @@ where other codes are the truth, the distance to them against what both leave op
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -14,12 +15,15 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from crosscheck.engines.contract import Run
+from crosscheck.engines.registry import engine
 from crosscheck.library import load_case
 from crosscheck.plan import variant_scene
 from flexmb.linear.equilibrium import equilibrium
+from flexmb.methods import Method
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
-from flexmb.scene.schema import BeamBody, Scene
+from flexmb.scene.schema import BeamBody, Level, Scene
 from flexmb.simulation import simulate
 from flexmb.surrogate import substructured
 from flexmb.system import System, compile
@@ -91,7 +95,9 @@ def test_ten_times_the_stiffness_bends_the_strip_back_on_itself() -> None:
     assert np.abs(elastica(10.0, 4, "stiffened")).max() > 1e-2  # and four do not
 
 
-def princeton(degrees: float, pieces: int, torsion: float = 1.0) -> np.ndarray:
+def princeton(
+    degrees: float, pieces: int, torsion: float = 1.0, *, level: Level = "full", eigenmodes: int = 0
+) -> np.ndarray:
     """Deflections (2,) of the tip (m); `torsion` multiplies the stiffness in torsion."""
     angle = np.deg2rad(degrees)
     scene = loaded("princeton_beam", (0.0, float(np.cos(angle)), float(np.sin(angle))))
@@ -99,7 +105,7 @@ def princeton(degrees: float, pieces: int, torsion: float = 1.0) -> np.ndarray:
     stations = tuple(replace(station, GJ_Nm2=torsion * station.GJ_Nm2) for station in bar.stations)
     modes = replace(bar.modes, families=("axial", *bar.modes.families))
     bar = replace(bar, stations=stations, modes=modes, theory="timoshenko")
-    chain = substructured(replace(scene, bodies=(bar,)), None, pieces, level="full")
+    chain = substructured(replace(scene, bodies=(bar,)), None, pieces, level=level, eigenmodes=eigenmodes)
     return tip_at_rest(compile(chain), (8.896,))[1:]
 
 
@@ -127,6 +133,18 @@ def test_princeton_beam_in_two_planes_deflects_as_published(degrees: int) -> Non
     stiffer, doubt = princeton_extrapolated(degrees, 1.035)
     assert stiffer == pytest.approx(published, abs=1.5e-5 + 0.25 * doubt)
     assert np.abs(found - published).max() > 2.0 * np.abs(stiffer - published).max()
+
+
+@pytest.mark.parametrize(("eigenmodes", "order"), [(0, 2), pytest.param(4, 3, marks=pytest.mark.slow)])
+def test_a_bar_that_twists_converges_as_its_twist_may_vary_within_a_piece(eigenmodes: int, order: int) -> None:
+    """Level stiffened: the attachment mode of torsion twists a piece evenly, an error of the square of its length; four
+    eigenmodes include one of torsion. Both go where level full goes, to what the two extrapolations leave open."""
+    coarse, middle, fine = (princeton(45.0, n, level="stiffened", eigenmodes=eigenmodes) for n in (4, 8, 16))
+    slope = np.log2(np.linalg.norm(middle - coarse) / np.linalg.norm(fine - middle))
+    assert slope == pytest.approx(order, abs=0.15)
+    correction = (fine - middle) / (2.0**order - 1.0)
+    found, doubt = princeton_extrapolated(45.0)
+    assert fine + correction == pytest.approx(found, abs=0.25 * (doubt + float(np.linalg.norm(correction))))
 
 
 def test_princeton_beam_against_geometrically_exact_elements_in_space() -> None:
@@ -194,3 +212,61 @@ def test_flying_spaghetti_is_thrown_by_newtons_law_and_keeps_its_energy() -> Non
     energy = sum(done.energy.values())
     assert energy - done.work == pytest.approx(np.full(len(times), energy[0]), abs=1e-5 * energy[-1])
     assert np.ptp(energy[done.t >= 2.5]) < 1e-5 * energy[-1] < 0.1 * energy[-1] < done.work[-1]
+
+
+@dataclass(frozen=True)
+class InMotion:
+    """A motion (s) that is not yet sensitive to what it starts from, and two numbers of pieces to compare in it."""
+
+    duration: float
+    eigenmodes: int
+    pieces: tuple[int, int]
+    method: Method
+
+    @property
+    def times(self) -> np.ndarray:
+        return np.linspace(0.0, self.duration, 41)
+
+
+IN_MOTION = {
+    "elastica": InMotion(4.0, 0, (8, 16), "radau5"),
+    "flying_spaghetti": InMotion(2.5, 2, (16, 32), "dop853"),
+}
+
+
+@cache
+def exact_in_motion(case: str) -> np.ndarray:
+    """Positions (markers, T, 3) by 64 of Exudyn's elements, as good as more pieces than are compared below."""
+    scene = load_scene(FAMILY / case / "scene.toml")
+    meshed = replace(scene, bodies=(replace(scene.bodies[0], elements=64),))
+    code = engine("exudyn-beam")
+    done = code.compile(meshed).simulate(Run(IN_MOTION[case].times), code.efforts(meshed)[-1])
+    return np.array([done.markers[marker.name].position for marker in scene.markers])
+
+
+def slope_in_motion(case: str, level: Level, eigenmodes: int) -> float:
+    """Order by which the largest error of a marker, its root mean square over time, falls with the pieces' length."""
+    scene, motion, errors = load_scene(FAMILY / case / "scene.toml"), IN_MOTION[case], []
+    for count in motion.pieces:
+        chain = substructured(scene, None, count, level=level, eigenmodes=eigenmodes)
+        done = simulate(chain, motion.duration, motion.method, rtol=1e-6, atol=1e-8, samples=motion.times)
+        found = np.array([done.markers[marker.name].position for marker in scene.markers])
+        errors.append(np.linalg.norm(found - exact_in_motion(case), axis=2).max(axis=0))
+    coarse, fine = (np.sqrt(np.mean(each**2)) for each in errors)
+    return float(np.log2(coarse / fine))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", IN_MOTION)
+@pytest.mark.parametrize("level", ORDERS)
+def test_pieces_converge_in_motion_as_they_do_at_rest(case: str, level: Level) -> None:
+    """Against nonlinear elements of another code. Terms of the next order still move the slopes, and phases add up."""
+    pytest.importorskip("exudyn")
+    assert slope_in_motion(case, level, IN_MOTION[case].eigenmodes) == pytest.approx(ORDERS[level], abs=0.35)
+
+
+@pytest.mark.slow
+def test_waves_of_shear_that_pieces_do_not_resolve_slow_the_convergence() -> None:
+    """Without eigenmodes a piece follows them by its ends alone: less than half of the order is left."""
+    pytest.importorskip("exudyn")
+    assert slope_in_motion("flying_spaghetti", "stiffened", eigenmodes=0) < 1.5
