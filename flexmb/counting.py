@@ -89,8 +89,10 @@ def _scalars(tally: Counter[str]) -> Any:
         elementary = staticmethod(lambda function: counted("elementary", function))
 
         def __pow__(self, exponent: float) -> float:  # type: ignore[override]
+            if exponent == 2:
+                return Scalar.__mul__(self, self)
             if exponent != 0.5:
-                raise NotImplementedError("only square roots are counted as powers")
+                raise NotImplementedError("only squares and square roots are counted as powers")
             return Scalar.square_root(self)
 
         def __neg__(self) -> float:

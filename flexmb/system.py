@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Literal, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb import coordinates, dynamics
@@ -86,6 +87,7 @@ class System(Mechanics):
         self._w = self.workspace()
         self.recursion_constants = with_elimination(self.constants, elimination)
         self._recursion_w = self.recursion_workspace()
+        self._driven = self._driven_places()
         self.rhs, self.project = dynamics.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
         self._operators: SpatialOperators | None = None
@@ -276,12 +278,16 @@ class System(Mechanics):
         return [wheel.name for link in self._links for wheel in self._wheels.get(link.name, ())]
 
     def _drives(self, drive: Real) -> dict[str, Real]:
+        return {name: drive[places] for name, places in self._driven.items()}
+
+    def _driven_places(self) -> dict[str, NDArray[np.intp]]:
+        """Places in u of the prescribed coordinates, by hinge or wheel."""
         found = {}
         for name in [*(link.hinge.name for link in self._links), *self._wheel_names]:
             place = self.speed(name)
             driven = self.constants.speed["prescribed"][place] >= 0
             if np.any(driven):
-                found[name] = drive[place][driven].copy()
+                found[name] = place.start + np.flatnonzero(driven)
         return found
 
 

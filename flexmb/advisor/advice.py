@@ -21,9 +21,9 @@ from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 
 BUDGET = 4e10
-"""Operations that all runs of one advice may take before the walk down ends; about 25 s."""
-REFERENCE_SHARE = 0.25
-"""Of the budget: the most that one reference may be expected to cost."""
+"""Operations that the walk's runs may take before the walk down ends; about 20 s."""
+REFERENCE = 1e10
+"""Operations that one reference may be expected to cost."""
 STIRRED = 1e-3
 """Of the tolerance: families of modes that add less than that are not excited."""
 
@@ -147,7 +147,7 @@ class Prepared:
 
     def confirmation(self) -> Confirmation:
         """The measurements, references run. Raises NoReference."""
-        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE_SHARE * BUDGET)
+        return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE)
 
 
 def prepare(

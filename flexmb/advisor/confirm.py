@@ -2,8 +2,9 @@
 
 The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. What they
 differ by is the uncertainty U of the finer; where differences of pieces and half pieces are seen to fall by a factor of
-1/r > 2, what is left of the geometric series, r/(1 - r) of the last, r no less than 1/4. A candidate is adequate if its
-distance to that one, plus U, plus what its integrator adds, is within the tolerance: the triangle inequality, no luck.
+1/r > 2, what is left of the geometric series, r/(1 - r) of the last, r no less than 1/4. What ten times tighter
+integration changes is part of U. A candidate is adequate if its distance to that one, plus U, plus what its integrator
+adds, is within the tolerance: the triangle inequality, no luck.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 
 from flexmb.advisor.bench import Bench, Outcome
 from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost, references
-from flexmb.advisor.methods import ADAPTIVE, FINEST, Method, ladders
+from flexmb.advisor.methods import ADAPTIVE, FACTORS, FINEST, Method, ladders
 from flexmb.advisor.models import Model
 from flexmb.advisor.quantity import Signals, error, scales
 
@@ -24,8 +25,12 @@ SECOND_ORDER = 0.25
 """Least ratio of successive differences that is believed: halved pieces converge by the second order at least."""
 MOST = 0.5
 """Of the tolerance: with an uncertainty beyond that nothing can be told."""
-INTEGRATION = 0.1
-"""Of the tolerance: kept for the integrator, and the most that the references' own integration may be off."""
+FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
+"""Relative tolerance that counts as fine, of the tolerance at first, then tightened by that; and at most."""
+INTEGRATION, ROOM = 0.1, 0.05
+"""Of the tolerance: the most that the references' own integration may be off; what a model leaves the integrator."""
+FEW = 1000
+"""Evaluations: where an explicit method takes fewer, those that linearise are not tried."""
 
 
 class NoReference(ValueError):
@@ -51,7 +56,7 @@ class Confirmation:
         """hidden: predicted error of what no reference can show; cost: predictions; budget: the most operations
         that one reference may be expected to cost."""
         self.bench, self.tolerance, self.cost = bench, tolerance, cost
-        self.fine = 1e-5 * tolerance
+        self.fine, self.drift = FINE * tolerance, 0.0
         self.measured: dict[Model, float] = {}
         self.reference = self._reference(hidden, budget)
 
@@ -61,7 +66,7 @@ class Confirmation:
 
     def finely(self, model: Model) -> Method:
         """A method whose error does not count."""
-        return Method("dop853", float(np.clip(self.fine, FINEST, 1e-7)), self.bench.algorithm(model))
+        return Method("dop853", self._relative(self.fine), self.bench.algorithm(model))
 
     def error(self, model: Model) -> float:
         """Error of a model, U included; infinite where it does not exist or does not finish."""
@@ -85,7 +90,7 @@ class Confirmation:
 
     def adequate(self, model: Model) -> bool:
         """Whether the model leaves the integrator its share of the tolerance."""
-        return self.error(model) <= (1.0 - INTEGRATION) * self.tolerance
+        return self.error(model) <= (1.0 - ROOM) * self.tolerance
 
     def integration_error(self, model: Model, method: Method) -> float:
         """How far a run is from the same model integrated finely."""
@@ -95,23 +100,29 @@ class Confirmation:
     def cheapest_method(self, model: Model) -> Method:
         """The method with the fewest operations whose error fits beside the model's.
 
-        In the ladder of every integrator, loose to tight, the first that fits and whose successor fits as well.
+        In the ladder of every integrator, loose to tight, the first that fits and whose successor fits as well. A
+        ladder ends where it costs more than what was found: tighter costs more still.
         """
         room = self.tolerance - self.error(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
-        found = [self.finely(model)]
+        best, least = self.finely(model), self.run(model).operations
         for ladder in ladders(highest, slow, algorithm, not scene.closures):
+            if ladder[0].integrator in FACTORS and self.bench.run(model, best).evaluations < FEW:
+                break
             before: Method | None = None
             for method in ladder:
                 if method.integrator in ADAPTIVE and method.value <= self.finely(model).value:
                     break
                 fits = self.integration_error(model, method) <= room
+                done = self.bench.run(model, method)
                 if fits and before is not None:
-                    found.append(before)
+                    best, least = before, self.bench.run(model, before).operations
+                    break
+                if done.finished and done.operations >= least:
                     break
                 before = method if fits else None
-        return min(found, key=lambda method: self.bench.run(model, method).operations)
+        return best
 
     def _reference(self, hidden: float, budget: float) -> Reference:
         history: list[str] = []
@@ -139,28 +150,34 @@ class Confirmation:
             falls = max(apart / steps[-1], SECOND_ORDER) if steps and steps[-1] > 0.0 else 1.0
             steps += [apart] if last.name.endswith("pieces") else []
             left = apart * falls / (1.0 - falls) if falls < 0.5 else apart
-            last = Reference(name, model, done.signals, scale, left + hidden, tuple(history))
+            last = Reference(name, model, done.signals, scale, left + hidden + self.drift, tuple(history))
             if last.uncertainty <= AGREED * self.tolerance:
                 return last
         if last is None:
-            raise NoReference("none of the finest models runs to the end: " + "; ".join(history))
+            models = "the finest models of this scene do not run" if len(known) > 1 else "this does not run"
+            raise NoReference(f"{models} to the end: {'; '.join(history)}")
         if len(known) == 1:  # rigid bodies, or raw ones that have the modes they have
-            last = replace(last, uncertainty=hidden)
+            last = replace(last, uncertainty=hidden + self.drift)
         if last.uncertainty > MOST * self.tolerance:
             raise NoReference(self._unresolved(hidden, history))
         return last
 
     def _refine(self, model: Model) -> None:
-        """Tighten what counts as fine until a hundred times tighter changes the reference by less than its share."""
+        """Tighten what counts as fine until ten times tighter changes the reference by less than its share: `drift`."""
         while self.fine > FINEST:
-            coarse = self.run(model)
-            tighter = self.bench.run(
-                model, Method("dop853", max(FINEST, 1e-2 * self.finely(model).value), self.bench.algorithm(model))
-            )
-            scale = scales(self.bench.wanted, tighter.signals)
-            if not tighter.finished or error(coarse.signals, tighter.signals, scale) <= INTEGRATION * self.tolerance:
+            coarse, method = self.run(model), self.finely(model)
+            tighter = self.bench.run(model, replace(method, value=self._relative(TIGHTER * self.fine)))
+            if not tighter.finished:
                 return
-            self.fine *= 1e-2
+            scale = scales(self.bench.wanted, tighter.signals)
+            self.drift = error(coarse.signals, tighter.signals, scale)
+            if self.drift <= INTEGRATION * self.tolerance:
+                return
+            self.fine *= TIGHTER
+
+    @staticmethod
+    def _relative(value: float) -> float:
+        return float(np.clip(value, FINEST, LOOSEST))
 
     def _unresolved(self, hidden: float, history: list[str]) -> str:
         text = "; ".join(history) or "only one model of them runs"

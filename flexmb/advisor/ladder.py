@@ -99,7 +99,7 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
     finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
     if not splits:
         finer = [("still more modes", tuple((b.name, rung(b, 8, 0)) for b in bodies))]
-    return (("modes", first), *((name, model) for name, model in finer if model != first))
+    return (("modes" if bodies else "the scene", first), *((name, model) for name, model in finer if model != first))
 
 
 def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:

@@ -22,8 +22,6 @@ STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 
 
 ADAPTIVE = frozenset({"dop853", "radau5", "exponential"})
-STIFF = 50.0
-"""Highest frequency over what the rigid scene does: from there on methods that linearise are tried."""
 COMPLEX = 4
 """Operations of an evaluation in complex numbers against one in real ones."""
 FACTORS = {"radau5": (10.0 / 3.0, 10.0), "exponential": (40.0, 10.0), "generalised_alpha": (2.0 / 3.0, 2.0)}
@@ -69,13 +67,13 @@ def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tu
     """For each integrator its methods from loose to tight.
 
     Fixed steps are those of the frequency `highest` (rad/s), implicit ones of `slow`, what the scene does with all
-    bodies rigid. Methods that linearise are for trees, by the recursion, and for scenes that are stiff.
+    bodies rigid. Methods that linearise are for trees, by the recursion.
     """
     explicit = (
         tuple(Method("dop853", rtol, algorithm) for rtol in TOLERANCES),
         tuple(Method("rk4", step / max(highest, slow), algorithm) for step in STEPS),
     )
-    if not tree or highest < STIFF * slow:
+    if not tree:
         return explicit
     return (
         *explicit,

@@ -93,9 +93,9 @@ def rigid_run(scene: Scene, times: Array) -> RigidRun | str:
     ]
     try:
         system = compile(replace(still, markers=(*still.markers, *extra)))
+        run = simulated(system, times, Method("dop853", _RTOL))
     except (ClosureError, ValueError, NotImplementedError) as error:
         return f"all bodies rigid: {error}"
-    run = simulated(system, times, Method("dop853", _RTOL))
     return RigidRun(still, system, run) if run.finished else f"all bodies rigid: {run.message}"
 
 

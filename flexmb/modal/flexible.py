@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
+from msgspec.structs import replace
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
@@ -26,9 +28,20 @@ def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> Fl
 
     `folder` is where a modal body's `.npz` lies (the scene file's folder). Node "origin" is the body frame, which does
     not deform; a beam also has "root" and "tip". At level "stiffened" the points are few that are as good as the many
-    (`flexmb.modal.equivalent`). Raises ValueError for data no model can be made of.
+    (`flexmb.modal.equivalent`). Equal beams have one model between them, so its arrays must not be written to. Raises
+    ValueError for data no model can be made of.
     """
-    return with_equivalent_masses(raw_model(body, folder) if isinstance(body, ModalBody) else beam_model(body))
+    if isinstance(body, ModalBody):
+        return with_equivalent_masses(raw_model(body, folder))
+    try:
+        return _beam(replace(body, name="beam"))
+    except ValueError:
+        return _beam(body)  # raises by its own name
+
+
+@lru_cache(maxsize=128)
+def _beam(body: BeamBody) -> FlexibleModel:
+    return with_equivalent_masses(beam_model(body))
 
 
 def beam_model(body: BeamBody) -> FlexibleModel:
