@@ -1,4 +1,4 @@
-"""Many arrays as one argument of a kernel: a class of named arrays whose address is all that is passed.
+"""Many arrays as one argument of a kernel: a class of named arrays, or bundles, whose address is all that is passed.
 
 A kernel that takes a NamedTuple of sixty arrays hands a thousand words to each function it calls, and counts references
 to every array it touches. That costs far more than the mechanics, to compile and to run. A bundle is one pointer to a
@@ -23,14 +23,15 @@ from numba.np.arrayobj import populate_array
 Class = TypeVar("Class", bound=type)
 
 _DIMENSIONS = 4  # the most an array of a bundle may have
-_ROW = 1 + _DIMENSIONS  # words of the table for one array: address, shape
+_ROW = 1 + _DIMENSIONS  # words of the table for one array: address, shape; of a bundle its table's address only
 
 
 @dataclass_transform(frozen_default=True)
 def bundle(cls: Class) -> Class:
-    """Make a class of annotated arrays a frozen dataclass that kernels take as one argument.
+    """Make a class of annotated arrays and bundles a frozen dataclass that kernels take as one argument.
 
-    Inside a kernel `b.name` is the array; in Python too. The arrays must be C-contiguous; kernels may write to them.
+    Inside a kernel `b.name` is the array or bundle; in Python too. The arrays must be C-contiguous; kernels may
+    write to them.
     """
     cls.__post_init__ = _describe  # type: ignore[attr-defined]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
@@ -40,9 +41,13 @@ def bundle(cls: Class) -> Class:
 def _describe(self: Any) -> None:
     """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers."""
     names = [field.name for field in fields(self)]
-    table, kinds = np.zeros((len(names), _ROW), np.int64), []
+    table, kinds = np.zeros((len(names), _ROW), np.int64), list[tuple[str, types.Type]]()
     for name, row in zip(names, table, strict=True):
         array = getattr(self, name)
+        if isinstance(getattr(array, "_numba_type_", None), BundleType):
+            row[0] = array._address
+            kinds.append((name, array._numba_type_))
+            continue
         if not array.flags.c_contiguous or array.ndim > _DIMENSIONS:
             raise ValueError(f"{name}: a bundle holds C-contiguous arrays of at most {_DIMENSIONS} dimensions")
         row[0] = array.ctypes.data
@@ -65,21 +70,40 @@ def _reduce(self: Any) -> tuple[Any, ...]:
 
 
 class BundleType(types.Type):
-    """Type of a bundle: the names and types of its arrays. Its name is short, for it is part of every symbol."""
+    """Type of a bundle: the names and types of its members. Its name is short, for it is part of every symbol."""
 
-    def __init__(self, name: str, kinds: tuple[tuple[str, types.Array], ...]) -> None:
+    def __init__(self, name: str, kinds: tuple[tuple[str, types.Type], ...]) -> None:
         self.kinds = kinds
         digest = hashlib.sha256(repr([(key, str(kind)) for key, kind in kinds]).encode()).hexdigest()[:8]
         super().__init__(name=f"{name}_{digest}")
 
     def place(self, name: str) -> int:
-        """Row of an array in the table."""
+        """Row of a member in the table."""
         return [key for key, _ in self.kinds].index(name)
 
 
+class AnyBundleType(types.Type):
+    """Type of bundles that a kernel passes on and never looks into."""
+
+    def __init__(self) -> None:
+        super().__init__(name="AnyBundle")
+
+
+class AnyBundle:
+    """A bundle as an argument of kernels that are compiled once for bundles of every type; see `pointer.py`."""
+
+    _numba_type_ = AnyBundleType()
+
+    def __init__(self, bundle: Any) -> None:
+        self._bundle = bundle
+        self._address = bundle._address
+
+
 register_model(BundleType)(models.OpaqueModel)
+register_model(AnyBundleType)(models.OpaqueModel)
 
 
+@unbox(AnyBundleType)
 @unbox(BundleType)
 def _unbox(typ, obj, c):
     """A bundle enters a kernel as the address of its table."""
@@ -98,8 +122,11 @@ class _BundleAttribute(AttributeTemplate):
 
 
 @lower_getattr_generic(BundleType)
-def _array_of(context, builder, typ, value, attr):
-    """Build the array structure from its row; "invariant" lets LLVM load each address once per function."""
+def _member_of(context, builder, typ, value, attr):
+    """A bundle's address, or the array structure built from its row.
+
+    "invariant" lets LLVM load each address once per function.
+    """
     place = typ.place(attr)
     kind = typ.kinds[place][1]
     word = ir.IntType(64)
@@ -110,6 +137,8 @@ def _array_of(context, builder, typ, value, attr):
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
+    if isinstance(kind, BundleType):
+        return builder.inttoptr(load(0), value.type)
     array = context.make_array(kind)(context, builder)
     shape = [load(1 + i) for i in range(kind.ndim)]
     itemsize = context.get_constant(types.intp, kind.dtype.bitwidth // 8)

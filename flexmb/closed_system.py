@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from flexmb import dynamics
 from flexmb.arrays import Real
+from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
 from flexmb.closure.constants import closure_constants, slowest_mode
-from flexmb.closure.propagate import dop853_run, rk4_run
 from flexmb.closure.system import ClosedMotion, ClosureError, Closures
 from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
@@ -92,16 +92,17 @@ class ClosedSystem(System):
         return self.closures.gaps(state.t, pack(state))
 
     def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
-        """Constants, a maker of workspaces and the compiled runs; ClosureError where there is no motion to run."""
+        """Fields of a `flexmb.propagate.Route`; ClosureError where there is no motion to run."""
         _refuse_others(self.scene, algorithm)
         if not (np.isfinite(stabilise) and stabilise >= 0.0):
             raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
         self._refuse_locked()
 
-        def workspace() -> Closed:
-            return self.closures.chain("composite" if algorithm == "composite" else "articulated", stabilise)
+        def tables() -> tuple[Closed, Closed]:
+            chain = self.closures.chain("composite" if algorithm == "composite" else "articulated", stabilise)
+            return chain, chain
 
-        return self.closures.constants, workspace, dop853_run, rk4_run
+        return tables, closed_dynamics.rhs, closed_dynamics.project
 
     def _refuse_locked(self) -> None:
         start = self.initial_state  # counts the independent rows

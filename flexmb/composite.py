@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 from flexmb.arrays import Index, Workspace
 from flexmb.balance import power
+from flexmb.bundle import bundle
 from flexmb.coordinates import configuration_rate, load_state
 from flexmb.jain import composite
 from flexmb.jain.places import Matrices
@@ -13,7 +12,8 @@ from flexmb.kernel import kernel
 from flexmb.status import OK
 
 
-class CompositeWorkspace(NamedTuple):
+@bundle
+class CompositeWorkspace:
     """What an evaluation by composite bodies writes."""
 
     sweeps: Workspace

@@ -1,8 +1,8 @@
-"""Compilation of kernels: with `bundle.py`, the only file that names numba.
+"""Compilation of kernels: with `parts.py`, `bundle.py` and `pointer.py`, all that names numba.
 
 `kernel` marks an entry point: compiled for the argument types of its first call, callable from Python, cached on disk.
-`helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper and
-no cache entry of its own (a third of the cold compile time of caching everything). From Python, call its `.py_func`.
+`helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper, no
+machine code and no cache entry of its own (see `parts.py`). From Python, call its `.py_func`.
 
 The disk cache is keyed by the sources a kernel can depend on: its own file and all that this imports, directly or not,
 from the package. Numba by itself only looks at the file of the entry point, so that an edited helper in another file
@@ -23,8 +23,13 @@ from numba import config, njit, types
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
+from flexmb.parts import PartCompiler
+
 # "contract" fuses a*b + c. No "nnan" or "ninf": they would let the compiler delete the checks that catch a blow-up.
 _SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
+_AS_PART: dict[str, Any] = {
+    **_SEMANTICS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler
+}  # fmt: skip
 
 
 # Folders whose sources no kernel can depend on (held by a test): editing them recompiles nothing.
@@ -101,16 +106,7 @@ def kernel(function: Callable[..., Any]) -> Any:
 
 def helper(function: Callable[..., Any]) -> Any:
     """Compile `function` into the kernels that call it."""
-    return njit(no_cpython_wrapper=True, no_cfunc_wrapper=True, **_SEMANTICS)(function)
-
-
-def generic(function: Callable[..., Any]) -> Any:
-    """Write out `function`, which takes kernels as arguments, in every place it is called from.
-
-    A kernel that is still passed around in the machine code is an address of this process: numba then refuses to cache
-    the caller. Written out down to the entry point, which names the kernel, it is a direct call.
-    """
-    return njit(inline="always", no_cpython_wrapper=True, no_cfunc_wrapper=True, **_SEMANTICS)(function)
+    return njit(**_AS_PART)(function)
 
 
 def by_bundle(array: str, having: Callable[..., Any], lacking: Callable[..., Any]) -> Callable[..., Any]:
@@ -123,7 +119,7 @@ def by_bundle(array: str, having: Callable[..., Any], lacking: Callable[..., Any
     def choose(bundle: Any, *args: Any) -> Any:
         return (having if hasattr(bundle, array) else lacking)(bundle, *args)
 
-    @overload(choose, jit_options=_SEMANTICS)
+    @overload(choose, jit_options=_AS_PART)
     def _typed(bundle, *args):
         choice = having if array in dict(bundle.kinds) else lacking
 
@@ -145,7 +141,7 @@ def by_number(real: Callable[..., Any], tangent: Callable[..., Any]) -> Callable
     def choose(*args: Any) -> Any:
         return (tangent if any(isinstance(x, complex) for x in args) else real)(*args)
 
-    @overload(choose, jit_options=_SEMANTICS)
+    @overload(choose, jit_options=_AS_PART)
     def _typed(*args):
         choice = tangent if any(isinstance(kind, types.Complex) for kind in args) else real
 

@@ -1,12 +1,12 @@
 """Coordinates moved by finite increments of the speeds' motion, q o exp(increment): for methods on Lie groups."""
 
 from flexmb.hinges import catalogue
-from flexmb.kernel import helper
+from flexmb.kernel import helper, kernel
 from flexmb.spatial.rotation import exponential_coefficients, left_jacobian_times, quaternion_matrix
 from flexmb.spatial.vector import dot, times
 
 
-@helper
+@kernel
 def move(y, increment, result, c):
     """Coordinates of result = those of y moved for a unit of time at the constant speeds `increment` (nu,).
 

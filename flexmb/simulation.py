@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
+from typing import TYPE_CHECKING, NamedTuple, cast, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import composite_runs, propagate
-from flexmb.arrays import Workspace
-from flexmb.composite import CompositeWorkspace
-from flexmb.frisch import propagation as nested_propagation
-from flexmb.frisch.tables import NestedWorkspace
+from flexmb import composite, propagate
+from flexmb.frisch import evaluation as nested_evaluation
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
 from flexmb.integrate.jacobians import COUNTS, FACTORISATIONS, JACOBIANS
 from flexmb.labels import state_names
 from flexmb.methods import LINEARISING, Method, Settings
+from flexmb.propagate import Route
 from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
@@ -30,7 +28,6 @@ from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 if TYPE_CHECKING:
     from flexmb.closed_system import ClosedSystem
-    from flexmb.closure.tables import Closed
 
 
 class _Raw(NamedTuple):
@@ -43,15 +40,6 @@ class _Raw(NamedTuple):
     counts: list[int]
     compile_s: float
     run_s: float
-
-
-class _Route(NamedTuple):
-    """An algorithm as integrators see it: its constants, a maker of workspaces, and the compiled runs."""
-
-    constants: Any
-    workspace: Callable[[], Workspace | CompositeWorkspace | NestedWorkspace | Closed]
-    run_dop853: Callable[..., Any]
-    run_rk4: Callable[..., Any]
 
 
 def simulate(
@@ -137,47 +125,34 @@ def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array
     return times
 
 
-def _route(system: System, algorithm: Algorithm, stabilise: float) -> _Route:
+def _route(system: System, algorithm: Algorithm, stabilise: float) -> Route:
     if system.scene.closures:
-        return _Route(*cast("ClosedSystem", system).route(algorithm, stabilise))
+        return Route(*cast("ClosedSystem", system).route(algorithm, stabilise))
     if stabilise != 0.0:
         raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures: leave it out")
     if algorithm == "articulated":
-        return _Route(
-            system.recursion_constants, system.recursion_workspace, propagate.run_dop853, propagate.run_rk4
-        )
+        return Route(lambda: (system.recursion_constants, system.recursion_workspace()))
     if algorithm == "composite":
-        return _Route(
-            system.constants, system.composite_workspace, composite_runs.run_dop853, composite_runs.run_rk4
-        )
+        return Route(lambda: (system.constants, system.composite_workspace()), composite.rhs)
     if algorithm not in ERRATA:
         routes = [each for each in get_args(Algorithm) if each != "unsplit"]  # a reference for single states
         raise ValueError(f"algorithm is {algorithm!r}: runs use one of {', '.join(map(repr, routes))}")
     nested = system.nested(algorithm)
-    return _Route(nested.constants, nested.workspace, nested_propagation.run_dop853, nested_propagation.run_rk4)
+    return Route(lambda: (nested.constants, nested.workspace()), nested_evaluation.rhs)
 
 
-def _integrate(system: System, route: _Route, times: Array, settings: Settings) -> _Raw:
+def _integrate(system: System, route: Route, times: Array, settings: Settings) -> _Raw:
     """Run once over no time at all, which compiles, and then in earnest."""
     initial = system.initial_state
     ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
 
     def run(times: Array, ends: Array) -> _Raw:
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
-        counts, workspace = np.zeros(COUNTS, np.int64), route.workspace()
-        limit, tables = settings.max_steps, (route.constants, workspace, out, counts)
+        counts = np.zeros(COUNTS, np.int64)
         start = perf_counter()
-        if settings.method == "rk4":
-            status, t = route.run_rk4(y, times, ends, settings.step, limit, *tables)
-        elif settings.method == "dop853":
-            controlled = system.nq + system.nu
-            status, t = route.run_dop853(y, times, ends, settings.rtol, settings.atol, controlled, limit, *tables)
-        else:
-            from flexmb import stiff_runs  # brings the equations of motion once more, for complex numbers
-
-            status, t = stiff_runs.run(system, settings, y, times, ends, workspace, out, counts)
+        status, t, fault = propagate.run(route, settings, system.constants, system.nq, y, times, ends, out, counts)
         seconds = perf_counter() - start
-        return _Raw(out[: counts[SAMPLES]], Status(status), int(workspace.fault[0]), t, counts.tolist(), 0.0, seconds)
+        return _Raw(out[: counts[SAMPLES]], Status(status), fault, t, counts.tolist(), 0.0, seconds)
 
     compiled = run(times[:1], ends[:0])
     return run(times, ends)._replace(compile_s=compiled.run_s)

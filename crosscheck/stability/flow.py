@@ -12,7 +12,8 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.propagate import run_dop853
+from flexmb.integrate.dop853 import dop853
+from flexmb.propagate import recursion
 from flexmb.state import pack
 from flexmb.status import OK, Status
 from flexmb.system import System
@@ -36,10 +37,8 @@ def flow(system: System, start: Array, time: float) -> Array:
     """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
     counts, controlled = np.zeros(4, np.int64), system.nq + system.nu
-    status, _ = run_dop853(
-        start.copy(), times, times[1:], RTOL, ATOL, controlled, MAX_STEPS,
-        system.recursion_constants, system.recursion_workspace(), out, counts,
-    )  # fmt: skip
+    equations = recursion(system.recursion_constants, system.recursion_workspace())
+    status, _ = dop853(equations, start.copy(), times, times[1:], RTOL, ATOL, controlled, MAX_STEPS, out, counts)
     if status != OK:
         raise StoppedError(Status(status))
     return np.asarray(out[1])

@@ -7,16 +7,19 @@ from flexmb.closure.projection import displace, project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.coordinates import configuration_rate, load_state
 from flexmb.dynamics import world_loads
-from flexmb.kernel import helper, kernel
+from flexmb.kernel import kernel
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.status import OK
 
 NOTHING, COORDINATES, SPEEDS = range(3)
 
 
-@helper
+@kernel
 def rhs(t, y, dy, s, _):
-    """dy/dt of y = [q, u, work] at time t; returns a status code, that of the projection before it too."""
+    """dy/dt of y = [q, u, work] at time t; returns a status code, that of the projection before it too.
+
+    A closed chain is constants and workspace in one: it is passed as both.
+    """
     c, w, cw = s.c, s.w, s.cw
     if cw.failure[0] != OK:
         w.fault[0] = cw.failure[1]
@@ -38,7 +41,7 @@ def rhs(t, y, dy, s, _):
     return OK
 
 
-@helper
+@kernel
 def project(t, y, s):
     """Put y on the manifold of closures, unit quaternions and prescribed coordinates."""
     project_closed(t, y, s)

@@ -115,7 +115,7 @@ class Closures:
 
     def linearise_stiff(self, t: float, y: Real) -> int:
         """The same with the metric that hardly bends bodies; returns the status code."""
-        return int(dynamics.linearise(t, y, self._chain._replace(c=self._stiff)))
+        return int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
 
     @cached_property
     def _stiff(self) -> Constants:

@@ -6,8 +6,6 @@ body_a (the inboard side), frame B on body_b, both turned so that an axis is z; 
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 
 from flexmb.arrays import Constants, Index, Real, Record, Workspace
@@ -99,7 +97,8 @@ class Recursion:
     """No arrays: the articulated quantities in the tree's workspace are all that unit loads need."""
 
 
-class Closed(NamedTuple):
+@bundle
+class Closed:
     """A closed chain as kernels see it: constants and workspaces of its tree (c, w) and its closures (cc, cw).
 
     route: what factorises the mass matrix. Recursion: unit loads are passed through the articulated quantities, and

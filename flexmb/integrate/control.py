@@ -1,4 +1,4 @@
-"""One step control for all adaptive methods: error scale, change of step, first step, and what is checked on the way.
+"""What runs have in common: derivatives that are checked, error scale, first step, change of step, stretches of steps.
 
 The last components of a state y (n,) may be pure quadratures: only the first `controlled` ones enter a norm (see
 `dop853`).
@@ -8,13 +8,19 @@ from __future__ import annotations
 
 import math
 
-from flexmb.kernel import generic, helper
-from flexmb.status import NONFINITE, OK
+import numpy as np
+
+from flexmb.kernel import helper
+from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 SAFETY = 0.9
 SHRINK = 0.2  # strongest change of step after a rejection ...
 GROW = 10.0  # ... and after an acceptance
 RETREAT = 0.1  # change of step where the right-hand side could not be evaluated at all
+HALVED = 0.5  # change of step where an iteration did not converge
+# A fixed step may exceed the one asked for by this fraction: 0.1 s in steps of 0.01 s are 10, whatever 0.1/0.01 rounds
+# to.
+_STEP_SLACK = 1e-9
 
 EVALUATIONS, ACCEPTED, REJECTED, SAMPLES = range(4)  # entries of `counts`
 
@@ -35,11 +41,11 @@ def all_finite(values):
     return True
 
 
-@generic
-def derivative(rhs, t, y, dy, constants, workspace, counts):
+@helper
+def derivative(problem, t, y, dy, counts):
     """dy = f(t, y); returns a status code, which is never OK for a derivative that is not finite."""
     counts[EVALUATIONS] += 1
-    status = rhs(t, y, dy, constants, workspace)
+    status = problem.rhs(t, y, dy, problem.constants, problem.workspace)
     if status == OK and not all_finite(dy):
         return NONFINITE
     return status
@@ -71,10 +77,16 @@ def step_factor(error, exponent, rejected_before):
     return min(1.0, factor) if rejected_before else factor
 
 
-@generic
-def initial_step(
-    rhs, t, y, dy, span, last, rtol, atol, controlled, exponent, constants, workspace, counts, trial, slope
-):
+@helper
+def begin(problem, t, y, out, counts):
+    """Put the initial state on its manifold; it is the first sample."""
+    problem.project(t, y, problem.constants)
+    copy(y, out[0])
+    counts[SAMPLES] = 1
+
+
+@helper
+def initial_step(problem, t, y, dy, span, last, rtol, atol, controlled, exponent, counts, trial, slope):
     """First step size: Hairer, Norsett, Wanner I, II.4. `dy` = f(t, y); `trial` and `slope` (n,) are scratch."""
     d0 = scaled_norm(y, y, rtol, atol, controlled)
     d1 = scaled_norm(dy, y, rtol, atol, controlled)
@@ -82,10 +94,66 @@ def initial_step(
     h0 = min(h0, span)
     for i in range(y.shape[0]):
         trial[i] = y[i] + h0 * dy[i]
-    if derivative(rhs, min(t + h0, last), trial, slope, constants, workspace, counts) != OK:
+    if derivative(problem, min(t + h0, last), trial, slope, counts) != OK:
         return h0
     for i in range(y.shape[0]):
         slope[i] -= dy[i]
     d2 = scaled_norm(slope, y, rtol, atol, controlled) / h0
     h1 = max(1e-6, h0 * 1e-3) if d1 <= 1e-15 and d2 <= 1e-15 else (0.01 / max(d1, d2)) ** (1.0 / exponent)
     return min(100.0 * h0, h1, span)
+
+
+@helper
+def enter_segment(problem, t, y, dy, h, end, last, rtol, atol, controlled, exponent, counts, trial, slope):
+    """dy = f(t, y), afresh, for it may jump where a segment ends; returns a status code, and h, the first one for 0."""
+    status = derivative(problem, t, y, dy, counts)
+    if status == OK and h == 0.0:
+        h = initial_step(problem, t, y, dy, end - t, last, rtol, atol, controlled, exponent, counts, trial, slope)
+    return status, h
+
+
+@helper
+def step_end(t, h, end, trouble, max_steps, counts):
+    """Where a step of size h ends, after a status code: OK, or why there is no further step.
+
+    There may have been too many, or it is too short to advance time. No sliver of a step is left before the end of the
+    segment.
+    """
+    status = OK
+    if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
+        status = MAX_STEPS
+    elif h < 10.0 * (np.nextafter(t, math.inf) - t):
+        status = trouble
+    return status, end if t + 1.01 * h >= end else t + h
+
+
+@helper
+def next_step(h, length, factor, cut):
+    """Step after one of this length that was accepted; h was proposed for it, `cut`: the segment's end cut it short.
+
+    That says nothing against the longer one that was proposed.
+    """
+    return max(h, length * factor) if cut and factor >= 1.0 else length * factor
+
+
+@helper
+def retreat(status):
+    """New step over old where a trial did not come to an error estimate."""
+    return HALVED if status == NOT_CONVERGED else RETREAT
+
+
+@helper
+def reason(status):
+    """What a step that gets too short reports: the failure that shortened it, or that steps do."""
+    return STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
+
+
+@helper
+def stretch(t, sample, segment_end, step):
+    """Equal steps from t to the next sample or segment end: (its time, their number, their size, last time before it).
+
+    Stages at the end of a segment see the right-hand side's limit from the left, at the time returned last.
+    """
+    end = min(sample, segment_end)
+    steps = max(1, math.ceil((end - t) / step * (1.0 - _STEP_SLACK)))
+    return end, steps, (end - t) / steps, np.nextafter(segment_end, t)

@@ -14,17 +14,21 @@ import numpy as np
 from flexmb.integrate.control import (
     ACCEPTED,
     REJECTED,
-    RETREAT,
     SAMPLES,
     all_finite,
+    begin,
     copy,
     derivative,
-    initial_step,
+    enter_segment,
+    next_step,
+    reason,
+    retreat,
+    step_end,
     step_factor,
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
-from flexmb.kernel import generic, helper
-from flexmb.status import MAX_STEPS, NONFINITE, OK, STEP_TOO_SMALL
+from flexmb.kernel import helper, kernel
+from flexmb.status import NONFINITE, OK, STEP_TOO_SMALL
 
 _END = STAGES  # row of A with the weights of the result; k[_END] is the derivative there
 _ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)
@@ -46,14 +50,14 @@ def combine(y, h, row, k, result):
         result[i] = y[i] + h * weighted_sum(A[row], row, k, i)
 
 
-@generic
-def stages(rhs, t, last, y, h, k, trial, constants, workspace, counts):
+@helper
+def stages(problem, t, last, y, h, k, trial, counts):
     """Stages 1 to 11 (stage 0 is given), then trial = y(t + h). No stage is evaluated later than `last`."""
     for s in range(1, STAGES + 1):
         combine(y, h, s, k, trial)
         if s == _END:
             break
-        status = derivative(rhs, min(t + C[s] * h, last), trial, k[s], constants, workspace, counts)
+        status = derivative(problem, min(t + C[s] * h, last), trial, k[s], counts)
         if status != OK:
             return status
     return OK if all_finite(trial) else NONFINITE
@@ -72,12 +76,12 @@ def error_norm(y, y_new, h, k, rtol, atol, controlled):
     return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * controlled)
 
 
-@generic
-def interpolant(rhs, t, last, y, y_new, h, k, f, trial, constants, workspace, counts):
+@helper
+def interpolant(problem, t, last, y, y_new, h, k, f, trial, counts):
     """Coefficients f (7, n) of the interpolant of order 7 on the step from y(t) to y_new; three more stages."""
     for s in range(STAGES + 1, STAGES_DENSE):
         combine(y, h, s, k, trial)
-        status = derivative(rhs, min(t + C[s] * h, last), trial, k[s], constants, workspace, counts)
+        status = derivative(problem, min(t + C[s] * h, last), trial, k[s], counts)
         if status != OK:
             return status
     for i in range(y.shape[0]):
@@ -100,8 +104,8 @@ def interpolate(y, f, x, result):
         result[i] = y[i] + value
 
 
-@generic
-def store_samples(rhs, project, t, t_new, last, y, y_new, k, f, times, constants, workspace, out, counts):
+@helper
+def store_samples(problem, t, t_new, last, y, y_new, k, f, times, out, counts):
     """Store the samples in (t, t_new]; inside the step by the interpolant, which is only built where it is needed.
 
     Interpolated states are projected, so that quaternions are unit and prescribed coordinates exact there too.
@@ -113,40 +117,40 @@ def store_samples(rhs, project, t, t_new, last, y, y_new, k, f, times, constants
             copy(y_new, out[sample])
         else:
             if not built:
-                status = interpolant(rhs, t, last, y, y_new, t_new - t, k, f, out[sample], constants, workspace, counts)
+                status = interpolant(problem, t, last, y, y_new, t_new - t, k, f, out[sample], counts)
                 if status != OK:
                     return status
                 built = True
             interpolate(y, f, (times[sample] - t) / (t_new - t), out[sample])
-            project(times[sample], out[sample], constants)
+            problem.project(times[sample], out[sample], problem.constants)
         sample += 1
         counts[SAMPLES] = sample
     return OK
 
 
-@generic
-def attempt(rhs, project, t, t_new, last, y, y_new, k, rtol, atol, controlled, constants, workspace, counts):
+@helper
+def attempt(problem, t, t_new, last, y, y_new, k, rtol, atol, controlled, counts):
     """One trial step: y_new = y(t_new), projected, and k[_END] = f(t_new, y_new). Returns (status, error norm)."""
     h = t_new - t
-    status = stages(rhs, t, last, y, h, k, y_new, constants, workspace, counts)
+    status = stages(problem, t, last, y, h, k, y_new, counts)
     if status != OK:
         return status, math.inf
     error = error_norm(y, y_new, h, k, rtol, atol, controlled)
     if error < 1.0:
-        project(t_new, y_new, constants)
-        status = derivative(rhs, min(t_new, last), y_new, k[_END], constants, workspace, counts)
+        problem.project(t_new, y_new, problem.constants)
+        status = derivative(problem, min(t_new, last), y_new, k[_END], counts)
     return status, error
 
 
-@generic
-def dop853(rhs, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts):
-    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+@kernel
+def dop853(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
+    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
 
-    y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends: increasing, the last is
-    times[-1]; no step crosses one, and the stages before one see the right-hand side's limit from the left.
-    `project(t, y, constants)` puts y back on its manifold. Only the first `controlled` components enter the error norm:
-    what follows are quadratures (work), which nothing depends on; they have no scale of their own to compare `atol`
-    with, and are as smooth as the state, hence integrated as accurately by the same steps.
+    problem: a `Problem`. y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends:
+    increasing, the last is times[-1]; no step crosses one, and the stages before one see the right-hand side's limit
+    from the left. Only the first `controlled` components enter the error norm: what follows are quadratures (work),
+    which nothing depends on; they have no scale of their own to compare `atol` with, and are as smooth as the state,
+    hence integrated as accurately by the same steps.
     A step whose right-hand side fails is retried shorter: it may only have reached too far. When the step gets too
     short to advance time, the failure's own status is returned. counts (4,): evaluations, accepted and rejected steps,
     samples stored. Returns (status code, time of the last good state).
@@ -155,48 +159,34 @@ def dop853(rhs, project, y, times, segment_ends, rtol, atol, controlled, max_ste
     k = np.empty((STAGES_DENSE, n))
     y_new, f = np.empty(n), np.empty((7, n))
     t, h = times[0], 0.0
-    project(t, y, constants)
-    copy(y, out[0])
-    counts[SAMPLES] = 1
+    begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status = derivative(rhs, t, y, k[0], constants, workspace, counts)
+        status, h = enter_segment(
+            problem, t, y, k[0], h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, y_new, k[1]
+        )
         if status != OK:
             return status, t
-        if h == 0.0:
-            h = initial_step(
-                rhs, t, y, k[0], end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
-                constants, workspace, counts, y_new, k[1],
-            )  # fmt: skip
-        rejected = False
-        trouble = STEP_TOO_SMALL
+        rejected, trouble = False, STEP_TOO_SMALL
         while t < end:
-            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
-                return MAX_STEPS, t
-            if h < 10.0 * (np.nextafter(t, math.inf) - t):
-                return trouble, t
-            t_new = end if t + 1.01 * h >= end else t + h  # 1.01: no sliver of a step is left before the end
-            status, error = attempt(
-                rhs, project, t, t_new, last, y, y_new, k, rtol, atol, controlled, constants, workspace, counts
-            )
+            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            if status != OK:
+                return status, t
+            length = t_new - t
+            status, error = attempt(problem, t, t_new, last, y, y_new, k, rtol, atol, controlled, counts)
+            trouble = reason(status)
             accepted = status == OK and error < 1.0
             if accepted:
-                status = store_samples(
-                    rhs, project, t, t_new, last, y, y_new, k, f, times, constants, workspace, out, counts
-                )
+                status = store_samples(problem, t, t_new, last, y, y_new, k, f, times, out, counts)
                 if status != OK:
                     return status, t
-                factor = step_factor(error, _ERROR_EXPONENT, rejected)
-                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
-                h = max(h, (t_new - t) * factor) if t_new == end and factor >= 1.0 else (t_new - t) * factor
+                h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
                 t = t_new
                 copy(y_new, y)
                 copy(k[_END], k[0])
                 counts[ACCEPTED] += 1
-                trouble = STEP_TOO_SMALL
             else:
-                h = (t_new - t) * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else RETREAT)
-                trouble = STEP_TOO_SMALL if status == OK else status
+                h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t

@@ -21,18 +21,22 @@ import numpy as np
 from flexmb.integrate.control import (
     ACCEPTED,
     REJECTED,
-    RETREAT,
     SAMPLES,
+    begin,
     copy,
     derivative,
-    initial_step,
+    enter_segment,
+    next_step,
+    reason,
+    retreat,
     scaled_norm,
+    step_end,
     step_factor,
 )
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
-from flexmb.kernel import generic, helper
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.kernel import helper, kernel
+from flexmb.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 NODES = np.array([0.25, 0.5, 0.75, 1.0])
 # Row l: l-th derivative at 0 of the polynomial that vanishes at 0 and has given values at the nodes.
@@ -82,14 +86,14 @@ def change(flow, s, y, rtol, atol, controlled):
     return math.sqrt(0.25 * total)
 
 
-@generic
-def evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts):
+@helper
+def evaluate_rest(problem, t, last, y, f, h, flow, s, counts):
     """h r at the nodes, balanced, and from it the polynomial v; returns a status code."""
     n = y.shape[0]
     for node in range(4):
         for i in range(n):
             s.y_new[i] = y[i] + flow.scale[i] * s.x[node, i]
-        status = derivative(rhs, min(t + NODES[node] * h, last), s.y_new, s.f_new, constants, workspace, counts)
+        status = derivative(problem, min(t + NODES[node] * h, last), s.y_new, s.f_new, counts)
         if status != OK:
             return status
         for i in range(n):
@@ -106,8 +110,8 @@ def evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts):
     return OK
 
 
-@generic
-def iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, workspace, counts):
+@helper
+def iterate(problem, t, last, y, f, h, flow, s, rtol, atol, controlled, counts):
     """Solve for x at the nodes; returns a status code, NOT_CONVERGED where the iteration would not end in time."""
     n = y.shape[0]
     for i in range(n):
@@ -117,7 +121,7 @@ def iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, w
     for sweep in range(1, _SWEEPS + 1):
         for node in range(4):
             copy(s.x[node], s.x_before[node])
-        status = evaluate_rest(rhs, t, last, y, f, h, flow, s, constants, workspace, counts)
+        status = evaluate_rest(problem, t, last, y, f, h, flow, s, counts)
         if status != OK:
             return status
         response(flow, s, TERMS)
@@ -157,24 +161,24 @@ def estimate(y, flow, s, rtol, atol, controlled):
     return norm
 
 
-@generic
-def attempt(rhs, project, t, t_new, last, y, f, flow, s, rtol, atol, controlled, constants, workspace, counts):
+@helper
+def attempt(problem, t, t_new, last, y, f, flow, s, rtol, atol, controlled, counts):
     """One trial step: y_new, projected, and its slope f_new; returns status, error norm."""
     h = t_new - t
-    status = iterate(rhs, t, last, y, f, h, flow, s, rtol, atol, controlled, constants, workspace, counts)
+    status = iterate(problem, t, last, y, f, h, flow, s, rtol, atol, controlled, counts)
     if status != OK:
         return status, math.inf
     for i in range(y.shape[0]):
         s.y_new[i] = y[i] + flow.scale[i] * s.x[3, i]
     error = estimate(y, flow, s, rtol, atol, controlled)
     if error < 1.0:
-        project(t_new, s.y_new, constants)
-        status = derivative(rhs, min(t_new, last), s.y_new, s.f_new, constants, workspace, counts)
+        problem.project(t_new, s.y_new, problem.constants)
+        status = derivative(problem, min(t_new, last), s.y_new, s.f_new, counts)
     return status, error
 
 
-@generic
-def store_samples(project, t, t_new, y, flow, s, times, constants, out, counts):
+@helper
+def store_samples(problem, t, t_new, y, flow, s, times, out, counts):
     """Store the samples in (t, t_new]; inside the step by the exact flow under the same polynomial, projected."""
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= t_new:
@@ -185,79 +189,65 @@ def store_samples(project, t, t_new, y, flow, s, times, constants, out, counts):
             at_fraction(flow, s.v, s.X, s.x, theta, out[sample], s.term, s.product)
             for i in range(y.shape[0]):
                 out[sample, i] = y[i] + flow.scale[i] * out[sample, i]
-            project(times[sample], out[sample], constants)
+            problem.project(times[sample], out[sample], problem.constants)
         sample += 1
     counts[SAMPLES] = sample
 
 
-@generic
-def exponential(
-    rhs, jacobian, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
-):
-    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
-
-    Arguments, samples, segments and the retreat from a failing right-hand side are those of `dop853`; `jacobian` and
-    counts (6,) are those of `jacobians`. Where the iteration does not converge, the step is halved.
-    """
-    n = y.shape[0]
-    flow = Flow(
-        np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((5, n, n)), np.empty(1, np.int64)
-    )
-    s = Scratch(
+@helper
+def scratch(n):
+    """For n components."""
+    flow = Flow(np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((5, n, n)), np.empty(1, np.int64))
+    return flow, Scratch(
         np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
         np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
-    f = np.empty(n)
+
+
+@kernel
+def exponential(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
+    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
+    `dop853`, counts (6,) those of `jacobians`. Where the iteration does not converge, the step is halved.
+    """
+    flow, s = scratch(y.shape[0])
+    f = np.empty(y.shape[0])
     t, h = times[0], 0.0
-    project(t, y, constants)
-    copy(y, out[0])
-    counts[SAMPLES] = 1
+    begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status = derivative(rhs, t, y, f, constants, workspace, counts)
+        status, h = enter_segment(
+            problem, t, y, f, h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, s.y_new, s.f_new
+        )
         if status != OK:
             return status, t
-        if h == 0.0:
-            h = initial_step(
-                rhs, t, y, f, end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
-                constants, workspace, counts, s.y_new, s.f_new,
-            )  # fmt: skip
-        renew, rejected, trouble = True, False, STEP_TOO_SMALL
+        rejected, trouble = False, STEP_TOO_SMALL
         while t < end:
-            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
-                return MAX_STEPS, t
-            if h < 10.0 * (np.nextafter(t, math.inf) - t):
-                return trouble, t
-            t_new = end if t + 1.01 * h >= end else t + h
+            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            if status != OK:
+                return status, t
             length = t_new - t
-            if renew:
-                status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+            if not rejected:
+                status = linearisation(problem, t, y, s.J, counts)
                 if status != OK:
                     return status, t
             status, error = NOT_CONVERGED, math.inf
             counts[FACTORISATIONS] += 1
             if prepare(flow, s.J, length):
-                status, error = attempt(
-                    rhs, project, t, t_new, last, y, f, flow, s, rtol, atol, controlled, constants, workspace, counts
-                )
-            renew = status == OK and error < 1.0
-            if renew:
-                store_samples(project, t, t_new, y, flow, s, times, constants, out, counts)
-                factor = step_factor(error, _ERROR_EXPONENT, rejected)
-                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
-                h = max(h, length * factor) if t_new == end and factor >= 1.0 else length * factor
+                status, error = attempt(problem, t, t_new, last, y, f, flow, s, rtol, atol, controlled, counts)
+            trouble = reason(status)
+            accepted = status == OK and error < 1.0
+            if accepted:
+                store_samples(problem, t, t_new, y, flow, s, times, out, counts)
+                h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
                 t = t_new
                 copy(s.y_new, y)
                 copy(s.f_new, f)
                 counts[ACCEPTED] += 1
-                trouble = STEP_TOO_SMALL
             else:
-                if status == OK:
-                    h = length * step_factor(error, _ERROR_EXPONENT, rejected)
-                else:
-                    h = length * (0.5 if status == NOT_CONVERGED else RETREAT)
-                trouble = STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
+                h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
                 counts[REJECTED] += 1
-            rejected = not renew
+            rejected = not accepted
     return OK, t

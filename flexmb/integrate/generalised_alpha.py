@@ -12,22 +12,20 @@ resolve in one step.
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, copy, derivative, scaled_norm
+from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, scaled_norm, stretch
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
-from flexmb.kernel import generic, helper
+from flexmb.kernel import helper, kernel
 from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
 _ROUNDING = 2.0**-46  # a correction this far below accelerations is theirs: 64 roundings
 _WORN = 8  # iterations after which the Jacobian is renewed: it costs more than they do
 _SAME = 1e-9  # relative difference of steps that share factors
-_STEP_SLACK = 1e-9  # a step may exceed the one asked for by this fraction, as in `rk4`
 
 
 class Scratch(NamedTuple):
@@ -82,8 +80,8 @@ def factorise(s, h, radius, nq, counts):
     return lu_factorise(s.matrix, s.pivots)
 
 
-@generic
-def end_of_step(move, y, h, radius, nq, s, constants):
+@helper
+def end_of_step(problem, y, h, radius, nq, s):
     """y_new and a_new from udot at both ends; what follows the speeds is left alone."""
     alpha_m, alpha_f, beta, gamma = parameters(radius)
     for j in range(s.a.shape[0]):
@@ -91,18 +89,18 @@ def end_of_step(move, y, h, radius, nq, s, constants):
         s.a_new[j] = a
         s.increment[j] = h * (y[nq + j] + h * ((0.5 - beta) * s.a[j] + beta * a))
         s.y_new[nq + j] = y[nq + j] + h * ((1.0 - gamma) * s.a[j] + gamma * a)
-    move(y, s.increment, s.y_new, constants)
+    problem.move(y, s.increment, s.y_new, problem.constants)
 
 
-@generic
-def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspace, counts):
+@helper
+def newton(problem, t_new, y, h, radius, nq, s, rtol, atol, counts):
     """Solve for udot at the end of the step. Returns (status, iterations).
 
     The first guess is the solution with f linearised at the start, so that no stiff mode is ever far out.
     """
     nu = s.a.shape[0]
     copy(s.rate, s.rate_new)
-    end_of_step(move, y, h, radius, nq, s, constants)
+    end_of_step(problem, y, h, radius, nq, s)
     for j in range(nu):
         total = 0.0
         for k in range(nq + nu):
@@ -111,9 +109,9 @@ def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspa
     lu_solve(s.matrix, s.pivots, s.correction)
     for j in range(nu):
         s.rate_new[j] += s.correction[j]
-    end_of_step(move, y, h, radius, nq, s, constants)
+    end_of_step(problem, y, h, radius, nq, s)
     for iteration in range(1, _ITERATIONS + 1):
-        status = derivative(rhs, t_new, s.y_new, s.f_new, constants, workspace, counts)
+        status = derivative(problem, t_new, s.y_new, s.f_new, counts)
         if status != OK:  # an iterate that runs away is no motion that diverges
             return NOT_CONVERGED if status == NONFINITE else status, iteration
         for j in range(nu):
@@ -122,7 +120,7 @@ def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspa
         for j in range(nu):
             s.rate_new[j] += s.correction[j]
         copy(s.y_new, s.y_before)
-        end_of_step(move, y, h, radius, nq, s, constants)
+        end_of_step(problem, y, h, radius, nq, s)
         if not all_finite(s.y_new):
             return NOT_CONVERGED, iteration
         for i in range(nq + nu):
@@ -133,9 +131,9 @@ def newton(rhs, move, t_new, y, h, radius, nq, s, rtol, atol, constants, workspa
     return NOT_CONVERGED, _ITERATIONS
 
 
-@generic
+@helper
 def step_once(
-    rhs, jacobian, move, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, constants, workspace, counts
+    problem, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, counts
 ):
     """One step from y(t) to y_new, with a new Jacobian where the old one does not do.
 
@@ -145,33 +143,28 @@ def step_once(
     if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
         h_factored = h if factorise(s, h, radius, nq, counts) else 0.0
     if h_factored > 0.0:
-        status, iterations = newton(
-            rhs, move, min(t_new, last), y, h, radius, nq, s, rtol, atol, constants, workspace, counts
-        )
+        status, iterations = newton(problem, min(t_new, last), y, h, radius, nq, s, rtol, atol, counts)
     if status == NOT_CONVERGED:
-        status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+        status = linearisation(problem, t, y, s.J, counts)
         if status != OK:
             return status, 0.0
         if not factorise(s, h, radius, nq, counts):
             return NOT_CONVERGED, 0.0
-        status, iterations = newton(
-            rhs, move, min(t_new, last), y, h, radius, nq, s, rtol, atol, constants, workspace, counts
-        )
+        status, iterations = newton(problem, min(t_new, last), y, h, radius, nq, s, rtol, atol, counts)
         return status, h
     return status, h if iterations < _WORN else 0.0
 
 
-@generic
+@kernel
 def generalised_alpha(
-    rhs, jacobian, move, project, y, times, segment_ends, step, radius, nq, controlled, rtol, atol, max_steps,
-    constants, workspace, out, counts,
-):  # fmt: skip
+    problem, y, times, segment_ends, step, radius, nq, controlled, rtol, atol, max_steps, out, counts
+):
     """Integrate y = [q (nq,), u, quadratures] from times[0] to times[-1] and store y at every time of `times` in `out`.
 
-    Steps, samples and segments are those of `rk4`; `jacobian` and counts (6,) those of `jacobians`. `move(y, increment,
-    result, constants)` puts q o exp(increment) into result. Newton's method stops where its correction is below
-    rtol |y| + atol over the first `controlled` components. Quadratures follow the trapezoidal rule. a starts as udot,
-    at the start and after every segment end, where udot may jump. Returns (status code, time of the last good state).
+    problem: a `StiffProblem`. Steps, samples and segments are those of `rk4`, counts (6,) those of `jacobians`.
+    Newton's method stops where its correction is below rtol |y| + atol over the first `controlled` components.
+    Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end, where udot may
+    jump. Returns (status code, time of the last good state).
     """
     n, nu = y.shape[0], controlled - nq
     s = Scratch(
@@ -179,22 +172,18 @@ def generalised_alpha(
         np.empty(nu), np.empty(nu), np.empty(nu), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
     t = times[0]
-    project(t, y, constants)
-    copy(y, out[0])
+    begin(problem, t, y, out, counts)
     copy(y, s.y_new)
-    counts[SAMPLES] = 1
     segment, at_start, h_factored = 0, True, 0.0
     for sample in range(1, times.shape[0]):
         while t < times[sample]:
-            start, end = t, min(times[sample], segment_ends[segment])
-            last = np.nextafter(segment_ends[segment], start)
-            steps = max(1, math.ceil((end - start) / step * (1.0 - _STEP_SLACK)))
-            h = (end - start) / steps
+            start = t
+            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], step)
             for k in range(steps):
                 if counts[ACCEPTED] >= max_steps:
                     return MAX_STEPS, t
                 if at_start:
-                    status = derivative(rhs, t, y, s.f, constants, workspace, counts)
+                    status = derivative(problem, t, y, s.f, counts)
                     if status != OK:
                         return status, t
                     for j in range(nu):
@@ -202,16 +191,15 @@ def generalised_alpha(
                     at_start = False
                 t_new = end if k == steps - 1 else start + (k + 1) * h
                 status, h_factored = step_once(
-                    rhs, jacobian, move, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol,
-                    constants, workspace, counts,
-                )  # fmt: skip
+                    problem, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, counts
+                )
                 if status != OK:
                     return status, t
                 for i in range(controlled, n):
                     s.y_new[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
                 t = t_new
                 copy(s.y_new, y)
-                project(t, y, constants)
+                problem.project(t, y, problem.constants)
                 copy(s.rate_new, s.rate)
                 copy(s.a_new, s.a)
                 copy(s.f_new, s.f)

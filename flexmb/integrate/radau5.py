@@ -15,20 +15,24 @@ import numpy as np
 from flexmb.integrate.control import (
     ACCEPTED,
     REJECTED,
-    RETREAT,
     SAFETY,
     SAMPLES,
     SHRINK,
+    begin,
     copy,
     derivative,
-    initial_step,
+    enter_segment,
+    next_step,
+    reason,
+    retreat,
     scaled_norm,
+    step_end,
 )
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
-from flexmb.kernel import generic, helper
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.kernel import helper, kernel
+from flexmb.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 _ITERATIONS = 7  # of Newton's method, at most
 _GROW = 8.0  # strongest growth of a step
@@ -39,7 +43,9 @@ _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
 class Scratch(NamedTuple):
-    """Arrays of a step: stages Z, their slopes F (3,n); factors; unknowns w, v and corrections dw, dv, decoupled."""
+    """Arrays of a step: stages Z, those of the step before, slopes F (3,n); factors; unknowns w, v and corrections dw,
+    dv, decoupled.
+    """
 
     J: np.ndarray
     real: np.ndarray
@@ -47,6 +53,7 @@ class Scratch(NamedTuple):
     real_pivots: np.ndarray
     paired_pivots: np.ndarray
     Z: np.ndarray
+    Z_before: np.ndarray
     F: np.ndarray
     w: np.ndarray
     v: np.ndarray
@@ -121,8 +128,8 @@ def stage_norm(dZ, y, rtol, atol, controlled):
     return math.sqrt(total / 3.0)
 
 
-@generic
-def newton(rhs, t, last, y, h, s, rtol, atol, controlled, constants, workspace, counts):
+@helper
+def newton(problem, t, last, y, h, s, rtol, atol, controlled, counts):
     """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
 
     Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
@@ -135,7 +142,7 @@ def newton(rhs, t, last, y, h, s, rtol, atol, controlled, constants, workspace, 
         for stage in range(3):
             for i in range(y.shape[0]):
                 s.trial[i] = y[i] + s.Z[stage, i]
-            status = derivative(rhs, min(t + C[stage] * h, last), s.trial, s.F[stage], constants, workspace, counts)
+            status = derivative(problem, min(t + C[stage] * h, last), s.trial, s.F[stage], counts)
             if status != OK:
                 return status, iteration, rate
         correct(s, h)
@@ -185,15 +192,15 @@ def guess(before, h_before, h, Z):
             Z[stage, i] = Z[stage, i] - before[2, i] if h_before > 0.0 else 0.0
 
 
-@generic
+@helper
 def attempt(
-    rhs, project, t, t_new, last, y, f, s, filter_again, rtol, atol, controlled, constants, workspace, counts
+    problem, t, t_new, last, y, f, s, filter_again, rtol, atol, controlled, counts
 ):
     """One trial step from a guess in Z: y_new, projected, and its slope f_new; returns status, error norm, iterations,
     contraction. `filter_again`: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
     """
     h = t_new - t
-    status, iterations, rate = newton(rhs, t, last, y, h, s, rtol, atol, controlled, constants, workspace, counts)
+    status, iterations, rate = newton(problem, t, last, y, h, s, rtol, atol, controlled, counts)
     if status != OK:
         return status, math.inf, iterations, rate
     for i in range(y.shape[0]):
@@ -202,17 +209,17 @@ def attempt(
     if error >= 1.0 and filter_again:
         for i in range(y.shape[0]):
             s.trial[i] = y[i] + s.error[i]
-        status = derivative(rhs, t, s.trial, s.f_new, constants, workspace, counts)
+        status = derivative(problem, t, s.trial, s.f_new, counts)
         if status == OK:
             error = estimate(y, s.f_new, h, s, rtol, atol, controlled)
     if status == OK and error < 1.0:
-        project(t_new, s.y_new, constants)
-        status = derivative(rhs, min(t_new, last), s.y_new, s.f_new, constants, workspace, counts)
+        problem.project(t_new, s.y_new, problem.constants)
+        status = derivative(problem, min(t_new, last), s.y_new, s.f_new, counts)
     return status, error, iterations, rate
 
 
-@generic
-def store_samples(project, t, t_new, y, s, times, constants, out, counts):
+@helper
+def store_samples(problem, t, t_new, y, s, times, out, counts):
     """Store the samples in (t, t_new]: the collocation polynomial, projected, inside the step."""
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= t_new:
@@ -222,90 +229,91 @@ def store_samples(project, t, t_new, y, s, times, constants, out, counts):
             evaluate_polynomial(s.Z, (times[sample] - t) / (t_new - t), out[sample])
             for i in range(y.shape[0]):
                 out[sample, i] += y[i]
-            project(times[sample], out[sample], constants)
+            problem.project(times[sample], out[sample], problem.constants)
         sample += 1
     counts[SAMPLES] = sample
 
 
-@generic
-def radau5(
-    rhs, jacobian, project, y, times, segment_ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
-):
-    """Integrate y' = rhs(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
-
-    Arguments, samples, segments and the retreat from a failing right-hand side are those of `dop853`; `jacobian` and
-    counts (6,) are those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed, then the
-    step is halved.
-    """
-    n = y.shape[0]
-    s = Scratch(
+@helper
+def scratch(n):
+    """For n components."""
+    return Scratch(
         np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
-        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty(n), np.empty(n, np.complex128),
-        np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
+        np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n),
     )  # fmt: skip
-    Z_before, f = np.empty((3, n)), np.empty(n)
+
+
+@helper
+def after_acceptance(h, length, cut, factor, rejected, worn):
+    """Step after one of this length: a change that is not worth new factors is none, unless they are `worn` anyway."""
+    factor = min(1.0, factor) if rejected else min(_GROW, factor)
+    return next_step(h, length, 1.0 if 1.0 <= factor < _KEEP and not worn else factor, cut)
+
+
+@kernel
+def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
+    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+
+    problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
+    `dop853`, counts (6,) those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed,
+    then the step is halved.
+    """
+    s, f = scratch(y.shape[0]), np.empty(y.shape[0])
     t, h = times[0], 0.0
-    project(t, y, constants)
-    copy(y, out[0])
-    counts[SAMPLES] = 1
+    begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status = derivative(rhs, t, y, f, constants, workspace, counts)
+        status, h = enter_segment(
+            problem, t, y, f, h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, s.trial, s.error
+        )
         if status != OK:
             return status, t
-        if h == 0.0:
-            h = initial_step(
-                rhs, t, y, f, end - t, last, rtol, atol, controlled, _ERROR_EXPONENT,
-                constants, workspace, counts, s.trial, s.error,
-            )  # fmt: skip
         h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
         renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
         while t < end:
-            if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
-                return MAX_STEPS, t
-            if h < 10.0 * (np.nextafter(t, math.inf) - t):
-                return trouble, t
-            t_new = end if t + 1.01 * h >= end else t + h
+            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            if status != OK:
+                return status, t
             length = t_new - t
             if renew:
-                status = linearisation(jacobian, t, y, s.J, constants, workspace, counts)
+                status = linearisation(problem, t, y, s.J, counts)
                 if status != OK:
                     return status, t
                 renew, fresh, h_factored = False, True, 0.0
-            status, error, iterations, rate = NOT_CONVERGED, math.inf, 0, 0.0
             # Equal steps differ by the rounding of time: the factors are good for all of them.
             if abs(length - h_factored) > _SAME * length:
                 h_factored = length if factorise(s, length, counts) else 0.0
+            status, error, iterations, rate = NOT_CONVERGED, math.inf, 0, 0.0
             if h_factored > 0.0:
-                guess(Z_before, h_before, length, s.Z)
+                guess(s.Z_before, h_before, length, s.Z)
                 status, error, iterations, rate = attempt(
-                    rhs, project, t, t_new, last, y, f, s, rejected or h_before == 0.0, rtol, atol, controlled,
-                    constants, workspace, counts,
-                )  # fmt: skip
-            caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
+                    problem, t, t_new, last, y, f, s, rejected or h_before == 0.0, rtol, atol, controlled, counts
+                )
+            trouble = reason(status)
+            factor = 1.0
+            if status == OK:
+                caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
+                factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                store_samples(project, t, t_new, y, s, times, constants, out, counts)
-                factor = min(_GROW, caution * new_over_old(length, h_before, error, error_before))
-                factor = min(1.0, factor) if rejected else factor
+                store_samples(problem, t, t_new, y, s, times, out, counts)
                 renew = iterations > 2 and rate > _SLOW
-                factor = 1.0 if 1.0 <= factor < _KEEP and not renew else factor
-                # A step cut short by the end of its segment says nothing against the longer one that was proposed.
-                h = max(h, length * factor) if t_new == end and factor >= 1.0 else length * factor
+                h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)
                 copy(s.y_new, y)
                 copy(s.f_new, f)
                 for stage in range(3):
-                    copy(s.Z[stage], Z_before[stage])
+                    copy(s.Z[stage], s.Z_before[stage])
                 counts[ACCEPTED] += 1
-                fresh, rejected, trouble = False, False, STEP_TOO_SMALL
+                fresh, rejected = False, False
             else:
                 if status == OK:
-                    h = length * max(SHRINK, min(1.0, caution * new_over_old(length, h_before, error, error_before)))
+                    h = length * max(SHRINK, min(1.0, factor))
                 elif status == NOT_CONVERGED and not fresh:
                     h, renew = length, True  # the Jacobian may be too old, not the step too long
                 else:
-                    h, renew = length * (0.5 if status == NOT_CONVERGED else RETREAT), not fresh
-                trouble = STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
-                rejected = True
+                    h, renew = length * retreat(status), not fresh
                 counts[REJECTED] += 1
+                rejected = True
     return OK, t

@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 import flexmb.kernel
-from flexmb.bundle import bundle
+from flexmb.bundle import AnyBundle, bundle
 from flexmb.kernel import _imported, helper, kernel, source_hash
+from flexmb.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
 
 
 @bundle
@@ -25,6 +26,11 @@ class Pair:
 @helper
 def scaled(pair, i, factor):
     return factor * pair.values[i, 2]
+
+
+@bundle
+class Other:
+    counts: np.ndarray  # (m,)
 
 
 @kernel
@@ -47,6 +53,60 @@ def test_kernels_read_and_write_the_arrays_of_a_bundle(rows):
     arrays = pair(rows)
     assert fill(arrays, 2.0) == 2.0 * arrays.values[:, 2].sum()
     assert arrays.counts.tolist() == [0, 2, 4, 6, 8]
+
+
+@bundle
+class Nested:
+    inner: Pair
+    weights: np.ndarray  # (k,)
+
+
+@kernel
+def fill_inner(nested, factor):
+    """As `fill`, times the sum of the weights."""
+    total = 0.0
+    for i in range(nested.weights.shape[0]):
+        total += nested.weights[i]
+    return total * fill(nested.inner, factor)
+
+
+def test_bundles_hold_bundles():
+    arrays = pair()
+    assert fill_inner(Nested(arrays, np.array([1.0, 3.0])), 2.0) == 8.0 * arrays.values[:, 2].sum()
+    assert arrays.counts.tolist() == [0, 2, 4, 6, 8]
+
+
+@kernel
+def trebled(t, y, dy, first, second):
+    for i in range(y.shape[0]):
+        dy[i] = 3.0 * y[i] + first.counts[0]
+    return second.counts[0]
+
+
+@kernel
+def call(function, y, dy, first, second):
+    return function(0.5, y, dy, first, second)
+
+
+def pointed(first, second):
+    return pointer(trebled, STATUS, REAL, VECTOR, VECTOR, first, second)
+
+
+def test_a_kernel_that_calls_by_address_is_compiled_once_for_all_bundles():
+    plain = pair()
+    plain.counts[0] = 7
+    y, dy = np.arange(3.0), np.empty(3)
+    assert call(pointed(plain, plain), y, dy, AnyBundle(plain), AnyBundle(plain)) == 7
+    assert dy.tolist() == [7.0, 10.0, 13.0]
+    other = Other(counts=np.array([5]))
+    assert call(pointed(plain, other), y, dy, AnyBundle(plain), AnyBundle(other)) == 5
+    assert len(trebled.signatures) == 2
+    assert len(call.signatures) == 1
+
+
+def test_an_address_refuses_a_kernel_that_returns_something_else():
+    with pytest.raises(TypeError, match="trebled returns int64, not none"):
+        pointer(trebled, NOTHING, REAL, VECTOR, VECTOR, pair(), pair())
 
 
 def test_a_pickled_bundle_has_its_own_arrays():
@@ -99,7 +159,8 @@ def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached
     package = tmp_path / "flexmb"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    shutil.copy(Path(flexmb.kernel.__file__), package / "kernel.py")
+    for name in ("kernel.py", "parts.py"):
+        shutil.copy(Path(flexmb.kernel.__file__).with_name(name), package / name)
     (package / "entry.py").write_text(
         "from flexmb.kernel import kernel\nfrom flexmb.part import part\n@kernel\ndef entry(x):\n    return part(x)\n"
     )

@@ -1,6 +1,6 @@
 """Test problems behind the signature of a scene's right-hand side, with closed forms; one kernel for all of them.
 
-`constants.kind[0]` selects the problem, so that everything compiles once and is cached.
+`constants.kind[0]` selects the problem.
 """
 
 from __future__ import annotations
@@ -11,11 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ellipj
 
+from flexmb.bundle import bundle
 from flexmb.integrate.control import ACCEPTED, copy, derivative
 from flexmb.integrate.dop853 import dop853, interpolant, interpolate, stages
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
+from flexmb.integrate.problem import Problem, problem
 from flexmb.integrate.rk4 import rk4
-from flexmb.kernel import kernel
+from flexmb.kernel import helper, kernel
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
 
 HARMONIC, KEPLER, CONING, TOP, BLOW_UP, BREAKDOWN, SWITCHED, POWER = range(8)
@@ -26,12 +28,34 @@ BREAKDOWN_AT = 0.5  # the problem's own "articulated inertia" fails where y pass
 SWITCH_ON, SWITCH_OFF = 0.3, 0.8
 
 
-class Constants(NamedTuple):
+@bundle
+class Constants:
     kind: np.ndarray
 
 
-class Workspace(NamedTuple):
+@bundle
+class Workspace:
     fault: np.ndarray
+
+
+@helper
+def cone(t, y, dy):
+    """Quaternion rates of CONING."""
+    x = CONE_RATE * math.sin(CONE_ANGLE) * math.sin(SPIN_RATE * t)
+    w = CONE_RATE * math.sin(CONE_ANGLE) * math.cos(SPIN_RATE * t)
+    z = CONE_RATE * math.cos(CONE_ANGLE) + SPIN_RATE
+    dy[0] = 0.5 * (-y[1] * x - y[2] * w - y[3] * z)
+    dy[1] = 0.5 * (y[0] * x + y[2] * z - y[3] * w)
+    dy[2] = 0.5 * (y[0] * w + y[3] * x - y[1] * z)
+    dy[3] = 0.5 * (y[0] * z + y[1] * w - y[2] * x)
+
+
+@helper
+def normalise(y):
+    """The quaternion y, unit again."""
+    norm = math.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2 + y[3] ** 2)
+    for i in range(4):
+        y[i] /= norm
 
 
 @kernel
@@ -43,13 +67,7 @@ def rhs(t, y, dy, constants, workspace):
         r3 = math.hypot(y[0], y[1]) ** 3
         dy[0], dy[1], dy[2], dy[3] = y[2], y[3], -y[0] / r3, -y[1] / r3
     elif kind == CONING:
-        x = CONE_RATE * math.sin(CONE_ANGLE) * math.sin(SPIN_RATE * t)
-        w = CONE_RATE * math.sin(CONE_ANGLE) * math.cos(SPIN_RATE * t)
-        z = CONE_RATE * math.cos(CONE_ANGLE) + SPIN_RATE
-        dy[0] = 0.5 * (-y[1] * x - y[2] * w - y[3] * z)
-        dy[1] = 0.5 * (y[0] * x + y[2] * z - y[3] * w)
-        dy[2] = 0.5 * (y[0] * w + y[3] * x - y[1] * z)
-        dy[3] = 0.5 * (y[0] * z + y[1] * w - y[2] * x)
+        cone(t, y, dy)
     elif kind == TOP:
         dy[0] = (INERTIA[1] - INERTIA[2]) / INERTIA[0] * y[1] * y[2]
         dy[1] = (INERTIA[2] - INERTIA[0]) / INERTIA[1] * y[2] * y[0]
@@ -72,38 +90,24 @@ def rhs(t, y, dy, constants, workspace):
 @kernel
 def project(t, y, constants):
     if constants.kind[0] == CONING:
-        norm = math.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2 + y[3] ** 2)
-        for i in range(4):
-            y[i] /= norm
+        normalise(y)
 
 
 @kernel
-def run_dop853(y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts):
-    return dop853(
-        rhs, project, y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
-    )  # fmt: skip
-
-
-@kernel
-def run_rk4(y, times, ends, step, max_steps, constants, workspace, out, counts):
-    return rk4(rhs, project, y, times, ends, step, max_steps, constants, workspace, out, counts)
-
-
-@kernel
-def run_dop853_fixed(y, t0, h, steps, x, constants, workspace, ends, dense, counts):
+def run_dop853_fixed(problem, y, t0, h, steps, x, ends, dense, counts):
     """`steps` equal steps of the 8th-order formula.
 
     ends (steps, n): the state after each; dense (steps, n): the interpolant at the fraction x of each.
     """
     n = y.shape[0]
     k, f, y_new, trial = np.empty((STAGES_DENSE, n)), np.empty((7, n)), np.empty(n), np.empty(n)
-    derivative(rhs, t0, y, k[0], constants, workspace, counts)
+    derivative(problem, t0, y, k[0], counts)
     for j in range(steps):
         t = t0 + j * h
-        stages(rhs, t, math.inf, y, h, k, y_new, constants, workspace, counts)
-        project(t + h, y_new, constants)
-        derivative(rhs, t + h, y_new, k[STAGES], constants, workspace, counts)
-        interpolant(rhs, t, math.inf, y, y_new, h, k, f, trial, constants, workspace, counts)
+        stages(problem, t, math.inf, y, h, k, y_new, counts)
+        problem.project(t + h, y_new, problem.constants)
+        derivative(problem, t + h, y_new, k[STAGES], counts)
+        interpolant(problem, t, math.inf, y, y_new, h, k, f, trial, counts)
         interpolate(y, f, x, dense[j])
         copy(y_new, y)
         copy(y_new, ends[j])
@@ -113,6 +117,10 @@ def run_dop853_fixed(y, t0, h, steps, x, constants, workspace, ends, dense, coun
 
 def data(kind: int) -> tuple[Constants, Workspace]:
     return Constants(np.array([kind])), Workspace(np.zeros(1, np.int64))
+
+
+def equations(kind: int) -> Problem:
+    return problem(rhs, project, *data(kind))
 
 
 class Result(NamedTuple):
@@ -131,15 +139,14 @@ class Result(NamedTuple):
 def solve(kind: int, times, *, rtol=None, step=None, ends=None, controlled=None, max_steps=100_000) -> Result:
     """Integrate a problem from its exact initial state: DOP853 with rtol = atol, or RK4 with `step`."""
     constants, workspace = data(kind)
+    of_kind = problem(rhs, project, constants, workspace)
     times, y = np.asarray(times, float), exact(kind, times[0])
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(4, np.int64)
     if step is None:
-        status, t = run_dop853(
-            y, times, ends, rtol, rtol, controlled or len(y), max_steps, constants, workspace, out, counts
-        )
+        status, t = dop853(of_kind, y, times, ends, rtol, rtol, controlled or len(y), max_steps, out, counts)
     else:
-        status, t = run_rk4(y, times, ends, step, max_steps, constants, workspace, out, counts)
+        status, t = rk4(of_kind, y, times, ends, step, max_steps, out, counts)
     return Result(status, t, y, out[: counts[3]], *map(int, counts[:3]), int(workspace.fault[0]))
 
 

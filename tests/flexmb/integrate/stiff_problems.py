@@ -10,27 +10,30 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.exponential import exponential
-from flexmb.integrate.generalised_alpha import generalised_alpha
+from flexmb.bundle import bundle
 from flexmb.integrate.jacobians import COUNTS
-from flexmb.integrate.radau5 import radau5
+from flexmb.integrate.problem import stiff_problem
 from flexmb.kernel import kernel
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from tests.flexmb.integrate.integration_problems import (
+    BREAKDOWN_AT,
+    CONE_ANGLE,
+    CONE_RATE,
+    SPIN_RATE,
+    SWITCH_OFF,
+    SWITCH_ON,
+    Workspace,
+    cone,
+    normalise,
+)
 
 LINEAR, PROTHERO, KAPS, VAN_DER_POL, CONING, SPRING, BREAKDOWN, SWITCHED, DRIVEN, BLOW_UP, OSCILLATOR = range(11)
 
-CONE_RATE, CONE_ANGLE, SPIN_RATE = 1.3, 0.7, -0.9  # q(t) = z(CONE_RATE t) * x(CONE_ANGLE) * z(SPIN_RATE t)
-BREAKDOWN_AT = 0.5
-SWITCH_ON, SWITCH_OFF = 0.3, 0.8
 
-
-class Constants(NamedTuple):
+@bundle
+class Constants:
     kind: np.ndarray
     value: np.ndarray  # (2,)
-
-
-class Workspace(NamedTuple):
-    fault: np.ndarray
 
 
 @kernel
@@ -46,13 +49,7 @@ def rhs(t, y, dy, constants, workspace):
     elif kind == VAN_DER_POL:
         dy[0], dy[1] = y[1], a * ((1.0 - y[0] * y[0]) * y[1] - y[0])
     elif kind == CONING:
-        x = CONE_RATE * math.sin(CONE_ANGLE) * math.sin(SPIN_RATE * t)
-        w = CONE_RATE * math.sin(CONE_ANGLE) * math.cos(SPIN_RATE * t)
-        z = CONE_RATE * math.cos(CONE_ANGLE) + SPIN_RATE
-        dy[0] = 0.5 * (-y[1] * x - y[2] * w - y[3] * z)
-        dy[1] = 0.5 * (y[0] * x + y[2] * z - y[3] * w)
-        dy[2] = 0.5 * (y[0] * w + y[3] * x - y[1] * z)
-        dy[3] = 0.5 * (y[0] * z + y[1] * w - y[2] * x)
+        cone(t, y, dy)
     elif kind == SPRING:  # pendulum of unit mass and length on a spring of frequency a: stretch, angle, their rates
         r = 1.0 + y[0]
         dy[0], dy[1] = y[2], y[3]
@@ -116,37 +113,13 @@ def jacobian(t, y, J, constants, workspace):
 @kernel
 def project(t, y, constants):
     if constants.kind[0] == CONING:
-        norm = math.sqrt(y[0] ** 2 + y[1] ** 2 + y[2] ** 2 + y[3] ** 2)
-        for i in range(4):
-            y[i] /= norm
+        normalise(y)
 
 
 @kernel
 def move(y, increment, result, constants):
     for i in range(increment.shape[0]):
         result[i] = y[i] + increment[i]
-
-
-@kernel
-def run_generalised_alpha(y, times, ends, step, radius, nq, controlled, max_steps, constants, workspace, out, counts):
-    return generalised_alpha(
-        rhs, jacobian, move, project, y, times, ends, step, radius, nq, controlled, 1e-12, 1e-14, max_steps,
-        constants, workspace, out, counts,
-    )  # fmt: skip
-
-
-@kernel
-def run_radau5(y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts):
-    return radau5(
-        rhs, jacobian, project, y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
-    )
-
-
-@kernel
-def run_exponential(y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts):
-    return exponential(
-        rhs, jacobian, project, y, times, ends, rtol, atol, controlled, max_steps, constants, workspace, out, counts
-    )
 
 
 def coning(t: float) -> np.ndarray:
@@ -177,13 +150,14 @@ class Result(NamedTuple):
     fault: int
 
 
-def solve(run, problem, y, times, *settings, ends=None, max_steps=100_000) -> Result:
-    """Integrate `problem` = (constants, workspace) from y with a compiled run and its settings."""
+def solve(integrator, problem, y, times, *settings, ends=None, max_steps=100_000) -> Result:
+    """Integrate `problem` = (constants, workspace) from y with an integrator and its settings."""
     constants, workspace = problem
+    equations = stiff_problem(rhs, project, constants, workspace, jacobian, move, constants, workspace)
     times, y = np.asarray(times, float), np.array(y, float)
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
-    status, t = run(y, times, ends, *settings, max_steps, constants, workspace, out, counts)
+    status, t = integrator(equations, y, times, ends, *settings, max_steps, out, counts)
     evaluations, accepted, rejected, samples, jacobians, factorisations = map(int, counts)
     return Result(
         status, t, y, out[:samples], evaluations, accepted, rejected, jacobians, factorisations, int(workspace.fault[0])

@@ -7,7 +7,7 @@ a twentieth of an error shifts it by log2(1 + 1/20) = 0.07: the slope of the fin
 import numpy as np
 import pytest
 
-from tests.flexmb.integrate.integration_problems import CONING, HARMONIC, TOP, data, exact, run_dop853_fixed, solve
+from tests.flexmb.integrate.integration_problems import CONING, HARMONIC, TOP, equations, exact, run_dop853_fixed, solve
 
 ROUND_OFF = 5e-16  # root mean square of a few units in the last place of states of size 1
 PROBLEMS = {"harmonic": HARMONIC, "quaternion": CONING, "top": TOP}
@@ -22,10 +22,9 @@ def last_slope(errors: list[float]) -> float:
 
 def dop853_errors(kind: int, t_end: float, steps: int, x: float) -> tuple[float, float]:
     """Root mean square error over the run: at the ends of the steps, and of the interpolant at their fraction x."""
-    constants, workspace = data(kind)
     y, h = exact(kind, 0.0), t_end / steps
     ends, dense = np.empty((2, steps, len(y)))
-    run_dop853_fixed(y, 0.0, h, steps, x, constants, workspace, ends, dense, np.zeros(4, np.int64))
+    run_dop853_fixed(equations(kind), y, 0.0, h, steps, x, ends, dense, np.zeros(4, np.int64))
     at_ends = np.array([exact(kind, (j + 1) * h) for j in range(steps)])
     between = np.array([exact(kind, (j + x) * h) for j in range(steps)])
     return np.sqrt(np.mean((ends - at_ends) ** 2)), np.sqrt(np.mean((dense - between) ** 2))

@@ -1,0 +1,84 @@
+"""The pictures of the stiff cases, from a run of them: python -m tests.benchmarks.stiff_figures FOLDER
+
+FOLDER is what `crosscheck run stiff --jobs 1 --out FOLDER` left. It also prints which method is fastest at which error,
+the table of docs/integrators.md.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+
+from crosscheck.records import read
+from crosscheck.results import CaseResults, collect
+from crosscheck.workprecision import WorkPrecision, work_precision
+from tests.repo.project import ROOT
+
+PICTURES = {"stiff/beam_with_axial_modes": "stiff_beam.png", "stiff/stiff_hinge_springs": "stiff_springs.png"}
+ERRORS = (1e-4, 1e-6, 1e-8)  # m
+STYLES = {
+    "native": ("dop853", "ko-"),
+    "native-radau5": ("radau5", "C0s-"),
+    "native-exponential": ("exponential", "C3D-"),
+    "native-generalised-alpha": ("generalised_alpha", "C2v-"),
+    "exudyn": ("Exudyn, trapezoidal", "C5*:"),
+    "mujoco": ("MuJoCo, RK4", "C4^:"),
+    "pinocchio": ("Pinocchio, DOP853", "C1P:"),
+}
+
+
+def main(folder: Path) -> None:
+    """Draw both pictures, here and beside the cases; print the table."""
+    plt.switch_backend("agg")
+    for results in collect(read(folder / "records.jsonl")).cases:
+        charts = [chart for chart in (work_precision(results, asked) for asked in results.case.run.charts) if chart]
+        picture = ROOT / "docs" / "pictures" / PICTURES[results.case.case]
+        draw(charts, picture)
+        shutil.copy(picture, ROOT / "cases" / results.case.case / "picture.png")
+        tabulate(results, charts)
+
+
+def runs(chart: WorkPrecision) -> dict[str, list[tuple[float, float]]]:
+    """(Largest error of the tip in m, seconds) of the finished runs of every engine, in the order of its efforts."""
+    found: dict[str, list[tuple[float, float]]] = {engine: [] for engine in STYLES}
+    for point in chart.points:
+        if point.error is not None and point.error < 1.0:
+            found[point.engine].append((point.error * chart.scale, point.wall_s))
+    return {engine: sorted(points, reverse=True) for engine, points in found.items() if points}
+
+
+def draw(charts: list[WorkPrecision], picture: Path) -> None:
+    """One panel a release."""
+    plt.rcParams.update({"font.size": 9})
+    figure, panels = plt.subplots(ncols=len(charts), sharey=True, figsize=(11.5, 4.4), layout="constrained", dpi=100)
+    for axes, chart in zip(panels, charts, strict=True):
+        for engine, points in runs(chart).items():
+            label, style = STYLES[engine]
+            axes.loglog(*zip(*points, strict=True), style, ms=5, lw=1.2, label=label)
+        axes.set(title=chart.title.removeprefix("Tip position, "), xlabel="largest error of the tip (m)")
+        axes.invert_xaxis()
+        axes.grid(alpha=0.4)
+    panels[0].set_ylabel("seconds")
+    panels[0].legend(fontsize=8)
+    figure.savefig(picture, metadata={"Software": None})
+    plt.close(figure)
+
+
+def tabulate(results: CaseResults, charts: list[WorkPrecision]) -> None:
+    """Milliseconds of the fastest run of each engine whose tip errs by at most so much."""
+    print(results.case.run.title)
+    for chart in charts:
+        for error in ERRORS:
+            fastest = {
+                STYLES[engine][0]: min((1e3 * wall for e, wall in points if e <= error), default=None)
+                for engine, points in runs(chart).items()
+            }
+            row = ", ".join(f"{name} {'-' if ms is None else format(ms, '.3g')}" for name, ms in fastest.items())
+            print(f"  {chart.title}, {error:.0e} m: {row} ms")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

@@ -1,0 +1,75 @@
+"""Compiling ahead: what is left to compile afterwards, counted in processes of their own, without a clock."""
+
+import subprocess
+import sys
+
+import pytest
+
+from flexmb.warmup import main, warm_up
+
+# Compiled versions of every function of the package, before and after the scenes of the tests are run.
+PROBE = """
+import gc, sys
+import flexmb as fm
+from flexmb.warmup import main
+from tests.flexmb.warmed import SCENES
+
+def compiled():
+    return sum(len(x.overloads) for x in gc.get_objects() if type(x).__name__ == "CPUDispatcher"
+               and x.py_func.__module__.startswith("flexmb"))
+
+scene, method, algorithm, *arguments = sys.argv[1:]
+main(arguments)
+before = compiled()
+step = 1e-2 if method in ("rk4", "generalised_alpha") else None
+done = fm.simulate(SCENES[scene](), 0.05, method, samples=3, step=step, algorithm=algorithm)
+assert done.finished, done.message
+print(before, compiled() - before)
+"""
+
+
+def left(scene: str, method: str, algorithm: str, *arguments: str) -> tuple[int, int]:
+    """Functions compiled or loaded by the warm-up with these arguments, and by a run of another scene after it."""
+    probe = [sys.executable, "-c", PROBE, scene, method, algorithm, *arguments]
+    done = subprocess.run(probe, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    warmed, more = done.stdout.split()[-2:]
+    return int(warmed), int(more)
+
+
+@pytest.mark.parametrize(
+    ("scene", "method", "algorithm", "arguments"),
+    [
+        ("tree", "dop853", "articulated", ()),
+        ("tree", "rk4", "articulated", ()),
+        ("tree", "radau5", "articulated", ("--method", "radau5")),
+        ("tree", "dop853", "composite", ("--algorithm", "composite")),
+        ("condensed", "dop853", "articulated", ("--scene", "condensed")),
+        ("closed", "rk4", "articulated", ("--scene", "closed")),
+    ],
+)
+def test_nothing_is_compiled_after_the_warm_up(scene, method, algorithm, arguments):
+    warmed, more = left(scene, method, algorithm, *arguments)
+    assert warmed > 0
+    assert more == 0
+
+
+@pytest.mark.parametrize(
+    ("scene", "method", "algorithm"),
+    [("tree", "radau5", "articulated"), ("tree", "dop853", "composite"), ("condensed", "dop853", "articulated")],
+)
+def test_what_was_not_asked_for_is_left(scene, method, algorithm):
+    """The count of the test above sees what the default warm-up leaves."""
+    assert left(scene, method, algorithm)[1] > 0
+
+
+@pytest.mark.parametrize("names", [{"methods": ["euler"]}, {"algorithms": ["unsplit"]}, {"scenes": ["ring"]}])
+def test_names_that_do_not_exist_are_refused(names):
+    with pytest.raises(ValueError, match="use one of"):
+        warm_up(**names)
+
+
+def test_the_command_line_refuses_them_too(capsys):
+    with pytest.raises(SystemExit):
+        main(["--scene", "ring"])
+    assert "invalid choice: 'ring'" in capsys.readouterr().err
