@@ -71,7 +71,7 @@ class Scratch(NamedTuple):
 @helper
 def response(flow, s, terms):
     """x at the quarters of the step under the first terms of the polynomial v."""
-    respond(flow, s.v, terms, s.X, s.term, s.product)
+    respond(flow, s.v, terms, s.X)
     at_quarters(flow, s.X, s.x)
 
 
@@ -151,7 +151,7 @@ def estimate(y, flow, s, rtol, atol, controlled):
         s.term[i] = max(abs(y[i]), abs(s.y_new[i]))
         for l in range(TERMS):
             s.v_error[l, i] = WITHOUT_MIDDLE[l] * s.v[TERMS - 1, i] / 24.0
-    respond(flow, s.v_error, TERMS, s.X_error, s.error, s.product)
+    respond(flow, s.v_error, TERMS, s.X_error)
     at_quarters(flow, s.X_error, s.x_before)
     norm = 0.0
     for node in (1, 3):
@@ -197,7 +197,10 @@ def store_samples(problem, t, t_new, y, flow, s, times, out, counts):
 @helper
 def scratch(n):
     """For n components."""
-    flow = Flow(np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((5, n, n)), np.empty(1, np.int64))
+    flow = Flow(
+        np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((TERMS, n, n)), np.empty((5, n, n)),
+        np.empty(1, np.int64),
+    )  # fmt: skip
     return flow, Scratch(
         np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),

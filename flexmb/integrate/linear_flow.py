@@ -22,16 +22,19 @@ from flexmb.kernel import helper
 LEVELS = 36
 QUARTER = 2  # level of tau = 1/4, the coarsest one kept
 TERMS = 5  # of the polynomial: constant to fourth power
-_RESOLVED = 0.25  # norm at which the Taylor series to power 12 is exact: 0.25^13 / 13! = 2e-18
+_RESOLVED = 0.25  # norm at which the Taylor series to power 12 is exact: 0.25^13 / 13! = 2e-18; phi_5 to 10 likewise
 _POWER = 12
 
 
 class Flow(NamedTuple):
-    """Z (n,n) balanced, x = scale (n,) * balanced x; E (LEVELS,n,n) by level; powers (5,n,n); finest level (1,)."""
+    """Z (n,n) balanced, x = scale (n,) * balanced x; E (LEVELS,n,n) by level; P (TERMS,n,n) of `taylor` at the finest
+    level (1,); powers (5,n,n) are scratch.
+    """
 
     Z: np.ndarray
     scale: np.ndarray
     E: np.ndarray
+    P: np.ndarray
     powers: np.ndarray
     finest: np.ndarray
 
@@ -103,8 +106,12 @@ def balance(Z, scale):
 
 
 @helper
-def taylor(Z, tau, powers, E):
-    """E = exp(tau Z) - 1 by the series to power 12 in five products (Paterson, Stockmeyer)."""
+def taylor(Z, tau, powers, P, E):
+    """E = exp(tau Z) - 1 and P[k-1] = tau^k phi_k(tau Z), k to 5: the response to the powers of time.
+
+    phi_5 by its series to power 10 in five products (Paterson, Stockmeyer), then tau^k phi_k = tau^k/k! +
+    Z tau^(k+1) phi_(k+1), in which nothing cancels; phi_0 = 1 + E.
+    """
     B, B2, B3, B4, sums = powers[0], powers[1], powers[2], powers[3], powers[4]
     n = Z.shape[0]
     for i in range(n):
@@ -115,17 +122,27 @@ def taylor(Z, tau, powers, E):
     multiply(B2, B2, B4)
     for i in range(n):
         for j in range(n):
-            E[i, j] = B[i, j] / 362880.0 + B2[i, j] / 3628800.0 + B3[i, j] / 39916800.0 + B4[i, j] / 479001600.0
-        E[i, i] += 1.0 / 40320.0
+            E[i, j] = B[i, j] / 87178291200.0 + B2[i, j] / 1307674368000.0
+        E[i, i] += 1.0 / 6227020800.0
     multiply(B4, E, sums)
     for i in range(n):
         for j in range(n):
-            sums[i, j] += B[i, j] / 120.0 + B2[i, j] / 720.0 + B3[i, j] / 5040.0
-        sums[i, i] += 1.0 / 24.0
-    multiply(B4, sums, E)
+            sums[i, j] += B[i, j] / 3628800.0 + B2[i, j] / 39916800.0 + B3[i, j] / 479001600.0
+        sums[i, i] += 1.0 / 362880.0
+    top = P[TERMS - 1]
+    multiply(B4, sums, top)
+    scale = tau**TERMS
     for i in range(n):
         for j in range(n):
-            E[i, j] += B[i, j] + 0.5 * B2[i, j] + B3[i, j] / 6.0
+            top[i, j] = scale * (top[i, j] + B[i, j] / 720.0 + B2[i, j] / 5040.0 + B3[i, j] / 40320.0)
+        top[i, i] += scale / 120.0
+    factor = 1.0 / 120.0
+    for k in range(TERMS - 1, 0, -1):
+        factor *= k + 1.0
+        multiply(Z, P[k], P[k - 1])
+        for i in range(n):
+            P[k - 1, i, i] += tau**k * factor
+    multiply(Z, P[0], E)
 
 
 @helper
@@ -142,7 +159,7 @@ def prepare(flow, A, h):
     while norm > _RESOLVED * 2.0**finest:
         finest += 1
     flow.finest[0] = finest
-    taylor(flow.Z, 2.0**-finest, flow.powers, flow.E[finest])
+    taylor(flow.Z, 2.0**-finest, flow.powers, flow.P, flow.E[finest])
     for level in range(finest, QUARTER, -1):
         E, doubled = flow.E[level], flow.E[level - 1]
         multiply(E, E, doubled)
@@ -153,8 +170,8 @@ def prepare(flow, A, h):
 
 
 @helper
-def series(Z, tau, v, m, terms, x, term, product):
-    """x += flow from x over the short time tau under sum over l >= m of v[l] t^(l-m)/(l-m)!, by its Taylor series."""
+def series(Z, tau, v, x, term, product):
+    """x += flow from x over the short time tau under sum over l of v[l] t^l / l!, by its Taylor series."""
     n = x.shape[0]
     for i in range(n):
         term[i] = x[i]
@@ -164,14 +181,14 @@ def series(Z, tau, v, m, terms, x, term, product):
         for i in range(n):
             product[i] = 0.0
         add_product(Z, term, product)
-        forced = m + k - 1 < terms
+        forced = k <= TERMS
         for i in range(n):
-            term[i] = tau / k * product[i] + (factor * v[m + k - 1, i] if forced else 0.0)
+            term[i] = tau / k * product[i] + (factor * v[k - 1, i] if forced else 0.0)
             x[i] += term[i]
 
 
 @helper
-def respond(flow, v, terms, X, term, product):
+def respond(flow, v, terms, X):
     """X[level, m] for the polynomial sum over l < terms of v[l] t^l / l!, at all levels kept."""
     finest = flow.finest[0]
     n = v.shape[1]
@@ -179,8 +196,8 @@ def respond(flow, v, terms, X, term, product):
         x = X[finest, m]
         for i in range(n):
             x[i] = 0.0
-        if m < terms:
-            series(flow.Z, 2.0**-finest, v, m, terms, x, term, product)
+        for l in range(m, terms):
+            add_product(flow.P[l - m], v[l], x)
     for level in range(finest, QUARTER, -1):
         tau = 2.0**-level
         for m in range(terms):
@@ -238,4 +255,4 @@ def at_fraction(flow, v, X, x, theta, result, term, product):
             for i in range(n):
                 X[0, k, i] += factor * v[l, i]
             factor *= t / (l - k + 1)
-    series(flow.Z, rest, X[0], 0, TERMS, result, term, product)
+    series(flow.Z, rest, X[0], result, term, product)

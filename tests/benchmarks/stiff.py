@@ -12,14 +12,14 @@ from flexmb.scene.files import load_scene
 
 CASES = ("beam_with_axial_modes", "stiff_hinge_springs")
 RELEASES = {"smooth": "scene.toml", "damped": "damped.toml", "ringing": "ringing.toml"}
-T_END, SAMPLES, ROUNDS = 2.0, 101, 3
-TOLERANCES = tuple(10.0**-k for k in range(2, 9))
+T_END, SAMPLES, ROUNDS = 2.0, 101, 2
+TOLERANCES = tuple(10.0**-k for k in (2, 4, 6, 8))
 LADDERS: dict[str, tuple[dict[str, float], ...]] = {
     "dop853": tuple({"rtol": tol, "atol": 1e-2 * tol} for tol in TOLERANCES),
     "rk4": tuple({"step": h} for h in (2.5e-4, 1.25e-4, 6e-5)),
     "radau5": tuple({"rtol": tol, "atol": 1e-2 * tol} for tol in TOLERANCES),
     "exponential": tuple({"rtol": tol, "atol": 1e-2 * tol} for tol in TOLERANCES),
-    "generalised_alpha": tuple({"step": h} for h in (1.6e-2, 8e-3, 4e-3, 2e-3, 1e-3, 5e-4)),
+    "generalised_alpha": tuple({"step": h} for h in (8e-3, 4e-3, 2e-3, 1e-3)),
 }
 
 

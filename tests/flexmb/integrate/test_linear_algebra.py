@@ -24,14 +24,17 @@ def solve(A, pivots, x):
 def flow_at(A, h, v, theta, out):
     """out (n,) = x(theta) of x' = h A x + sum of v[l] theta^l / l!; returns whether the flow could be prepared."""
     n = A.shape[0]
-    flow = Flow(np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((5, n, n)), np.empty(1, np.int64))
+    flow = Flow(
+        np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((TERMS, n, n)), np.empty((5, n, n)),
+        np.empty(1, np.int64),
+    )  # fmt: skip
     X, x, term, product = np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty(n), np.empty(n)
     if not prepare(flow, A, h):
         return False
     for l in range(TERMS):
         for i in range(n):
             v[l, i] /= flow.scale[i]
-    respond(flow, v, TERMS, X, term, product)
+    respond(flow, v, TERMS, X)
     at_quarters(flow, X, x)
     at_fraction(flow, v, X, x, theta, out, term, product)
     for i in range(n):
