@@ -6,6 +6,7 @@ some 20 ns; it is made where a kernel does a thousand times that, as an integrat
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 from numba import types
@@ -37,7 +38,12 @@ def pointer(kernel: Any, returned: Any, *arguments: Any) -> Pointer:
 
     Raises TypeError where it returns something else than `returned`.
     """
-    exact = tuple(getattr(argument, "_numba_type_", argument) for argument in arguments)
+    return _pointer(kernel, returned, *(getattr(argument, "_numba_type_", argument) for argument in arguments))
+
+
+@cache
+def _pointer(kernel: Any, returned: Any, *exact: Any) -> Pointer:
+    """Kept, because numba takes a tenth of a millisecond to describe a signature."""
     kernel.compile(exact)
     compiled = kernel.overloads[exact]
     kind = types.unliteral(compiled.signature.return_type)  # a kernel that only ever returns OK

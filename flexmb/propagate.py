@@ -31,30 +31,35 @@ def recursion(constants: Constants, workspace: Any) -> Problem:
     return problem(dynamics.rhs, coordinates.project, constants, workspace)
 
 
-def run(
-    route: Route, settings: Settings, exact: Constants, nq: int, y: Real, times: Real, ends: Real, out: Real,
-    counts: Index,
-) -> tuple[int, float, int]:  # fmt: skip
-    """Integrate y (nq+nu+1,) = [q, u, work]; all else is as in `flexmb.integrate.dop853.dop853`.
+class Run:
+    """An integrator with a problem and a workspace of its own, ready to be called."""
 
-    exact: the constants with every body eliminated explicitly, for Jacobians. Returns the status code, the time of the
-    last good state, and where an evaluation failed.
-    """
-    constants, workspace = route.tables()
-    motion, controlled, limit = (route.rhs, route.project, constants, workspace), len(y) - 1, settings.max_steps
-    if settings.method in LINEARISING:
-        moving = tangent.tangent_workspace(exact, nq, controlled - nq)
-        equations: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
-    else:
-        equations = problem(*motion)
-    tolerances = settings.rtol, settings.atol
-    if settings.method == "rk4":
-        status, t = rk4(equations, y, times, ends, settings.step, limit, out, counts)
-    elif settings.method == "generalised_alpha":
-        status, t = generalised_alpha(
-            equations, y, times, ends, settings.step, settings.radius, nq, controlled, *tolerances, limit, out, counts
-        )
-    else:
+    def __init__(self, route: Route, settings: Settings, exact: Constants, nq: int, nu: int) -> None:
+        """exact: the constants with every body eliminated explicitly, for Jacobians."""
+        constants, self._workspace = route.tables()
+        self._settings, self._nq, self._controlled = settings, nq, nq + nu
+        motion = route.rhs, route.project, constants, self._workspace
+        if settings.method in LINEARISING:
+            moving = tangent.tangent_workspace(exact, nq, nu)
+            self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
+        else:
+            self._problem = problem(*motion)
+
+    def __call__(self, y: Real, times: Real, ends: Real, out: Real, counts: Index) -> tuple[int, float]:
+        """Integrate y (nq+nu+1,) = [q, u, work]; see `flexmb.integrate.dop853.dop853`."""
+        settings, limit = self._settings, self._settings.max_steps
+        tolerances = settings.rtol, settings.atol
+        if settings.method == "rk4":
+            return rk4(self._problem, y, times, ends, settings.step, limit, out, counts)
+        if settings.method == "generalised_alpha":
+            return generalised_alpha(
+                self._problem, y, times, ends, settings.step, settings.radius, self._nq, self._controlled,
+                *tolerances, limit, out, counts,
+            )  # fmt: skip
         adaptive = _ADAPTIVE[settings.method]
-        status, t = adaptive(equations, y, times, ends, *tolerances, controlled, limit, out, counts)
-    return status, t, int(workspace.fault[0])
+        return adaptive(self._problem, y, times, ends, *tolerances, self._controlled, limit, out, counts)
+
+    @property
+    def fault(self) -> int:
+        """Where an evaluation failed."""
+        return int(self._workspace.fault[0])

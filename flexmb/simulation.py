@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, NamedTuple, cast, get_args
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import composite, propagate
+from flexmb import composite
 from flexmb.frisch import evaluation as nested_evaluation
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
 from flexmb.integrate.jacobians import COUNTS, FACTORISATIONS, JACOBIANS
 from flexmb.labels import state_names
 from flexmb.methods import LINEARISING, Method, Settings
-from flexmb.propagate import Route
+from flexmb.propagate import Route, Run
 from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
@@ -149,13 +149,17 @@ def _integrate(system: System, route: Route, times: Array, settings: Settings) -
     def run(times: Array, ends: Array) -> _Raw:
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
         counts = np.zeros(COUNTS, np.int64)
+        begun = perf_counter()
+        solve = Run(route, settings, system.constants, system.nq, system.nu)
         start = perf_counter()
-        status, t, fault = propagate.run(route, settings, system.constants, system.nq, y, times, ends, out, counts)
-        seconds = perf_counter() - start
-        return _Raw(out[: counts[SAMPLES]], Status(status), fault, t, counts.tolist(), 0.0, seconds)
+        status, t = solve(y, times, ends, out, counts)
+        end = perf_counter()
+        return _Raw(
+            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start
+        )
 
     compiled = run(times[:1], ends[:0])
-    return run(times, ends)._replace(compile_s=compiled.run_s)
+    return run(times, ends)._replace(compile_s=compiled.compile_s)
 
 
 def _observed(system: System, times: Array, raw: _Raw, algorithm: Algorithm) -> Trajectory:

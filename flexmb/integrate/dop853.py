@@ -45,9 +45,17 @@ def weighted_sum(weights, count, k, i):
 
 @helper
 def combine(y, h, row, k, result):
-    """result = y + h * sum over j < row of A[row, j] k[j]."""
-    for i in range(y.shape[0]):
-        result[i] = y[i] + h * weighted_sum(A[row], row, k, i)
+    """result = y + h * sum over j < row of A[row, j] k[j], along rows of k and past the many zeros of A."""
+    n = y.shape[0]
+    for i in range(n):
+        result[i] = A[row, 0] * k[0, i]
+    for j in range(1, row):
+        a, slope = A[row, j], k[j]
+        if a != 0.0:
+            for i in range(n):
+                result[i] += a * slope[i]
+    for i in range(n):
+        result[i] = y[i] + h * result[i]
 
 
 @helper

@@ -62,7 +62,7 @@ def draw(charts: list[WorkPrecision], picture: Path) -> None:
         axes.invert_xaxis()
         axes.grid(alpha=0.4)
     panels[0].set_ylabel("seconds")
-    panels[0].legend(fontsize=8)
+    panels[-1].legend(*panels[0].get_legend_handles_labels(), fontsize=8, loc="lower right")  # where no run is
     figure.savefig(picture, metadata={"Software": None})
     plt.close(figure)
 
