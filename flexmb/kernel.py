@@ -109,6 +109,15 @@ def helper(function: Callable[..., Any]) -> Any:
     return njit(**_AS_PART)(function)
 
 
+def written_out(function: Callable[..., Any]) -> Any:
+    """A helper that is written out where it is called.
+
+    For the short ones around a call by address, which no optimiser sees through: arrays that are handed on once more on
+    their way there are counted again. It takes longer to compile.
+    """
+    return njit(inline="always", **_AS_PART)(function)
+
+
 def by_bundle(array: str, having: Callable[..., Any], lacking: Callable[..., Any]) -> Callable[..., Any]:
     """One helper for two kinds of bundles: `having` where the first argument has `array`, `lacking` where it has not.
 

@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from flexmb.kernel import helper
+from flexmb.kernel import helper, written_out
 from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 SAFETY = 0.9
@@ -41,7 +41,7 @@ def all_finite(values):
     return True
 
 
-@helper
+@written_out
 def derivative(problem, t, y, dy, counts):
     """dy = f(t, y); returns a status code, which is never OK for a derivative that is not finite."""
     counts[EVALUATIONS] += 1

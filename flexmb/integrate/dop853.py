@@ -50,10 +50,10 @@ def combine(y, h, row, k, result):
     for i in range(n):
         result[i] = A[row, 0] * k[0, i]
     for j in range(1, row):
-        a, slope = A[row, j], k[j]
+        a = A[row, j]
         if a != 0.0:
             for i in range(n):
-                result[i] += a * slope[i]
+                result[i] += a * k[j, i]
     for i in range(n):
         result[i] = y[i] + h * result[i]
 

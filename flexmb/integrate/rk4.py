@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, stretch
-from flexmb.kernel import helper, kernel
+from flexmb.kernel import kernel, written_out
 from flexmb.status import MAX_STEPS, NONFINITE, OK
 
 
-@helper
+@written_out
 def _stage(problem, t, y, slope, h, trial, dy, counts):
     """dy = f(t, y + h slope)."""
     for i in range(y.shape[0]):
@@ -17,7 +17,7 @@ def _stage(problem, t, y, slope, h, trial, dy, counts):
     return derivative(problem, t, trial, dy, counts)
 
 
-@helper
+@written_out
 def rk4_step(problem, t, last, y, h, k, trial, counts):
     """trial = y(t + h) from y(t). `k` (4, n) is scratch; no stage is later than `last`. Returns a status code."""
     status = derivative(problem, t, y, k[0], counts)
