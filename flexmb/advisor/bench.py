@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb import composite, dynamics
-from flexmb.advisor.methods import Method, operations, simulated
+from flexmb.advisor.methods import Method, operations, simulated, steps_within
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closed_system import ClosedSystem
@@ -22,6 +22,7 @@ from flexmb.counting import count
 from flexmb.jain.places import matrices
 from flexmb.scene.schema import Scene
 from flexmb.state import pack
+from flexmb.status import Status
 from flexmb.system import Algorithm, System, compile
 
 SAMPLES = 401
@@ -33,13 +34,14 @@ AROUND = 4e8
 @dataclass(frozen=True)
 class Outcome:
     """One run. `signals` as far as it got; `message`: why it stopped, or "" if it finished. `operations` counted,
-    `seconds` measured of the integration alone."""
+    `seconds` measured of the integration alone. `cut`: it would have taken more operations than it was allowed."""
 
     signals: Signals
     message: str
     evaluations: int
     operations: float
     seconds: float
+    cut: bool = False
 
     @property
     def finished(self) -> bool:
@@ -82,29 +84,32 @@ class Bench:
         found: tuple[Algorithm, ...] = ("articulated", "composite")
         return min(found, key=lambda algorithm: self.operations(model, algorithm))
 
-    def run(self, model: Model, method: Method) -> Outcome:
-        """The run, made at the first call."""
-        if (model, method) not in self._outcomes:
-            self._outcomes[model, method] = self._run(model, method)
-            self.spent += self._outcomes[model, method].operations + AROUND
-        return self._outcomes[model, method]
+    def run(self, model: Model, method: Method, most: float = np.inf) -> Outcome:
+        """The run, made at the first call; it ends where it has executed about `most` operations."""
+        found = self._outcomes.get((model, method))
+        if found is None or (found.cut and most > found.operations):
+            found = self._outcomes[model, method] = self._run(model, method, most)
+            self.spent += found.operations + AROUND
+        return found
 
-    def _run(self, model: Model, method: Method) -> Outcome:
+    def _run(self, model: Model, method: Method, most: float) -> Outcome:
         system = self.system(model)
         if isinstance(system, str):
             return Outcome({}, system, 0, 0.0, 0.0)
+        each = self.operations(model, method.algorithm)
+        steps = steps_within(method, each, most)
         try:
-            done = simulated(system, self.times, method, MAX_STEPS)
+            done = simulated(system, self.times, method, min(steps, MAX_STEPS))
         except ClosureError as error:  # nothing of it moves
             return Outcome({}, str(error), 0, 0.0, 0.0)
         cost = done.statistics
-        each = self.operations(model, method.algorithm)
         return Outcome(
             signals=measured(self.wanted, done) if len(done.t) else {},
             message="" if done.finished else done.message,
             evaluations=cost.evaluations,
             operations=operations(method, each, system.nq + system.nu + 1, cost),
             seconds=cost.run_s,
+            cut=done.status is Status.MAX_STEPS and steps < MAX_STEPS,
         )
 
 

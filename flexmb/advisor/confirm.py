@@ -30,7 +30,7 @@ FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
 INTEGRATION, ROOM = 0.1, 0.05
 """Of the tolerance: the most that the references' own integration may be off; what a model leaves the integrator."""
 FEW = 1000
-"""Evaluations: where an explicit method takes fewer, those that linearise are not tried."""
+"""Evaluations: where the fine run takes fewer, methods that linearise are not tried."""
 
 
 class NoReference(ValueError):
@@ -106,16 +106,18 @@ class Confirmation:
         room = self.tolerance - self.error(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
-        best, least = self.finely(model), self.run(model).operations
+        best, least, steady = self.finely(model), self.run(model).operations, self.run(model).evaluations < FEW
         for ladder in ladders(highest, slow, algorithm, not scene.closures):
-            if ladder[0].integrator in FACTORS and self.bench.run(model, best).evaluations < FEW:
-                break
+            if steady and ladder[0].integrator in FACTORS:
+                continue
             before: Method | None = None
             for method in ladder:
                 if method.integrator in ADAPTIVE and method.value <= self.finely(model).value:
                     break
+                done = self.bench.run(model, method, least if before is None else np.inf)
+                if done.cut:
+                    break
                 fits = self.integration_error(model, method) <= room
-                done = self.bench.run(model, method)
                 if fits and before is not None:
                     best, least = before, self.bench.run(model, before).operations
                     break

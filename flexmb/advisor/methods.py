@@ -24,6 +24,8 @@ STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 ADAPTIVE = frozenset({"dop853", "radau5", "exponential"})
 COMPLEX = 4
 """Operations of an evaluation in complex numbers against one in real ones."""
+EVALUATIONS = {"dop853": 11, "rk4": 4}
+"""Of a step, at least; of methods that linearise: 1."""
 FACTORS = {"radau5": (10.0 / 3.0, 10.0), "exponential": (40.0, 10.0), "generalised_alpha": (2.0 / 3.0, 2.0)}
 """Times n^3 for each factorisation (a real and a complex matrix; an exponential; a real one), n^2 for an evaluation."""
 
@@ -63,8 +65,13 @@ def simulated(system: System, times: NDArray[np.float64], method: Method, max_st
     return simulate(system, float(times[-1]), samples=times, max_steps=max_steps, **method.options())
 
 
+def steps_within(method: Method, each: int, most: float) -> int:
+    """Steps after which a run has executed `most` operations, `each` for an evaluation."""
+    return int(min(most / (each * EVALUATIONS.get(method.integrator, 1)), 1e9)) + 1
+
+
 def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[Method, ...], ...]:
-    """For each integrator its methods from loose to tight.
+    """For each integrator its methods from loose to tight, those that linearise first.
 
     Fixed steps are those of the frequency `highest` (rad/s), implicit ones of `slow`, what the scene does with all
     bodies rigid. Methods that linearise are for trees, by the recursion.
@@ -76,10 +83,10 @@ def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tu
     if not tree:
         return explicit
     return (
-        *explicit,
         tuple(Method("radau5", rtol) for rtol in TOLERANCES[:-3]),
         tuple(Method("exponential", rtol) for rtol in TOLERANCES[:-3]),
         tuple(Method("generalised_alpha", step / slow) for step in STEPS),
+        *explicit,
     )
 
 

@@ -6,13 +6,14 @@ Honest: the advised scene is run again with five times as many output times and 
 did not use: for scenes with beams twice as many welded pieces with one eigenmode more, for rigid scenes the tightest
 integration. Cheap: every rung of the body's ladder with every method; with several bodies every rung for all of them
 alike, every change of one body of the advised model, and every change of two to rungs of the simplest level with 0, 1,
-2, 4, 8 modes. A run ends where it has executed as many operations as the cheapest found so far: it cannot be cheaper
-any more. Predictions take no part in it. The table goes to docs/advice.md.
+2, 4, 8 modes, by the explicit methods. A run ends where it has executed as many operations as the cheapest found so
+far: it cannot be cheaper any more. Predictions take no part in it. The table goes to docs/advice.md.
 """
 
 from __future__ import annotations
 
 import argparse
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, pairwise, product
@@ -25,7 +26,7 @@ from crosscheck.library import shipped_cases
 from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
-from flexmb.advisor.methods import FINEST, Method, ladders, operations, simulated
+from flexmb.advisor.methods import FINEST, Method, ladders, operations, simulated, steps_within
 from flexmb.advisor.models import LEVELS, Model, Rung, built, flexible_bodies, levels
 from flexmb.advisor.quantity import error, measured, scales
 from flexmb.scene.bodies import BeamBody
@@ -39,7 +40,6 @@ PAGE = Path(__file__).parents[2] / "docs" / "advice.md"
 START, END = "<!-- study -->\n", "<!-- /study -->"
 FINER = 5
 DEARER = 4.0  # the next tighter method may take so many times the operations
-LEAST_EVALUATIONS = {"dop853": 11, "rk4": 4}  # of a step, no fewer; of methods that linearise: 1
 
 
 @dataclass(frozen=True)
@@ -109,22 +109,27 @@ def true_error(scene: Scene, advice: Advice) -> float:
     """Error of the advised run against a finer model than any that the advice saw, at more output times."""
     times = np.linspace(0.0, advice.t_end, FINER * 400 + 1)
     assert advice.scene is not None and advice.method is not None
-    fine = simulated(compile(built(scene, finer(scene))), times, Method("dop853", max(FINEST, 1e-4 * advice.tolerance)))
+    model = finer(scene, advice)
+    stiff = any(rung.pieces > 8 for _, rung in model)
+    tight = Method("radau5" if stiff else "dop853", max(FINEST, 1e-4 * advice.tolerance))
+    fine = simulated(compile(built(scene, model)), times, tight)
     assert fine.finished, fine.message
     reference = measured(advice.quantities, fine)
     run = measured(advice.quantities, simulated(compile(advice.scene), times, advice.method))
     return error(run, reference, scales(advice.quantities, reference))
 
 
-def finer(scene: Scene) -> Model:
-    """Beams in eight pieces, four where there are several; those that start bent with twelve modes more."""
+def finer(scene: Scene, advice: Advice) -> Model:
+    """Beams in eight pieces, four where there are several, or twice as many as the advice saw; those that start bent
+    with twelve modes more."""
     bent = {state.body for state in scene.modal_states}
     bodies = flexible_bodies(scene)
+    pieces = max(8 if len(bodies) == 1 else 4, *(2 * int(n) for n in re.findall(r"(\d+) pieces", advice.reference)), 0)
     found = []
     for body in bodies:
         level = levels(body)[-1]
         if isinstance(body, BeamBody) and body.name not in bent:
-            found.append((body.name, Rung("pieces", 0, level, pieces=8 if len(bodies) == 1 else 4)))
+            found.append((body.name, Rung("pieces", 0, level, pieces=pieces)))
         elif isinstance(body, BeamBody):
             found.append((body.name, Rung("modes", body.modes.count + 12, level, body.modes.static)))
     return tuple(found)
@@ -148,7 +153,8 @@ def cheapest_run(confirmation: Confirmation, model: Model, least: float) -> floa
     if isinstance(bench.system(model), str):
         return least
     highest, slow = highest_frequency(bench.scene, model), confirmation.cost.slow / (STAGES * bench.t_end)
-    for ladder in ladders(highest, slow, bench.algorithm(model), not bench.scene.closures):
+    linearising = len(model) < 2 and not bench.scene.closures
+    for ladder in ladders(highest, slow, bench.algorithm(model), linearising):
         for method, tighter in pairwise(ladder):
             cost, fits = capped(confirmation, model, method, least)
             if cost >= least:
@@ -163,7 +169,7 @@ def capped(confirmation: Confirmation, model: Model, method: Method, most: float
     """Operations of a run that ends where it has executed `most`, and whether it is within the tolerance."""
     bench, system = confirmation.bench, confirmation.bench.system(model)
     each = bench.operations(model, method.algorithm)
-    steps = int(most / (each * LEAST_EVALUATIONS.get(method.integrator, 1))) + 1
+    steps = steps_within(method, each, most)
     if not method.adaptive and bench.t_end / method.value > steps:
         return most, False
     done = simulated(system, bench.times, method, steps)
