@@ -161,7 +161,8 @@ class Confirmation:
         if len(known) == 1:  # rigid bodies, or raw ones that have the modes they have
             last = replace(last, uncertainty=hidden + self.drift)
         if last.uncertainty > MOST * self.tolerance:
-            raise NoReference(self._unresolved(hidden, history))
+            alone = [f"{last.name} alone can be run"] if np.isinf(last.uncertainty) else []
+            raise NoReference(self._unresolved(hidden, alone + history))
         return last
 
     def _refine(self, model: Model) -> None:
@@ -182,7 +183,7 @@ class Confirmation:
         return float(np.clip(value, FINEST, LOOSEST))
 
     def _unresolved(self, hidden: float, history: list[str]) -> str:
-        text = "; ".join(history) or "only one model of them runs"
+        text = "; ".join(history)
         if hidden > AGREED * self.tolerance:
             text += f"; what none of its models shows (second-order deflection) is estimated as {hidden:.2g}"
         return f"the finest models of this scene are not known to {self.tolerance:g} of the quantity: {text}"
