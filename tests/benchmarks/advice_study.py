@@ -58,7 +58,8 @@ class Row:
         a = self.advice
         yield from (self.case, f"{a.tolerance:g}")
         if not a.accepted:
-            yield from ("refused: " + a.refusal.replace("|", "/"), *[""] * 7, f"{self.seconds:.0f}")
+            why = a.refusal.partition(": ")[2] or a.refusal  # without the tolerance, which the row has
+            yield from (f"refused: {why}", *[""] * 7, f"{self.seconds:.0f}")
             return
         models = "; ".join(f"{each.body}: {each.rung}" for each in a.bodies) or "rigid as it is"
         yield from (models, str(a.method), f"{a.predicted:.1e}", f"{a.measured:.1e}", f"{self.true_error:.1e}")
