@@ -56,7 +56,7 @@ class Confirmation:
         """hidden: predicted error of what no reference can show; cost: predictions; budget: the most operations
         that one reference may be expected to cost."""
         self.bench, self.tolerance, self.cost = bench, tolerance, cost
-        self.fine, self.drift = FINE * tolerance, 0.0
+        self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
         self.measured: dict[Model, float] = {}
         self.reference = self._reference(hidden, budget)
 
@@ -66,7 +66,7 @@ class Confirmation:
 
     def finely(self, model: Model) -> Method:
         """A method whose error does not count."""
-        return Method("dop853", self._relative(self.fine), self.bench.algorithm(model))
+        return Method("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
 
     def error(self, model: Model) -> float:
         """Error of a model, U included; infinite where it does not exist or does not finish."""
@@ -169,7 +169,7 @@ class Confirmation:
         """Tighten what counts as fine until ten times tighter changes the reference by less than its share: `drift`."""
         while self.fine > FINEST:
             coarse, method = self.run(model), self.finely(model)
-            tighter = self.bench.run(model, replace(method, value=self._relative(TIGHTER * self.fine)))
+            tighter = self.bench.run(model, replace(method, value=max(FINEST, TIGHTER * self.fine)))
             if not tighter.finished:
                 return
             scale = scales(self.bench.wanted, tighter.signals)
@@ -177,10 +177,6 @@ class Confirmation:
             if self.drift <= INTEGRATION * self.tolerance:
                 return
             self.fine *= TIGHTER
-
-    @staticmethod
-    def _relative(value: float) -> float:
-        return float(np.clip(value, FINEST, LOOSEST))
 
     def _unresolved(self, hidden: float, history: list[str]) -> str:
         text = "; ".join(history)

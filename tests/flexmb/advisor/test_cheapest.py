@@ -9,7 +9,7 @@ import pytest
 from msgspec.structs import replace
 
 import flexmb as fm
-from flexmb.advisor.advice import Advice, advise
+from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.models import Rung, built
 from flexmb.advisor.quantity import Quantity, error, measured, scales
 from flexmb.advisor.response import rigid_run
@@ -88,3 +88,11 @@ def test_what_locks_without_flexibility_has_no_rigid_run_and_that_is_said() -> N
     scene = mechanisms.tilted_four_bar(flexible=True, drive=s.Ramp(value=0.5 * np.pi, rate=0.6))
     found = rigid_run(scene, np.linspace(0.0, 0.1, 11))
     assert isinstance(found, str) and found.startswith("all bodies rigid") and "locked" in found
+
+
+@pytest.mark.parametrize("tolerance", [0.5, 1e-2, 1e-4])
+def test_references_are_integrated_more_tightly_once(tolerance: float) -> None:
+    """What that changes is known, not zero, at loose tolerances too."""
+    confirmation = prepare(turned(1.0, 0.6), tolerance, WANTED, 0.8).confirmation()
+    assert 0.0 < confirmation.drift <= 0.1 * tolerance
+    assert confirmation.reference.uncertainty >= confirmation.drift
