@@ -66,6 +66,7 @@ relative to the channel's range, with which a comparison still counts as resolve
 
 from __future__ import annotations
 
+import math
 from typing import Literal
 
 import msgspec
@@ -216,12 +217,13 @@ class Chart(_Strict, frozen=True, kw_only=True):
 
 
 class RunFile(_Strict, frozen=True, kw_only=True):
-    """run.toml."""
+    """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together."""
 
     title: str
     tags: tuple[str, ...] = ()
     duration_s: float
     samples: int
+    time_limit_s: float | None = None
     variants: tuple[Variant, ...] = msgspec.field(name="variant")
     comparisons: tuple[Comparison, ...] = msgspec.field(name="comparison", default=())
     controls: tuple[Control, ...] = msgspec.field(name="control", default=())
@@ -255,6 +257,8 @@ def check_run_file(run: RunFile) -> None:
     names = [variant.name for variant in run.variants]
     _require(len(set(names)) == len(names), "variant", "two variants have the same name")
     _require(run.duration_s > 0 and run.samples >= 2, "duration_s", "a run needs a duration and at least 2 samples")
+    limit = run.time_limit_s
+    _require(limit is None or 0.0 < limit < math.inf, "time_limit_s", "a time limit is a positive number of seconds")
     for i, variant in enumerate(run.variants):
         _check_variant(variant, f"variant[{i}]")
     for i, comparison in enumerate(run.comparisons):

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
+from math import inf
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -14,8 +17,10 @@ from crosscheck import library
 from crosscheck.case import CaseError
 from crosscheck.engine_list import describe_engines
 from crosscheck.live import LiveProgress
-from crosscheck.report import write_all
+from crosscheck.lock import FolderInUseError, locked
+from crosscheck.report import Choice, write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome
+from crosscheck.session import last_session, standing
 from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
 from flexmb.scene.problems import closest
@@ -36,6 +41,10 @@ Start with `crosscheck run canonical`, then open the report whose path it prints
 console = Console()
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
+TimeLimit = Annotated[
+    float | None,
+    typer.Option("--time-limit", metavar="SECONDS", help="Stop what takes longer; default the case's limit or 1800."),
+]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
 
@@ -52,13 +61,18 @@ def run(
     out: Out = Path("out"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+    time_limit: TimeLimit = None,
     open_report: Open = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.
 
     **Writes** into `--out`: `report.html` (open it), `verdicts.json`, `summary.md`, `junit.xml`, `records.jsonl`.
-    A run that was stopped resumes where it was: what is recorded for the same scene and version is not run again.
+    A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
+    and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
+    `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
+
+    An engine that takes too long for a scene, or too much memory, is stopped: *did not finish*.
 
     **Exit code**: 0 every verdict is the one the case expects and everything asked for ran;
     1 something is not as expected or did not run; 2 the request itself makes no sense.
@@ -66,10 +80,15 @@ def run(
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
     """
+    _check_limit(time_limit)
     chosen = _found(tuple(cases))
-    with LiveProgress(console) as live:
-        sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, listener=live.hear)
-    _conclude(out / "records.jsonl", out, open_report)
+    with _sole_writer(out):
+        with LiveProgress(console) as live:
+            sweep(
+                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, time_limit_s=time_limit,
+                listener=live.hear,
+            )  # fmt: skip
+        _conclude(out / "records.jsonl", out, open_report, last_session)
 
 
 @app.command("list")
@@ -97,7 +116,8 @@ def report(
     """
     if not records.is_file():
         _refuse(f"{records} is no file")
-    _conclude(records, out, open_report)
+    with _sole_writer(out):
+        _conclude(records, out, open_report, standing)
 
 
 @app.command()
@@ -145,6 +165,9 @@ def stability(
     pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+    time_limit: Annotated[
+        float | None, typer.Option("--time-limit", metavar="SECONDS", help="Stop a longer cell; default 1800.")
+    ] = None,
 ) -> None:
     """
     Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
@@ -161,6 +184,7 @@ def stability(
     from crosscheck.stability.console import run_and_draw, show_maps  # they load the compiler
     from crosscheck.stability.run import PROVIDER, maps_of
 
+    _check_limit(time_limit)
     known = maps_of(PROVIDER)
     if maps == ["list"]:
         return show_maps(console, known.values())
@@ -168,9 +192,11 @@ def stability(
     for name in chosen:
         if name not in known:
             _refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
-    raise typer.Exit(
-        run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs)
-    )
+    with _sole_writer(out):
+        code = run_and_draw(
+            console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs, time_limit_s=time_limit
+        )
+    raise typer.Exit(code)
 
 
 def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
@@ -181,9 +207,24 @@ def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
         _refuse(str(error))
 
 
-def _conclude(records: Path, out: Path, open_report: bool) -> None:
+@contextmanager
+def _sole_writer(out: Path) -> Iterator[None]:
+    """Hold the folder, or end the program with exit code 2 where another process does."""
+    try:
+        with locked(out):
+            yield
+    except FolderInUseError as error:
+        _refuse(str(error))
+
+
+def _check_limit(seconds: float | None) -> None:
+    if seconds is not None and not 0.0 < seconds < inf:
+        _refuse(f"--time-limit {seconds:g}: give a positive number of seconds")
+
+
+def _conclude(records: Path, out: Path, open_report: bool, chosen: Choice) -> None:
     """Judge, write everything, show the table, and leave with the exit code."""
-    outcome, page = write_all(records, out)
+    outcome, page = write_all(records, out, chosen)
     code = print_outcome(console, outcome)
     console.print(f"Report: [bold]{page}[/bold]", soft_wrap=True)
     if open_report:

@@ -11,7 +11,7 @@ from crosscheck.results import CaseResults, Result
 from crosscheck.verdict import Finding, Status, Verdict, compare, conserve
 from flexmb.channels import matches
 
-MISSING: tuple[Status, ...] = ("did not run", "refused", "failed")
+MISSING: tuple[Status, ...] = ("did not run", "refused", "failed", "crashed", "did not finish")
 MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
 TRUE_MODEL = "conservation law"
 

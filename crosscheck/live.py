@@ -18,6 +18,8 @@ MARKS = {
     "finished": "[green]✓[/green]",
     "diverged": "[magenta]✕[/magenta]",
     "failed": "[red]✕[/red]",
+    "crashed": "[red]✕[/red]",
+    "did not finish": "[red]✕[/red]",
     "refused": "[yellow]⊘[/yellow]",
     "did not run": "[yellow]–[/yellow]",
 }
@@ -59,17 +61,18 @@ class LiveProgress:
             self._lines[event.job] = self._progress.add_task(f"{title}: starting", total=None)
         elif event.kind == "emitted" and isinstance(event.content, RunRecord):
             self._records[event.job].append(event.content)
-        elif event.kind == "emitted":
+        elif event.kind == "emitted" and isinstance(event.content, str):
             self._progress.update(self._lines[event.job], description=f"{title}: {escape(event.content)}")
-        else:
+        elif event.kind != "emitted":
             self._progress.remove_task(self._lines.pop(event.job))
             self._progress.advance(self._overall)
             self._progress.console.print(self._ending(title, event), highlight=False)
 
     def _ending(self, title: str, event: Event) -> str:
         """The lasting line of a job."""
-        if event.kind == "crashed":
-            return f"{MARKS['failed']} {title}: {escape(event.content)}"
+        if event.kind in ("crashed", "stopped"):
+            status = "crashed" if event.kind == "crashed" else "did not finish"
+            return f"{MARKS[status]} {title}: {status}: {escape(event.content)}"
         records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
         if not records:
             return f"{MARKS['finished']} {title}: already recorded"

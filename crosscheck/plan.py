@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import msgspec
 import numpy as np
@@ -15,6 +16,7 @@ from crosscheck.controls import mutate
 from crosscheck.drawing import draw, levels
 from crosscheck.engines.contract import Effort
 from crosscheck.library import Case
+from crosscheck.pool import TIME_LIMIT_S
 from crosscheck.records import CaseRecord, VariantInfo
 from crosscheck.selection import select
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
@@ -26,14 +28,23 @@ Array = NDArray[np.float64]
 MAIN, REFINED = "main", "refined"
 
 
+class Done(NamedTuple):
+    """A run that is recorded: its effort, what made it, and its place: a ladder of another length is run anew."""
+
+    effort: str
+    made_by: str
+    rung: int
+    rungs: int
+
+
 @dataclass(frozen=True)
 class Job:
     """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
 
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
     channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
-    name. `done` are the (effort, version, rung, rungs) already recorded for this very scene: a result is a ladder, and
-    another ladder is run from its foot. A job with an `error` cannot be run.
+    name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
+    `time_limit_s` it is stopped.
     """
 
     case: str
@@ -47,8 +58,9 @@ class Job:
     efforts: tuple[Effort, ...] = ()
     finest_only: bool = False
     kept: tuple[str, ...] = ()
-    done: frozenset[tuple[str, str, int, int]] = field(default_factory=frozenset)
+    done: frozenset[Done] = field(default_factory=frozenset)
     error: str = ""
+    time_limit_s: float = TIME_LIMIT_S
 
     @property
     def title(self) -> str:
@@ -57,8 +69,10 @@ class Job:
         return f"{self.case} · {self.variant}{role} · {self.engine}"
 
 
-def plan(case: Case, asked: tuple[str, ...], provider: str) -> tuple[CaseRecord, list[Job]]:
-    """The record of a case, reduced to the engines asked for, and its jobs."""
+def plan(
+    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None
+) -> tuple[CaseRecord, list[Job]]:
+    """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own."""
     run = select(case.run, asked)
     infos: dict[str, VariantInfo] = {}
     jobs: list[Job] = []
@@ -74,6 +88,8 @@ def plan(case: Case, asked: tuple[str, ...], provider: str) -> tuple[CaseRecord,
         variant = run.variant(control.a.variant)
         scene, error = _attempt(case, variant, control=control)
         jobs.append(_job(case, run, variant, f"control:{control.name}", control.a.engine, scene, error, provider))
+    limit = time_limit_s or case.run.time_limit_s or TIME_LIMIT_S
+    jobs = [replace(job, time_limit_s=limit) for job in jobs]
     record = CaseRecord(case=case.name, run=run, provenance=case.provenance, readme=case.readme, variants=infos)
     return record, jobs
 

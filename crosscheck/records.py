@@ -24,7 +24,7 @@ from crosscheck.case import Provenance, RunFile
 from crosscheck.drawing import Drawing
 
 Array = NDArray[np.float64]
-RunStatus = Literal["finished", "diverged", "failed", "refused", "did not run"]
+RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
 PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec", "plotly")
 
 
@@ -33,7 +33,10 @@ class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=T
 
 
 class Environment(_Strict, frozen=True, kw_only=True, tag="environment"):
-    """Machine and versions of one session of running."""
+    """Machine and versions of one session of running, and what was asked for: no engines named means all.
+
+    A session that `confirms` writes a `Confirmed` for each earlier result that it lets stand; older versions did not.
+    """
 
     started: str
     python: str
@@ -41,6 +44,9 @@ class Environment(_Strict, frozen=True, kw_only=True, tag="environment"):
     processor: str
     cores: int
     packages: dict[str, str]
+    cases: tuple[str, ...] = ()
+    engines: tuple[str, ...] = ()
+    confirms: bool = False
 
 
 class VariantInfo(msgspec.Struct, frozen=True, kw_only=True):
@@ -72,7 +78,11 @@ class RunRecord(_Strict, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
     `role` is "main", "refined" or "control:<name>". `rung` counts the efforts of the ladder from coarse to fine out of
-    `rungs`. `scene` identifies scene and sample times. `compile_s` is conversion and warm-up, `wall_s` the solve alone.
+    `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
+    `made_by.py`; records of older versions have none). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
+
+    `status`: "finished"; "diverged", as the engine says; "failed" where the adapter raised or broke the contract;
+    "crashed" where its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
     """
 
     case: str
@@ -81,6 +91,7 @@ class RunRecord(_Strict, frozen=True, kw_only=True, tag="run"):
     engine: str
     version: str
     scene: str
+    made_by: str = ""
     status: RunStatus
     message: str = ""
     support: str = ""
@@ -102,7 +113,18 @@ class RunRecord(_Strict, frozen=True, kw_only=True, tag="run"):
         return (self.case, self.variant, self.role, self.engine, self.effort)
 
 
-Record = Environment | CaseRecord | RunRecord
+class Confirmed(_Strict, frozen=True, kw_only=True, tag="confirmed"):
+    """Says that what earlier sessions recorded under this key is the result of this session too."""
+
+    case: str
+    variant: str
+    role: str
+    engine: str
+    scene: str
+    made_by: str
+
+
+Record = Environment | CaseRecord | RunRecord | Confirmed
 
 
 def pack(values: Array) -> Packed:
@@ -117,15 +139,18 @@ def unpack(packed: Packed) -> Array:
     return np.frombuffer(data, dtype="<f8").reshape(packed.shape).astype(np.float64)
 
 
-def environment() -> Environment:
-    """This machine and the versions of what runs on it."""
+def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), confirms: bool = False) -> Environment:
+    """This machine and the versions of what runs on it; what was asked for."""
     return Environment(
         started=datetime.now(UTC).isoformat(timespec="seconds"),
         python=platform.python_version(),
         system=f"{platform.system()} {platform.release()} ({platform.machine()})",
-        processor=_processor(),
+        processor=processor(),
         cores=os.cpu_count() or 1,
         packages={name: _package_version(name) for name in PACKAGES},
+        cases=cases,
+        engines=engines,
+        confirms=confirms,
     )
 
 
@@ -183,7 +208,7 @@ def _package_version(name: str) -> str:
         return "not installed"
 
 
-def _processor() -> str:
+def processor() -> str:
     """Model name of the CPU: Linux keeps it in /proc/cpuinfo, elsewhere `platform` knows it."""
     info = Path("/proc/cpuinfo")
     if info.is_file():

@@ -28,7 +28,7 @@ class Result:
 
     variant: str
     engine: str
-    status: Literal["finished", "failed", "refused", "did not run"]
+    status: Literal["finished", "failed", "crashed", "did not finish", "refused", "did not run"]
     message: str
     runs: tuple[RunRecord, ...]
     refined: Result | None = None
@@ -178,14 +178,14 @@ def _without_effect(ladder: Sequence[RunRecord]) -> bool:
 
 
 def _result(key: Key, group: list[RunRecord]) -> Result:
-    """A result from the runs of one scene and one version: those of the record that came last."""
+    """A result from the runs of one scene and one origin: those of the record that came last."""
     variant, engine, _ = key
     last = group[-1]
     if not last.effort:
         status = "failed" if last.status == "diverged" else last.status
         return Result(variant, engine, status, last.message, ())
-    stamp = (last.scene, last.version, last.rungs)
-    same = [run for run in group if run.effort and (run.scene, run.version, run.rungs) == stamp]
+    stamp = (last.scene, last.version, last.rungs, last.made_by)
+    same = [run for run in group if run.effort and (run.scene, run.version, run.rungs, run.made_by) == stamp]
     runs = tuple(sorted(same, key=lambda run: run.rung))
     finest = runs[-1]
     if finest.rung < finest.rungs - 1:

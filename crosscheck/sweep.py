@@ -10,12 +10,13 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from crosscheck.checked import clean
 from crosscheck.engines.registry import COMPILED_LIKE
 from crosscheck.execute import execute
 from crosscheck.library import Case
-from crosscheck.plan import Job, plan
+from crosscheck.plan import Done, Job, plan
 from crosscheck.pool import Event, run_jobs
-from crosscheck.records import Archive, Record, RunRecord, environment, read
+from crosscheck.records import Archive, Confirmed, Record, RunRecord, environment, read
 
 PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
@@ -29,29 +30,39 @@ def sweep(
     fresh: bool = False,
     workers: int | None = None,
     provider: str = PROVIDER,
+    time_limit_s: float | None = None,
+    memory_limit_bytes: float | None = None,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run cases and append to the file `records`; what it already holds of the same scenes is kept unless `fresh`.
+    """Run cases and append to the file `records`; what it already holds is confirmed, not run again, unless `fresh`.
 
-    `asked` are the engines (none: all), `workers` the number of processes (default: one per core). `listener` hears
-    every event, with the list of jobs.
+    What it holds counts where scene, effort and all that made it are the same (`made_by`). `asked` are the engines
+    (none: all), `workers` the number of processes (default: one per core). An engine that takes longer than
+    `time_limit_s` for a scene (default: the case's limit, or else the pool's), or more memory than `memory_limit_bytes`
+    (default: its part of the machine's), is stopped. `listener` hears every event, with the list of jobs.
     """
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
-    plans = [plan(case, asked, provider) for case in cases]
+    plans = [plan(case, asked, provider, time_limit_s) for case in cases]
     jobs = [replace(job, done=_done(known, job)) for _, planned in plans for job in planned]
     archive = Archive(records)
     try:
-        archive.write(environment())
+        archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
         for record, _ in plans:
             archive.write(record)
         log = str(records.with_suffix(".log"))
-        for event in run_jobs(execute, jobs, workers or os.cpu_count() or 1, log, kind=_engine):
-            if isinstance(event.content, RunRecord):
+        doing: dict[int, str] = {}
+        for event in run_jobs(
+            execute, jobs, workers or os.cpu_count() or 1, log, _engine, _time_limit, memory_limit_bytes
+        ):
+            if isinstance(event.content, RunRecord | Confirmed):
                 archive.write(event.content)
-            elif event.kind == "crashed":
-                archive.write(_crash(jobs[event.job], event.content))
+            elif event.kind == "emitted":
+                doing[event.job] = event.content
+            elif event.kind in ("crashed", "stopped"):
+                event = replace(event, content=f"{event.content}, while at {doing.get(event.job, 'its start')}")
+                archive.write(_cut_short(jobs[event.job], event))
             listener(jobs, event)
     finally:
         archive.close()
@@ -62,23 +73,28 @@ def _engine(job: Job) -> str:
     return COMPILED_LIKE.get(job.engine, job.engine)
 
 
-def _done(known: Sequence[Record], job: Job) -> frozenset[tuple[str, str, int, int]]:
-    """Efforts of the job, with version and place in the ladder, whose outcome is already known for the same scene.
+def _time_limit(job: Job) -> float:
+    return job.time_limit_s
 
-    A later record without an effort (missing engine, crash) withdraws the earlier ones.
+
+def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
+    """Efforts of the job whose outcome is already known for the same scene, with what made it.
+
+    A later record without an effort (missing engine, crash) withdraws the earlier ones. A record of an older version,
+    which does not say what made it, is of no use here.
     """
-    done: set[tuple[str, str, int, int]] = set()
+    done: set[Done] = set()
     for record in known:
         if not isinstance(record, RunRecord) or record.key[:4] != (job.case, job.variant, job.role, job.engine):
             continue
         if not record.effort:
             done.clear()
         elif record.status in ("finished", "diverged") and record.scene == job.scene_id:
-            done.add((record.effort, record.version, record.rung, record.rungs))
+            done.add(Done(record.effort, record.made_by, record.rung, record.rungs))
     return frozenset(done)
 
 
-def _crash(job: Job, how: str) -> RunRecord:
+def _cut_short(job: Job, event: Event) -> RunRecord:
     return RunRecord(
         case=job.case,
         variant=job.variant,
@@ -86,6 +102,6 @@ def _crash(job: Job, how: str) -> RunRecord:
         engine=job.engine,
         version="",
         scene=job.scene_id,
-        status="failed",
-        message=how,
+        status="crashed" if event.kind == "crashed" else "did not finish",
+        message=clean(event.content),
     )

@@ -21,7 +21,7 @@ from crosscheck.uncertainty import Uncertainty
 from flexmb.channels import distance, family, signal_range
 
 Array = NDArray[np.float64]
-Status = Literal["agree", "differ", "unresolved", "refused", "failed", "did not run"]
+Status = Literal["agree", "differ", "unresolved", "refused", "failed", "crashed", "did not finish", "did not run"]
 
 
 class Verdict(msgspec.Struct, frozen=True, kw_only=True):

@@ -43,7 +43,10 @@ class Effort:
 
     @property
     def label(self) -> str:
-        return f"{self.method} {'rtol' if self.kind == 'tolerance' else 'h'}={self.value:g}"
+        """How it is named everywhere; different efforts have different labels."""
+        short = f"{self.value:g}"
+        exact = short if float(short) == self.value else repr(float(self.value))
+        return f"{self.method} {'rtol' if self.kind == 'tolerance' else 'h'}={exact}"
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,8 @@ class MarkerPath:
 class Trajectory:
     """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
 
+    All this is checked before it is recorded (`crosscheck.checked`); an answer that breaks it counts as *failed*. Names
+    are those of the scene; a marker, a load or an energy that is left out is a channel that the engine does not offer.
     `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
     done so far by drives, motors, dampers and loads, where the engine integrates it. `wall_s` times only the solve.
     """

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from functools import partial
 from importlib import import_module
-from importlib.metadata import entry_points
+from importlib.metadata import EntryPoint, entry_points
 
-from crosscheck.engines.contract import Engine
+from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Support
+from flexmb.scene.schema import Scene
 
 GROUP = "crosscheck.engines"
 
@@ -27,20 +29,73 @@ BUILT_IN = {
 COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}
 
 
-def engines() -> dict[str, Engine]:
+class Engines(Mapping[str, Engine]):
+    """Engines by name; each is loaded when it is asked for, and no other with it."""
+
+    def __init__(self, loaders: dict[str, Callable[[], Engine]]) -> None:
+        self._loaders = loaders
+
+    def __getitem__(self, name: str) -> Engine:
+        return self._loaders[name]()
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._loaders)
+
+    def __len__(self) -> int:
+        return len(self._loaders)
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._loaders
+
+
+class BrokenPlugIn(RuntimeError):
+    """A plug-in that cannot be used; the message names it and says why."""
+
+
+class Broken:
+    """The engine in the place of a plug-in that cannot be loaded: all it does is to say why."""
+
+    summary = ""
+
+    def __init__(self, name: str, error: Exception) -> None:
+        self.name = name
+        self._error = error
+
+    def version(self) -> str:
+        raise self._error
+
+    def supports(self, scene: Scene) -> Support:
+        raise self._error
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        raise self._error
+
+    def compile(self, scene: Scene) -> Model:
+        raise self._error
+
+
+def engines() -> Engines:
     """All engines by name, built-in ones first, whether or not their libraries are installed.
 
-    An engine without its library raises `EngineMissing` from `version`. A plug-in may not take a built-in name.
+    An engine without its library raises `EngineMissing` from `version`, and so does a plug-in that cannot be imported
+    for want of a module; one that cannot be loaded for another reason raises `BrokenPlugIn`. A plug-in may not take a
+    built-in name.
     """
-    found = {name: _load(path)() for name, path in BUILT_IN.items()}
-    for point in entry_points(group=GROUP):
-        if point.name in BUILT_IN:
-            continue
-        engine = point.load()()
-        if not isinstance(engine, Engine):
-            raise TypeError(f'entry point "{point.name}" of group "{GROUP}" is no crosscheck engine: {engine!r}')
-        found[point.name] = engine
-    return found
+    found: dict[str, Callable[[], Engine]] = {name: partial(_built_in, path) for name, path in BUILT_IN.items()}
+    for name, points in _plug_ins().items():
+        found[name] = partial(_plugged, name, points)
+    return Engines(found)
+
+
+def plug_ins() -> tuple[str, ...]:
+    """Names of the engines that others have plugged in."""
+    return tuple(_plug_ins())
+
+
+def home(name: str) -> str:
+    """The module that makes the engine called `name`, "" if no engine here is called so."""
+    paths = [BUILT_IN[name]] if name in BUILT_IN else [point.value for point in _plug_ins().get(name, ())]
+    return paths[0].partition(":")[0].strip() if len(paths) == 1 else ""
 
 
 def engine(name: str) -> Engine:
@@ -51,6 +106,40 @@ def engine(name: str) -> Engine:
     return known[name]
 
 
-def _load(path: str) -> Callable[[], Engine]:
+def _built_in(path: str) -> Engine:
     module, _, name = path.partition(":")
-    return getattr(import_module(module), name)
+    made: Engine = getattr(import_module(module), name)()
+    return made
+
+
+def _plug_ins() -> dict[str, list[EntryPoint]]:
+    """Entry points by name, more than one where distributions quarrel about a name."""
+    found: dict[str, list[EntryPoint]] = {}
+    for point in entry_points(group=GROUP):
+        if point.name not in BUILT_IN and point not in found.setdefault(point.name, []):
+            found[point.name].append(point)
+    return found
+
+
+def _plugged(name: str, points: list[EntryPoint]) -> Engine:
+    """The engine of a plug-in, or a `Broken` one that says why there is none."""
+    what = f'plug-in "{name}" ({", ".join(point.value for point in points)})'
+    if len(points) > 1:
+        return Broken(name, BrokenPlugIn(f"{what}: several distributions offer this name; uninstall all but one"))
+    try:
+        made = points[0].load()()
+    except ImportError as error:
+        return Broken(name, EngineMissing(f"{what} cannot be imported: {type(error).__name__}: {error}"))
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # whatever it does, sys.exit among it, it may not take the others with it
+        return Broken(name, BrokenPlugIn(f"{what} cannot be loaded: {type(error).__name__}: {error}"))
+    if not isinstance(made, Engine):
+        lacking = f"it made a {type(made).__name__} without {_lacking(made)}"
+        return Broken(name, BrokenPlugIn(f"{what} is no crosscheck engine: {lacking}"))
+    return made
+
+
+def _lacking(made: object) -> str:
+    """What of the contract an object has not."""
+    return ", ".join(each for each in ("name", "version", "supports", "efforts", "compile") if not hasattr(made, each))

@@ -1,19 +1,23 @@
 """Everything a session leaves behind: verdicts.json, report.html, summary.md, junit.xml, from its records alone."""
 
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from crosscheck.records import read
+from crosscheck.records import Record, read
 from crosscheck.report.html import write_report
 from crosscheck.report.outcome import Outcome, conclude, write_verdicts
 from crosscheck.report.summary import write_junit, write_summary
 from crosscheck.results import collect
+from crosscheck.session import standing
 
-__all__ = ["Outcome", "write_all"]
+__all__ = ["Choice", "Outcome", "write_all"]
+
+Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
 
-def write_all(records: Path, out: Path) -> tuple[Outcome, Path]:
-    """Judge a file of records and write all outputs into `out`; returns the outcome and the report's path."""
-    session = collect(read(records))
+def write_all(records: Path, out: Path, chosen: Choice = standing) -> tuple[Outcome, Path]:
+    """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path."""
+    session = collect(chosen(read(records)))
     outcome = conclude(session)
     out.mkdir(parents=True, exist_ok=True)
     write_verdicts(outcome, out / "verdicts.json")

@@ -11,10 +11,9 @@ from rich.table import Column, Table
 from crosscheck.engine_list import EngineState
 from crosscheck.library import Case
 from crosscheck.report.outcome import Outcome
-from crosscheck.report.summary import pair
+from crosscheck.report.summary import STATUSES, pair
 from crosscheck.verdict import Verdict
 
-STATUSES = ("agree", "differ", "unresolved", "refused", "failed", "did not run")
 SHOWN = 20
 
 
@@ -85,7 +84,7 @@ def engines_table(states: Iterable[EngineState]) -> Table:
     table = Table(Column("engine", no_wrap=True), "what it is", "version", "how to install", header_style="bold")
     for state in states:
         version = (
-            "[yellow]not installed[/yellow]" if state.version is None else f"[green]{escape(state.version)}[/green]"
+            f"[yellow]{state.absence}[/yellow]" if state.version is None else f"[green]{escape(state.version)}[/green]"
         )
         table.add_row(state.name, escape(state.summary), version, escape(state.advice))
     return table

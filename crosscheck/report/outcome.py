@@ -12,7 +12,7 @@ from crosscheck.judge import judge
 from crosscheck.results import CaseResults, Session
 from crosscheck.verdict import Verdict
 
-NOT_GREEN = ("did not run", "refused", "failed")
+NOT_GREEN = ("did not run", "refused", "failed", "crashed", "did not finish")
 
 
 @dataclass(frozen=True)

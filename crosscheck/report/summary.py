@@ -8,17 +8,17 @@ from xml.etree import ElementTree
 from crosscheck.report.outcome import Outcome
 from crosscheck.verdict import Verdict
 
+STATUSES = ("agree", "differ", "unresolved", "refused", "failed", "crashed", "did not finish", "did not run")
 SHOWN = 40
 
 
 def write_summary(outcome: Outcome, file: Path) -> None:
     """summary.md: headline, counts by case, what is not as expected, what did not run."""
     lines = [f"# {'✅' if outcome.ok else '❌'} {outcome.headline}", ""]
-    lines += ["| case | verdicts | as expected | agree | differ | unresolved | refused | failed | did not run |"]
-    lines += ["|---|---|---|---|---|---|---|---|---|"]
+    lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |", "|---" * (3 + len(STATUSES)) + "|"]
     for case, verdicts in outcome.verdicts.items():
         counts = [sum(verdict.ok for verdict in verdicts)]
-        for status in ("agree", "differ", "unresolved", "refused", "failed", "did not run"):
+        for status in STATUSES:
             counts.append(sum(verdict.status == status for verdict in verdicts))
         lines.append(f"| {case} | {len(verdicts)} | {' | '.join(map(str, counts))} |")
     if outcome.unexpected:

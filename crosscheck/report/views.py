@@ -9,8 +9,11 @@ from crosscheck.report.summary import pair
 from crosscheck.verdict import Verdict
 from flexmb.channels import family
 
-SYMBOLS = {"agree": "✓", "differ": "≠", "unresolved": "?", "refused": "⊘", "failed": "✕", "did not run": "–"}
-GRAVITY = ("did not run", "failed", "refused", "differ", "unresolved", "agree")
+SYMBOLS = {
+    "agree": "✓", "differ": "≠", "unresolved": "?", "refused": "⊘", "failed": "✕", "crashed": "✕",
+    "did not finish": "✕", "did not run": "–",
+}  # fmt: skip
+GRAVITY = ("did not run", "crashed", "did not finish", "failed", "refused", "differ", "unresolved", "agree")
 FAMILIES = {
     "marker.position": "Marker positions",
     "marker.orientation": "Marker orientations",

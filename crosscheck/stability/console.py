@@ -29,12 +29,12 @@ def show_maps(console: Console, maps: Iterable[StabilityMap]) -> None:
 
 def run_and_draw(
     console: Console, names: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
-    workers: int | None,
+    workers: int | None, time_limit_s: float | None = None,
 ) -> int:  # fmt: skip
     """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
     verdicts = []
     for name in names:
-        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, workers)
+        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, workers, time_limit_s)
         picture = draw(done, pictures / f"{name}.svg")
         verdicts.append(done.verdict)
         write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
@@ -59,8 +59,9 @@ def read_verdicts(file: Path) -> list[MapVerdict]:
 
 
 def _run(
-    console: Console, name: str, records: Path, depth: int | None, fresh: bool, workers: int | None
-) -> Finished:
+    console: Console, name: str, records: Path, depth: int | None, fresh: bool, workers: int | None,
+    time_limit_s: float | None,
+) -> Finished:  # fmt: skip
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}"), BarColumn(bar_width=24), MofNCompleteColumn(),
         TimeElapsedColumn(), console=console, transient=True,
@@ -70,7 +71,9 @@ def _run(
         def hear(what: StabilityMap, done: int, known: int) -> None:
             progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
 
-        return run_map(name, records, depth=depth, fresh=fresh, workers=workers, listener=hear)
+        return run_map(
+            name, records, depth=depth, fresh=fresh, workers=workers, time_limit_s=time_limit_s, listener=hear
+        )
 
 
 def _line(done: Finished, picture: Path) -> str:

@@ -19,8 +19,9 @@ WRONG, NO_EVIDENCE = -1, -2  # instead of the number of a class
 class MapVerdict(msgspec.Struct, frozen=True, kw_only=True):
     """The judgement of a map.
 
-    `status`: "agree", "differ", or "did not run" where cells did not. `distance` is the largest distance, in cells of
-    the finest size, from a place to the nearest that the overlay puts into its class and back (-1: there is none).
+    `status`: "agree", "differ", or "did not run" where cells did not or none says anything. `distance` is the largest
+    distance, in cells of the finest size, from a place to the nearest that the overlay puts into its class and back
+    (-1: there is none).
     `worst` says where that is. `cells` counts cells by class or status.
     """
 
@@ -50,7 +51,7 @@ def judge(what: StabilityMap, mesh: Mesh, records: dict[Cell, CellRecord]) -> Ma
     place = np.unravel_index(int(np.argmax(distance)), distance.shape)
     farthest = int(distance[place])
     found = [records[cell] for cell in cells]
-    if any(record.status == "did not run" for record in found):
+    if any(record.status == "did not run" for record in found) or bool(np.all(measured == NO_EVIDENCE)):
         status = "did not run"
     else:
         status = "agree" if farthest <= ALLOWED else "differ"

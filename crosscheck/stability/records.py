@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
-import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 import msgspec
 
+from crosscheck.made_by import made_by
 from crosscheck.records import Environment, decoded_lines
 from crosscheck.stability.map import Axis, CellStatus, StabilityMap
 from crosscheck.stability.refine import Cell
+
+RECORDING = ("crosscheck.stability.map", "crosscheck.stability.run")  # a part of what makes a cell's record
 
 
 class MapRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="map"):
@@ -48,9 +49,9 @@ Record = Environment | MapRecord | CellRecord
 
 
 def identity(what: StabilityMap) -> str:
-    """A digest of the map's axes and of the text of the file that defines what is measured."""
-    source = inspect.getsource(sys.modules[what.measure.__module__])
-    text = f"{what.name} {what.x} {what.y} {source}"
+    """A digest of the map's axes and of all that its cells can depend on: sources, libraries, machine (`made_by`)."""
+    code = made_by({what.scene.__module__, what.measure.__module__}, RECORDING)
+    text = f"{what.name} {what.x} {what.y} {code}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -11,6 +11,7 @@ from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
+from crosscheck.checked import clean
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.pool import Event, run_jobs
 from crosscheck.records import Archive, environment
@@ -52,13 +53,15 @@ def run_map(
     fresh: bool = False,
     workers: int | None = None,
     provider: str = PROVIDER,
+    time_limit_s: float | None = None,
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda what, done, known: None,
 ) -> Finished:
     """Run one map of the provider to `depth` halvings (default: its own) and append to the file `records`.
 
-    Cells already recorded for the same definition are kept unless `fresh`. `listener` hears how many cells of those
-    known so far are done. Raises KeyError where there is no such map.
+    Cells already recorded by the same sources are kept unless `fresh`. A cell that takes longer than `time_limit_s`
+    (default: the scheduler's) is stopped; it did not run, as far as the map is concerned, which asks for it again.
+    `listener` hears how many cells of those known so far are done. Raises KeyError where there is no such map.
     """
     what = maps_of(provider)[name]
     mesh = Mesh(what.x, what.y, what.depth if depth is None else depth)
@@ -87,10 +90,11 @@ def run_map(
             return mesh.settle((record.cell, label(what, record)) for record in found)
 
         ask(sorted(mesh.waiting))
-        for event in scheduler(run_cell, jobs, workers or os.cpu_count() or 1, str(records.with_suffix(".log"))):
-            if event.kind in ("emitted", "crashed"):
-                job = jobs[event.job]
-                record = event.content if event.kind == "emitted" else _crash(job, event.content)
+        limit = {} if time_limit_s is None else {"time_limit_s": lambda job: time_limit_s}
+        log = str(records.with_suffix(".log"))
+        for event in scheduler(run_cell, jobs, workers or os.cpu_count() or 1, log, **limit):
+            if event.kind in ("emitted", "crashed", "stopped"):
+                record = event.content if event.kind == "emitted" else _cut_short(jobs[event.job], event)
                 archive.write(record)
                 ask(take([record]))
     finally:
@@ -113,8 +117,10 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
         outcome = maps_of(job.provider)[job.map].outcome(job.x, job.y)
     except EngineMissing as error:
         outcome = Outcome(status="did not run", message=str(error))
-    except Exception as error:
-        outcome = Outcome(status="failed", message=f"{type(error).__name__}: {error}")
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:
+        outcome = Outcome(status="failed", message=clean(f"{type(error).__name__}: {error}"))
     if outcome.status == "measured" and not math.isfinite(outcome.value):
         outcome = Outcome(status="failed", message=f"the quantity is {outcome.value}")
     emit(
@@ -126,10 +132,11 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
     )  # fmt: skip
 
 
-def _crash(job: CellJob, how: str) -> CellRecord:
+def _cut_short(job: CellJob, event: Event) -> CellRecord:
+    """A cell whose process died has failed; one that was stopped at a limit of this machine says nothing."""
     return CellRecord(
         identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
-        status="failed", message=how,
+        status="failed" if event.kind == "crashed" else "did not run", message=event.content,
     )  # fmt: skip
 
 

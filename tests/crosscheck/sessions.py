@@ -9,6 +9,7 @@ from crosscheck.library import load_case
 from crosscheck.records import read
 from crosscheck.report.outcome import Outcome, conclude
 from crosscheck.results import collect
+from crosscheck.session import last_session
 from crosscheck.sweep import sweep
 from crosscheck.verdict import Verdict
 
@@ -33,7 +34,7 @@ def copy_case(folder: Path, run_file: str | None = None) -> Path:
 def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: object) -> Outcome:
     """Run a case folder and judge its records."""
     sweep([load_case(case)], asked, records, workers=2, provider=PROVIDER, **options)
-    return conclude(collect(read(records)))
+    return conclude(collect(last_session(read(records))))
 
 
 def compare_engines(folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6') -> Outcome:

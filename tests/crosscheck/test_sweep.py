@@ -86,7 +86,7 @@ def test_efforts_without_effect_leave_the_uncertainty_unknown(tmp_path) -> None:
         ("absent", "did not run", "install the extra"),
         ("nonsense", "did not run", 'no engine "nonsense"; the engines are fine'),
         ("refuser", "refused", "revolute hinges are beyond it"),
-        ("crasher", "failed", "exit code 139"),
+        ("crasher", "crashed", "exit code 139"),
         ("raiser", "failed", "RuntimeError: the solver gave up on purpose"),
         ("diverger", "failed", "diverged at t = 0.9 s: the step fell below"),
     ],

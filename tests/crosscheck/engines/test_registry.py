@@ -49,8 +49,9 @@ def test_plug_in_is_found(monkeypatch):
 
 def test_plug_in_that_is_no_engine_is_refused(monkeypatch):
     _plug(monkeypatch, "mine", f"{__name__}:_NoEngine")
-    with pytest.raises(TypeError, match="no crosscheck engine"):
-        registry.engines()
+    broken = registry.engines()["mine"]
+    with pytest.raises(registry.BrokenPlugIn, match="no crosscheck engine.*without name, version"):
+        broken.version()
 
 
 @pytest.mark.parametrize("name", ["pinocchio", "mujoco"])

@@ -1,0 +1,53 @@
+"""Processes with all that they started: how much memory they hold, and their end."""
+
+from __future__ import annotations
+
+import os
+import signal
+from collections.abc import Iterable
+from contextlib import suppress
+from multiprocessing.process import BaseProcess
+from pathlib import Path
+
+import psutil
+
+USABLE = 0.8  # of the memory; the rest is for the system and for who runs the workers
+CGROUP = Path("/sys/fs/cgroup/memory.max")
+
+
+def memory_limit(workers: int) -> float:
+    """How many bytes each of so many workers may hold: what all may hold together is there."""
+    total = float(psutil.virtual_memory().total)
+    with suppress(OSError, ValueError):  # a container has less than its machine; "max" is no number
+        total = min(total, float(CGROUP.read_text(encoding="ascii")))
+    return USABLE * total / workers
+
+
+def memory_of(roots: Iterable[int]) -> dict[int, int]:
+    """Resident memory in bytes of each process in `roots` together with its descendants."""
+    held: dict[int, int] = dict.fromkeys(roots, 0)
+    parents = {each.pid: each.info["ppid"] for each in psutil.process_iter(["ppid"])}
+    for pid in parents:
+        ancestor: int | None = pid
+        while ancestor is not None and ancestor not in held:
+            ancestor = parents.get(ancestor) or None
+        if ancestor is not None:
+            with suppress(psutil.Error):
+                held[ancestor] += psutil.Process(pid).memory_info().rss
+    return held
+
+
+def end(process: BaseProcess) -> None:
+    """Kill a process, its descendants, and its process group where it leads one."""
+    assert process.pid is not None
+    family: list[psutil.Process] = []
+    with suppress(psutil.Error):
+        family = psutil.Process(process.pid).children(recursive=True)
+    if hasattr(os, "killpg"):
+        with suppress(ProcessLookupError, PermissionError):
+            os.killpg(process.pid, signal.SIGKILL)  # no such group where it did not become a leader
+    for each in family:
+        with suppress(psutil.Error):
+            each.kill()
+    process.kill()
+    process.join()
