@@ -11,10 +11,13 @@ from crosscheck.results import collect
 __all__ = ["Outcome", "write_all"]
 
 
-def write_all(records: Path, out: Path) -> tuple[Outcome, Path]:
-    """Judge a file of records and write all outputs into `out`; returns the outcome and the report's path."""
+def write_all(records: Path, out: Path, strict: bool = False) -> tuple[Outcome, Path]:
+    """Judge a file of records and write all outputs into `out`; returns the outcome and the report's path.
+
+    `strict`: what is worse than recorded, or not recorded, is not as expected.
+    """
     session = collect(read(records))
-    outcome = conclude(session)
+    outcome = conclude(session, strict)
     out.mkdir(parents=True, exist_ok=True)
     write_verdicts(outcome, out / "verdicts.json")
     write_summary(outcome, out / "summary.md")
