@@ -22,7 +22,7 @@ from crosscheck.case import (
 from crosscheck.patterns import fault
 from flexmb.scene.problems import Place, Problem, closest
 
-LONGEST_S = 1e7
+DURATIONS_S = (1e-9, 1e7)
 MOST_SAMPLES = 100_000  # of a few hundred channels each: what memory and records can hold
 MOST_STEPS = 1e8  # of one run with fixed steps: hours
 MOST_EFFORTS = 20
@@ -210,7 +210,7 @@ def _expectation(run: RunFile, item: Comparison | Conservation, place: Place) ->
         yield from _covered(item, place.key("band"))
     if item.diverged_s is not None:
         low, high = item.diverged_s
-        if not 0.0 <= low < high <= LONGEST_S:
+        if not 0.0 <= low < high <= DURATIONS_S[1]:
             remedy = "give the earliest and the latest time, in seconds"
             yield _problem(place.key("diverged_s"), f"[{low:g}, {high:g}] is no time", remedy)
 
@@ -280,8 +280,9 @@ def _count(number: int, place: Place, least: int) -> Iterator[Problem]:
 
 
 def _duration(duration: float, place: Place) -> Iterator[Problem]:
-    if not 0.0 < duration <= LONGEST_S:
-        remedy = f"give seconds above 0, at most {LONGEST_S:g}"
+    shortest, longest = DURATIONS_S
+    if not shortest <= duration <= longest:
+        remedy = f"give {shortest:g} to {longest:g} seconds"
         yield _problem(place.key("duration_s"), f"a run needs a duration, and {duration:g} is none", remedy)
 
 

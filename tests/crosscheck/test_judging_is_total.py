@@ -54,13 +54,13 @@ def haste(channel: str, a: Signal, b: Signal, goal: float, scale: float | None =
     """Judging by asking what fails: every comparison with NaN is false."""
     size = scale or max(*a.sizes, *b.sizes)
     with np.errstate(all="ignore"):
-        E = float(np.float64(np.max(np.linalg.norm(a.values - b.values, axis=1))) / size)
-        U = float(np.float64(a.uncertainty.value + b.uncertainty.value) / size)
-    if E > U:
-        return Finding("differ", "apart", E, U)
-    if U > goal:
-        return Finding("unresolved", "uncertain", E, U)
-    return Finding("agree", "within", E, U)
+        apart = float(np.float64(np.max(np.linalg.norm(a.values - b.values, axis=1))) / size)
+        doubt = float(np.float64(a.uncertainty.value + b.uncertainty.value) / size)
+    if apart > doubt:
+        return Finding("differ", "apart", apart, doubt)
+    if doubt > goal:
+        return Finding("unresolved", "uncertain", apart, doubt)
+    return Finding("agree", "within", apart, doubt)
 
 
 def comparisons(judge: Callable[..., Finding], channel: str) -> Iterator[str]:
