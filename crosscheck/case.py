@@ -37,6 +37,16 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
     b = { variant = "segments", engine = "pinocchio" }
     goals = { "marker:tip.position" = 1e-2 }
     expect = "differ"
+    band = { "marker:tip.position" = [2e-2, 2e-1] }    # E is expected within
+    reason = "the unstiffened body bends by more than the beam"
+
+    [[comparison]]
+    name = "flexible to the end"
+    a = { variant = "full", engine = "native-frisch" }
+    b = { variant = "segments", engine = "pinocchio" }
+    goals = { "marker:tip.position" = 1e-2 }
+    expect = "diverged"
+    diverged_s = [7.5, 8.5]           # the last sample time reached is expected within
     reason = "above the critical speed the unstiffened body diverges"
 
     [[control]]                       # a deliberate fault that must be seen
@@ -60,20 +70,31 @@ A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further s
 Channels are named ``marker:<name>.position | orientation | velocity | angular_velocity``, ``energy.<kind>``,
 ``energy.total``, ``momentum.angular | linear``, ``load:<hinge>.torque | force``,
 ``wheel_load:<wheel>.torque | force`` and ``drive:<name>``. A pattern is a channel, a shell pattern of one
-(``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``). A goal is the largest uncertainty,
-relative to the channel's range, with which a comparison still counts as resolved.
+(``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the longest that names a channel
+counts. A goal is the largest uncertainty, relative to the channel's range, with which a comparison still counts as
+resolved.
+
+An expectation other than *agree* needs its reason in words, and bounds, outside of which it is not as expected:
+``band`` for the size of E (*differ*) or of U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
+most 100 times low; ``diverged_s`` for the last sample time that a *diverged* run reached; ``because`` for a text that
+the engine's own reason must contain (*failed*, *refused*). What crashed, did not finish or did not run is never as
+expected. Statuses are explained in `crosscheck.verdict`.
+
+``case_check.py`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
+that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
+the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.accepted`).
 """
 
 from __future__ import annotations
 
-import math
 from typing import Literal
 
 import msgspec
 
 from flexmb.scene.schema import Level
 
-Expectation = Literal["agree", "differ", "unresolved", "refused", "failed"]
+Expectation = Literal["agree", "differ", "unresolved", "refused", "diverged", "failed"]
+Band = tuple[float, float]  # lowest and highest that is as expected
 Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
 TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
 MutationKind = Literal[
@@ -159,7 +180,8 @@ class Comparison(_Strict, frozen=True, kw_only=True):
     """Two results held against each other: `a` and `b`, or every pair of `engines` of one `variant`.
 
     `goals` maps channel patterns to the resolution goal, relative to the channel's range. `scales` replaces the range
-    by an absolute size (SI) for channels whose range is no measure, such as a momentum that stays zero.
+    by an absolute size (SI) for channels whose range is no measure, such as a momentum that stays zero. `band`,
+    `diverged_s` and `because` are the bounds of an expectation other than "agree".
     """
 
     name: str
@@ -170,6 +192,9 @@ class Comparison(_Strict, frozen=True, kw_only=True):
     goals: dict[str, float]
     scales: dict[str, float] = {}
     expect: Expectation = "agree"
+    band: dict[str, Band] = {}
+    diverged_s: Band | None = None
+    because: str = ""
     reason: str = ""
 
 
@@ -195,7 +220,7 @@ class Conservation(_Strict, frozen=True, kw_only=True):
     """A conserved quantity: its drift over the run, less the recorded work, relative to `scale`, is at most `limit`.
 
     `scale` (SI) is by default the largest magnitude reached: for the energy the largest sum of magnitudes of its kinds.
-    `engines` are by default all of the variant's.
+    `engines` are by default all of the variant's. Bounds of an expectation are those of a comparison, with one `band`.
     """
 
     variant: str
@@ -204,6 +229,9 @@ class Conservation(_Strict, frozen=True, kw_only=True):
     engines: tuple[str, ...] = ()
     scale: float | None = None
     expect: Expectation = "agree"
+    band: Band | None = None
+    diverged_s: Band | None = None
+    because: str = ""
     reason: str = ""
 
 
@@ -250,79 +278,3 @@ class Provenance(_Strict, frozen=True, kw_only=True):
     sources: tuple[str, ...]
     uncertainty: str
     notes: str = ""
-
-
-def check_run_file(run: RunFile) -> None:
-    """Refuse references to variants and engines that do not exist, empty comparisons and unexplained expectations."""
-    names = [variant.name for variant in run.variants]
-    _require(len(set(names)) == len(names), "variant", "two variants have the same name")
-    _require(run.duration_s > 0 and run.samples >= 2, "duration_s", "a run needs a duration and at least 2 samples")
-    limit = run.time_limit_s
-    _require(limit is None or 0.0 < limit < math.inf, "time_limit_s", "a time limit is a positive number of seconds")
-    for i, variant in enumerate(run.variants):
-        _check_variant(variant, f"variant[{i}]")
-    for i, comparison in enumerate(run.comparisons):
-        _check_comparison(run, comparison, f"comparison[{i}]")
-    for i, control in enumerate(run.controls):
-        where = f"control[{i}]"
-        _check_side(run, control.a, f"{where}.a")
-        _check_side(run, control.b, f"{where}.b")
-        _require(bool(control.goals), f"{where}.goals", "name at least one channel and its goal")
-    for i, conservation in enumerate(run.conservations):
-        where = f"conservation[{i}]"
-        variant = run.variant(conservation.variant)
-        _check_engines(variant, conservation.engines, where)
-        explained = conservation.expect == "agree" or bool(conservation.reason)
-        _require(explained, f"{where}.reason", "an expected status needs a reason")
-    for i, chart in enumerate(run.charts):
-        for name in (*chart.variants, chart.reference):
-            _require(name in names, f"chart[{i}]", f'no variant "{name}"; the variants are {", ".join(names)}')
-
-
-def _check_variant(variant: Variant, where: str) -> None:
-    _require(bool(variant.engines), f"{where}.engines", "name at least one engine")
-    twice = set(variant.engines) & set(variant.also)
-    _require(not twice, f"{where}.also", f"{', '.join(sorted(twice))} is among the engines already")
-    for key, transform in (("segments", "segments"), ("pieces", "substructures")):
-        given = getattr(variant, key) is not None
-        _require(given == (variant.transform == transform), f"{where}.{key}", f'give it exactly with "{transform}"')
-        finer = variant.refined is not None and getattr(variant.refined, key) is not None
-        _require(given or not finer, f"{where}.refined.{key}", f'give it with "{transform}" only')
-    pieces = variant.transform == "substructures"
-    _require(pieces or not variant.eigenmodes, f"{where}.eigenmodes", 'give it with "substructures" only')
-    split = variant.transform in ("segments", "substructures")
-    _require(split or variant.split_body is None, f"{where}.split_body", 'give it with "segments" or "substructures"')
-    for i, ladder in enumerate(variant.efforts):
-        _require(len(ladder.values) >= 2, f"{where}.efforts[{i}].values", "an uncertainty needs at least two efforts")
-        falling = all(a > b for a, b in zip(ladder.values, ladder.values[1:], strict=False))
-        _require(falling, f"{where}.efforts[{i}].values", "list them from coarse to fine (falling)")
-
-
-def _check_comparison(run: RunFile, comparison: Comparison, where: str) -> None:
-    _require(bool(comparison.goals), f"{where}.goals", "name at least one channel and its goal")
-    explained = comparison.expect == "agree" or bool(comparison.reason)
-    _require(explained, f"{where}.reason", "an expected status needs a reason")
-    if comparison.variant is not None:
-        _require(comparison.a is None and comparison.b is None, where, "give either variant, or a and b")
-        _check_engines(run.variant(comparison.variant), comparison.engines, where)
-        return
-    _require(not comparison.engines, f"{where}.engines", "engines belongs to variant; a and b name theirs")
-    for key, side in (("a", comparison.a), ("b", comparison.b)):
-        if side is None:
-            raise CaseError(f"$.{where}: give either variant, or a and b")
-        _check_side(run, side, f"{where}.{key}")
-
-
-def _check_side(run: RunFile, side: Side, where: str) -> None:
-    _check_engines(run.variant(side.variant), (side.engine,), where)
-
-
-def _check_engines(variant: Variant, engines: tuple[str, ...], where: str) -> None:
-    for engine in engines:
-        message = f'engine "{engine}" does not run variant "{variant.name}": add it to the variant\'s engines'
-        _require(engine in (*variant.engines, *variant.also), where, message)
-
-
-def _require(condition: bool, where: str, message: str) -> None:
-    if not condition:
-        raise CaseError(f"$.{where}: {message}")

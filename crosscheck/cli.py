@@ -14,6 +14,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from crosscheck import library
+from crosscheck.accept import NotAccepted, accept_figures
 from crosscheck.case import CaseError
 from crosscheck.engine_list import describe_engines
 from crosscheck.live import LiveProgress
@@ -45,6 +46,7 @@ TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="SECONDS", help="Stop what takes longer; default the case's limit or 1800."),
 ]
+Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
 
@@ -62,6 +64,10 @@ def run(
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
     time_limit: TimeLimit = None,
+    accept: Annotated[
+        bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
+    ] = False,
+    strict: Strict = False,
     open_report: Open = False,
 ) -> None:
     """
@@ -76,6 +82,8 @@ def run(
 
     **Exit code**: 0 every verdict is the one the case expects and everything asked for ran;
     1 something is not as expected or did not run; 2 the request itself makes no sense.
+    With `--strict` also 1 where E or U is *worse than recorded*, more than 10 times what was accepted, or where no
+    figures were accepted yet. `--accept` records nothing while anything is not as expected.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
@@ -88,7 +96,9 @@ def run(
                 chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, time_limit_s=time_limit,
                 listener=live.hear,
             )  # fmt: skip
-        _conclude(out / "records.jsonl", out, open_report, last_session)
+        if accept:
+            _accept(chosen, out / "records.jsonl", partial=bool(engine))
+        _conclude(out / "records.jsonl", out, open_report, strict, last_session)
 
 
 @app.command("list")
@@ -107,6 +117,7 @@ def engines() -> None:
 def report(
     records: Annotated[Path, typer.Argument(help="A records.jsonl of an earlier run, yours or anybody's.")],
     out: Out = Path("out"),
+    strict: Strict = False,
     open_report: Open = False,
 ) -> None:
     """
@@ -117,7 +128,7 @@ def report(
     if not records.is_file():
         _refuse(f"{records} is no file")
     with _sole_writer(out):
-        _conclude(records, out, open_report, standing)
+        _conclude(records, out, open_report, strict, standing)
 
 
 @app.command()
@@ -222,9 +233,18 @@ def _check_limit(seconds: float | None) -> None:
         _refuse(f"--time-limit {seconds:g}: give a positive number of seconds")
 
 
-def _conclude(records: Path, out: Path, open_report: bool, chosen: Choice) -> None:
+def _accept(cases: tuple[library.Case, ...], records: Path, partial: bool) -> None:
+    """Write what the cases have reached beside their run files, or say why not and leave with 1."""
+    try:
+        for file, count in accept_figures(cases, records, partial):
+            console.print(f"{count} figures accepted: review {escape(str(file))}", soft_wrap=True)
+    except NotAccepted as error:
+        console.print(f"[red]{escape(str(error))}[/red]", soft_wrap=True)
+
+
+def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice) -> None:
     """Judge, write everything, show the table, and leave with the exit code."""
-    outcome, page = write_all(records, out, chosen)
+    outcome, page = write_all(records, out, strict, chosen)
     code = print_outcome(console, outcome)
     console.print(f"Report: [bold]{page}[/bold]", soft_wrap=True)
     if open_report:

@@ -6,12 +6,15 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
+from crosscheck.accepted import key, worse
 from crosscheck.case import Comparison, Conservation, Control, Side
+from crosscheck.expectation import outside
+from crosscheck.patterns import most_specific
 from crosscheck.results import CaseResults, Result
 from crosscheck.verdict import Finding, Status, Verdict, compare, conserve
-from flexmb.channels import matches
+from flexmb.channels import matches, norms
 
-MISSING: tuple[Status, ...] = ("did not run", "refused", "failed", "crashed", "did not finish")
+MISSING: tuple[Status, ...] = ("did not run", "crashed", "did not finish", "failed", "diverged", "refused")
 MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
 TRUE_MODEL = "conservation law"
 
@@ -36,7 +39,26 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         if finding is None:
             scale = _scale(item.scales, channel)
             finding = compare(channel, a.signal(channel, across), b.signal(channel, across), goal, scale)
-        yield _verdict(case, item.name, "comparison", channel, item.a, item.b, item.expect, item.reason, goal, finding)
+        beyond = outside(item, channel, finding) if finding.status == item.expect else ""
+        yield _verdict(
+            case, item.name, "comparison", channel, item.a, item.b, item.expect, item.reason, goal, finding, beyond
+        )
+    yield from _unused(case, item, a, b)
+
+
+def _unused(case: CaseResults, item: Comparison, a: Result, b: Result) -> Iterator[Verdict]:
+    """Scales and bands whose pattern names no channel that is judged: misspelt, they would be left out in silence."""
+    judged = [name for name in _union(a.channels, b.channels) if most_specific(item.goals, name) is not None]
+    if _missing(a, b) is not None or not judged:
+        return
+    for what, patterns in (("scale", item.scales), ("band", item.band)):
+        for pattern in patterns:
+            if not any(matches(pattern, name) for name in judged):
+                finding = Finding("unresolved", f'a {what} is given for "{pattern}", which is no channel judged here')
+                yield _verdict(
+                    case, item.name, "comparison", pattern, item.a, item.b, item.expect, item.reason, 0.0, finding,
+                    finding.reason,
+                )  # fmt: skip
 
 
 def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
@@ -49,7 +71,7 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
         if finding is None:
             finding = _absent(twin, channel)
         if finding is None:
-            signal = faulty.control_signal(channel, twin)
+            signal = faulty.control_signal(channel, twin, across)
             finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
         yield _verdict(case, item.name, "control", channel, item.a, item.b, "differ", why, goal, finding)
 
@@ -61,28 +83,34 @@ def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict
     side = Side(variant=item.variant, engine=engine)
     law = Side(variant=item.variant, engine=TRUE_MODEL)
     name = f"{item.quantity.replace('_', ' ')} conserved"
-    return _verdict(case, name, "conservation", channel, side, law, item.expect, item.reason, item.limit, finding)
+    beyond = outside(item, channel, finding) if finding.status == item.expect else ""
+    return _verdict(
+        case, name, "conservation", channel, side, law, item.expect, item.reason, item.limit, finding, beyond
+    )
 
 
 def _drift(result: Result, channel: str, item: Conservation) -> Finding:
     """Drift (SI): of the energy less the work done, or the change of the momentum vector."""
-    values = result.values(channel)
-    if item.quantity == "energy":
-        drift, scale = energy_drift(result)
-    else:
-        drift = np.linalg.norm(values - values[0], axis=1)
-        scale = float(np.max(np.linalg.norm(values, axis=1)))
+    drift, scale = drift_of(result, channel)
     return conserve(drift, item.scale if item.scale is not None else scale, item.limit)
 
 
-def energy_drift(result: Result) -> tuple[np.ndarray, float]:
+def drift_of(result: Result, channel: str) -> tuple[np.ndarray, float]:
+    """Drift (T,) in SI at every sample, and the largest magnitude: of the energy less the work, or of a momentum."""
+    if channel == "energy.total":
+        return _energy_drift(result)
+    values = result.values(channel)
+    return norms(values - values[:1]), float(np.max(norms(values), initial=0.0))
+
+
+def _energy_drift(result: Result) -> tuple[np.ndarray, float]:
     """E(t) - E(0) - W(t) + W(0) (J), and the largest sum of magnitudes of the kinds of energy (J)."""
     drift = result.values("energy.total")[:, 0]
     if "work" in result.channels:
         drift = drift - result.values("work")[:, 0]
     kinds = [name for name in result.channels if name.startswith("energy.") and name != "energy.total"]
-    scale = float(np.max(sum(np.abs(result.values(name)[:, 0]) for name in kinds)))
-    return drift - drift[0], scale
+    sizes = sum((np.abs(result.values(name)[:, 0]) for name in kinds), np.zeros(len(drift)))
+    return drift - drift[:1], float(np.max(sizes, initial=0.0))
 
 
 def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[str, float, Finding | None]]:
@@ -109,31 +137,30 @@ def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[s
 
 def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:
     """Whether `pattern` is the most specific (longest) of the patterns that name the channel."""
-    naming = [each for each in goals if matches(each, channel)]
-    return bool(naming) and max(naming, key=len) == pattern
+    return most_specific(goals, channel) == pattern
 
 
-def _missing(a: Result, b: Result) -> Finding | None:
-    """The graver of two missing results: not run, refused, failed."""
-    absent = [result for result in (a, b) if result.status != "finished"]
-    if not absent:
+def _missing(*results: Result) -> Finding | None:
+    """The gravest of missing results, so that an expected refusal of one cannot hide that the other crashed."""
+    endings = [result.ending for result in results if result.status != "finished"]
+    if not endings:
         return None
-    worst = min(absent, key=lambda result: MISSING.index(result.status))
-    return Finding(worst.status, f"{worst.engine} on {worst.variant}: {worst.message}")
+    worst = min(endings, key=lambda ending: MISSING.index(ending.status))
+    return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
 
 
 def _absent(result: Result, channel: str) -> Finding | None:
     """Why a result has no such channel, if it has not."""
     if result.status != "finished":
-        return Finding(result.status, f"{result.engine} on {result.variant}: {result.message}")
+        return _missing(result)
     if channel not in result.channels:
         return Finding("refused", f"{result.engine} does not offer {channel}")
     return None
 
 
 def _scale(scales: dict[str, float], channel: str) -> float | None:
-    naming = [pattern for pattern in scales if matches(pattern, channel)]
-    return scales[max(naming, key=len)] if naming else None
+    pattern = most_specific(scales, channel)
+    return scales[pattern] if pattern is not None else None
 
 
 def _union(first: Iterable[str], second: Iterable[str]) -> list[str]:
@@ -151,8 +178,11 @@ def _verdict(
     why: str,
     goal: float,
     finding: Finding,
+    beyond: str = "",
 ) -> Verdict:
     infos = case.case.variants
+    place = key(channel, (a.engine, a.variant), (b.engine, b.variant))
+    accepted = case.case.accepted.get(name, {}).get(place) if kind != "control" else None
     levels = dict.fromkeys(infos[side.variant].level for side in (a, b) if side.variant in infos)
     return Verdict(
         case=case.case.case,
@@ -170,6 +200,9 @@ def _verdict(
         U=finding.U,
         goal=goal,
         scale=finding.scale,
-        reason=finding.reason,
+        reason=f"{finding.reason}; {beyond}" if beyond and beyond != finding.reason else finding.reason,
         expected_reason=why,
+        outside=beyond,
+        accepted=accepted,
+        worse=worse(accepted, finding.E, finding.U),
     )

@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import tomllib
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TypeVar
 
-import msgspec
-
-from crosscheck.case import CaseError, Provenance, RunFile, Variant, check_run_file
+from crosscheck.accepted import FILE as ACCEPTED
+from crosscheck.accepted import Accepted
+from crosscheck.case import CaseError, Provenance, RunFile, Variant
+from crosscheck.case_check import check_accepted, check_run_file
+from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
+from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Scene
 
 T = TypeVar("T")
@@ -26,6 +29,7 @@ class Case:
     run: RunFile
     provenance: Provenance | None
     readme: str
+    accepted: Accepted = field(default_factory=dict)
 
     def scene(self, variant: Variant) -> Scene:
         """The variant's scene as its file says, before any transformation."""
@@ -83,6 +87,13 @@ def load_case(folder: Path) -> Case:
         if not (folder / variant.scene).is_file():
             missing = f'variant "{variant.name}" needs {variant.scene}, which is not there'
             raise CaseError(f"{folder / 'run.toml'}: {missing}")
+    accepted: Accepted = {}
+    if (folder / ACCEPTED).is_file():
+        accepted = _read(folder / ACCEPTED, Accepted)
+        try:
+            check_accepted(accepted, run)
+        except CaseError as error:
+            raise CaseError(f"{folder / ACCEPTED}: {error}") from None
     provenance_file, readme = folder / "provenance.toml", folder / "README.md"
     return Case(
         name=f"{folder.parent.name}/{folder.name}",
@@ -90,13 +101,14 @@ def load_case(folder: Path) -> Case:
         run=run,
         provenance=_read(provenance_file, Provenance) if provenance_file.is_file() else None,
         readme=readme.read_text(encoding="utf-8") if readme.is_file() else "",
+        accepted=accepted,
     )
 
 
 def _read(file: Path, kind: type[T]) -> T:
     try:
-        return msgspec.convert(tomllib.loads(file.read_text(encoding="utf-8")), kind)
-    except (tomllib.TOMLDecodeError, msgspec.ValidationError) as error:
+        return to_struct(tomllib.loads(file.read_text(encoding="utf-8")), kind, str(file))
+    except (tomllib.TOMLDecodeError, SceneError) as error:
         raise CaseError(f"{file}: {error}") from None
     except OSError as error:
         raise CaseError(f"{file}: {error.strerror}") from None

@@ -90,7 +90,14 @@ def plan(
         jobs.append(_job(case, run, variant, f"control:{control.name}", control.a.engine, scene, error, provider))
     limit = time_limit_s or case.run.time_limit_s or TIME_LIMIT_S
     jobs = [replace(job, time_limit_s=limit) for job in jobs]
-    record = CaseRecord(case=case.name, run=run, provenance=case.provenance, readme=case.readme, variants=infos)
+    record = CaseRecord(
+        case=case.name,
+        run=run,
+        provenance=case.provenance,
+        readme=case.readme,
+        variants=infos,
+        accepted=case.accepted,
+    )
     return record, jobs
 
 
@@ -202,7 +209,7 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
     """Engines whose result of this variant is compared with another variant: there its discretisation matters."""
-    crossing = [item for item in run.comparisons if item.a.variant != item.b.variant]
+    crossing = [item for item in (*run.comparisons, *run.controls) if item.a.variant != item.b.variant]
     found = {side.engine for item in crossing for side in (item.a, item.b) if side.variant == variant.name}
     return tuple(engine for engine in variant.engines if engine in found)
 

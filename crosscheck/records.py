@@ -20,6 +20,7 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from crosscheck.accepted import Accepted
 from crosscheck.case import Provenance, RunFile
 from crosscheck.drawing import Drawing
 
@@ -58,13 +59,15 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CaseRecord(_Strict, frozen=True, kw_only=True, tag="case"):
-    """A case as it was run: its run file reduced to the engines asked for, provenance, README, and variants."""
+    """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, and the
+    figures accepted for it."""
 
     case: str
     run: RunFile
     provenance: Provenance | None
     readme: str
     variants: dict[str, VariantInfo]
+    accepted: Accepted = {}
 
 
 class Packed(msgspec.Struct, frozen=True, kw_only=True):

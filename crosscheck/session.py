@@ -18,11 +18,11 @@ def standing(records: Sequence[Record]) -> list[Record]:
     """
     asked: dict[str, int] = {}  # where each case was last asked for, if what stands is confirmed there
     confirmed: set[tuple[str, ...]] = set()
-    confirms = False
+    begin, confirms = 0, False
     for place, record in enumerate(records):
         if isinstance(record, Environment):
-            confirms = record.confirms
-        elif isinstance(record, CaseRecord):
+            begin, confirms = place, record.confirms
+        elif isinstance(record, CaseRecord) and asked.get(record.case, -1) < begin:  # a later one asks for nothing new
             asked[record.case] = place if confirms else 0
             confirmed = {each for each in confirmed if each[0] != record.case}
         elif isinstance(record, Confirmed):

@@ -22,12 +22,16 @@ U = 3 max(d_12, d_23) again.
 eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
 size is that of the largest signal of the same family (all hinge torques, all positions): a backward-stable solve leaves
 errors relative to the norm of everything it solves for.
+
+Estimating is total: whatever is no ladder of finite runs at falling efforts gives an infinite U with the reason, and a
+comparison with it is unresolved.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,6 +46,7 @@ UNPROVEN_SAFETY = 3.0
 ORDER_BAND = 0.1
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
+LARGEST_RATIO = 1e6  # of two steps: an order seen across more is seen nowhere
 
 
 @dataclass(frozen=True)
@@ -62,23 +67,55 @@ class Rung:
     values: Array
 
 
+def unknown(samples: int, why: str) -> Uncertainty:
+    """An infinite U: nothing is known, for the reason `why`."""
+    return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
+
+
 def estimate(channel: str, kind: str, rungs: Sequence[Rung], evaluations: int, size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
     `size` is the magnitude of the signal's family, `evaluations` the number of right-hand sides (0 if not counted).
+    Never raises: U is infinite where the rungs say nothing.
     """
+    samples = len(rungs[-1].values) if rungs else 0
+    fault = _fault(kind, rungs, evaluations, size)
+    if fault:
+        return unknown(samples, fault)
     finest = rungs[-1].values
-    floor = roundoff_floor(size, max(evaluations, len(finest)))
-    if len(rungs) < 2:
-        unknown = np.full(len(finest), np.inf)
-        return Uncertainty(unknown, float("inf"), "unknown: fewer than two efforts finished with different results")
+    floor = roundoff_floor(size, max(evaluations, samples))
     gap = distance(channel, rungs[-2].values, finest)
     if len(rungs) == 2:
-        envelope = np.maximum.accumulate(UNPROVEN_SAFETY * gap) + floor
-        return Uncertainty(envelope, float(envelope[-1]), "3 x the difference of the only two efforts")
+        return _enveloped(UNPROVEN_SAFETY, gap, floor, "3 x the difference of the only two efforts", None)
     wider = distance(channel, rungs[-3].values, rungs[-2].values)
     factor, gap, how, order = _bound(kind, [rung.effort for rung in rungs[-3:]], wider, gap)
-    envelope = np.maximum.accumulate(factor * gap) + floor
+    return _enveloped(factor, gap, floor, how, order)
+
+
+def _fault(kind: str, rungs: Sequence[Rung], evaluations: int, size: float) -> str:
+    """Why nothing can be said from such runs; "" if something can."""
+    if len(rungs) < 2:
+        return "fewer than two efforts finished with different results"
+    if kind not in ("step", "tolerance"):
+        return f'efforts of kind "{kind}" have no order'
+    efforts = [rung.effort for rung in rungs]
+    if not all(0.0 < fine < coarse < np.inf for coarse, fine in pairwise(efforts)):
+        return f"the efforts {', '.join(f'{effort:g}' for effort in efforts)} do not fall to a positive number"
+    if any(rung.values.shape != rungs[-1].values.shape for rung in rungs) or rungs[-1].values.size == 0:
+        return "the efforts have results of different shapes, or empty ones"
+    if not all(np.all(np.isfinite(rung.values)) for rung in rungs):
+        return "an effort has values that are not numbers"
+    if not (0 <= evaluations < np.inf and 0.0 <= size < np.inf):
+        return f"{evaluations} evaluations of a signal of size {size:g} leave no round-off to be told"
+    return ""
+
+
+def _enveloped(factor: float, gap: Array, floor: float, how: str, order: float | None) -> Uncertainty:
+    """U that never falls over time, above the round-off."""
+    with np.errstate(over="ignore"):
+        envelope = np.maximum.accumulate(factor * gap) + floor
+    if not np.all(np.isfinite(envelope)):
+        return unknown(len(envelope), "the runs are so far apart that their distance is no number")
     return Uncertainty(envelope, float(envelope[-1]), how, order)
 
 
@@ -90,23 +127,32 @@ def roundoff_floor(size: float, evaluations: int) -> float:
 def spatial(channel: str, coarse: Array, fine: Array, ratio: float, order: float) -> Array:
     """U (T,) of a spatial discretisation, for its *coarse* result: f_c - f = (f_c - f_f) r^p / (r^p - 1), safety 1.25.
 
-    `order` is the known order p of the discretisation and `ratio` r its refinement.
+    `order` is the known order p of the discretisation and `ratio` r its refinement. Infinite where they say nothing:
+    results of different shapes or with values that are no numbers, a ratio that is none, no order.
     """
-    gain = ratio**order
-    return np.maximum.accumulate(SAFETY * gain / (gain - 1.0) * distance(channel, coarse, fine))
+    samples = len(coarse)
+    comparable = coarse.shape == fine.shape and coarse.size > 0 and np.all(np.isfinite((coarse, fine)))
+    if not (comparable and 1.0 < ratio < np.inf and 0.0 < order < np.inf):
+        return np.full(samples, np.inf)
+    with np.errstate(all="ignore"):
+        left = -np.expm1(-order * np.log(ratio))  # 1 - r^-p, which no r^p can overflow
+        found = np.maximum.accumulate(SAFETY / left * distance(channel, coarse, fine))
+    return found if np.all(np.isfinite(found)) else np.full(samples, np.inf)
 
 
 def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | None:
     """Order p from three steps and the two differences; None where there is none between 0 and LARGEST_ORDER."""
-    if gap <= 0.0 or wider <= 0.0:
+    if not all(0.0 < number < np.inf for number in (*steps, wider, gap)):
         return None
     first, second = steps[0] / steps[1], steps[1] / steps[2]
+    if not (1.0 < first <= LARGEST_RATIO and 1.0 < second <= LARGEST_RATIO):
+        return None
 
     def mismatch(order: float) -> float:
-        return second**order * (first**order - 1.0) / (second**order - 1.0) - wider / gap
+        return float(np.expm1(order * np.log(first)) / -np.expm1(-order * np.log(second))) - wider / gap
 
     low, high = 1e-3, LARGEST_ORDER
-    if mismatch(low) * mismatch(high) > 0.0:
+    if not mismatch(low) < 0.0 < mismatch(high) < np.inf:
         return None
     return float(brentq(mismatch, low, high))
 
@@ -127,4 +173,4 @@ def _bound(kind: str, efforts: Sequence[float], wider: Array, gap: Array) -> tup
         how = f"difference of the two finest steps, as order {order:.2f} is not whole"
         return SAFETY / (ratio - 1.0), gap, how, order
     credited = min(order, ORDER_CREDIT)
-    return SAFETY / (ratio**credited - 1.0), gap, f"Richardson, observed order {order:.2f}", order
+    return SAFETY / float(np.expm1(credited * np.log(ratio))), gap, f"Richardson, observed order {order:.2f}", order

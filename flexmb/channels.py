@@ -109,17 +109,33 @@ def distance(channel: str, a: Array, b: Array) -> Array:
 
     Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles.
     """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _distance(channel, a, b)
+
+
+def _distance(channel: str, a: Array, b: Array) -> Array:
     if channel.endswith(".orientation"):
-        chord = np.minimum(np.linalg.norm(a - b, axis=1), np.linalg.norm(a + b, axis=1))
+        chord = np.minimum(norms(a - b), norms(a + b))
         return 4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
-    return np.linalg.norm(a - b, axis=1)
+    return norms(a - b)
+
+
+def norms(rows: Array) -> Array:
+    """Euclidean norm of each row, (T,), neither lost below nor beyond the range of the numbers it is squared in.
+
+    Rows are scaled by powers of two, which rounds nothing. What is not finite stays so.
+    """
+    largest = np.max(np.abs(rows), axis=1, initial=0.0)
+    exponent = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.ldexp(np.linalg.norm(np.ldexp(rows, -exponent[:, None]), axis=1), exponent)
 
 
 def magnitude(channel: str, values: Array) -> float:
     """Largest size of the signal itself, to which round-off is proportional (rad for orientations: half a turn)."""
     if channel.endswith(".orientation"):
         return float(np.pi)
-    return float(np.max(np.linalg.norm(values, axis=1), initial=0.0))
+    return float(np.max(norms(values), initial=0.0))
 
 
 def signal_range(channel: str, values: Array) -> float:

@@ -15,10 +15,15 @@ __all__ = ["Choice", "Outcome", "write_all"]
 Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
 
-def write_all(records: Path, out: Path, chosen: Choice = standing) -> tuple[Outcome, Path]:
-    """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path."""
+def write_all(
+    records: Path, out: Path, strict: bool = False, chosen: Choice = standing
+) -> tuple[Outcome, Path]:
+    """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
+
+    `strict`: what is worse than recorded, or not recorded, is not as expected.
+    """
     session = collect(chosen(read(records)))
-    outcome = conclude(session)
+    outcome = conclude(session, strict)
     out.mkdir(parents=True, exist_ok=True)
     write_verdicts(outcome, out / "verdicts.json")
     write_summary(outcome, out / "summary.md")

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.judge import energy_drift
+from crosscheck.judge import drift_of
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.results import CaseResults, Result
@@ -154,7 +154,7 @@ def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
             channel = {"energy": "energy.total"}.get(item.quantity, f"momentum.{item.quantity.partition('_')[0]}")
             if channel not in result.channels:
                 continue
-            drift, scale = _drift(result, channel)
+            drift, scale = drift_of(result, channel)
             size = item.scale if item.scale is not None else scale
             if size > 0.0:
                 values = store.peaks(np.abs(drift) / size)
@@ -163,13 +163,6 @@ def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
             title = f"{item.quantity.replace('_', ' ').capitalize()}, {item.variant}"
             found.append({"title": title, "limit": item.limit, "curves": curves})
     return found
-
-
-def _drift(result: Result, channel: str) -> tuple[Array, float]:
-    if channel == "energy.total":
-        return energy_drift(result)
-    values = result.values(channel)
-    return np.linalg.norm(values - values[0], axis=1), float(np.max(np.linalg.norm(values, axis=1)))
 
 
 def _work(chart: WorkPrecision) -> dict[str, Any]:

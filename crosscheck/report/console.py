@@ -11,8 +11,8 @@ from rich.table import Column, Table
 from crosscheck.engine_list import EngineState
 from crosscheck.library import Case
 from crosscheck.report.outcome import Outcome
-from crosscheck.report.summary import STATUSES, pair
-from crosscheck.verdict import Verdict
+from crosscheck.report.summary import pair
+from crosscheck.verdict import STATUSES, Verdict
 
 SHOWN = 20
 
@@ -30,6 +30,13 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
     for each in outcome.not_run:
         where = f"{each.case}, {each.variant}, {each.engine}"
         console.print(f"[yellow]–[/yellow] {escape(where)} did not run: {escape(each.reason)}", soft_wrap=True)
+    for verdict in outcome.worse[:SHOWN]:
+        where = f"{verdict.case}, {verdict.comparison}, {pair(verdict)}, {verdict.channel}"
+        text = f"[yellow]![/yellow] {escape(where)} worse than recorded: {escape(verdict.worse)}"
+        console.print(text, highlight=False, soft_wrap=True)
+    for verdict in outcome.unrecorded[:SHOWN] if outcome.strict else ():
+        where = f"{verdict.case}, {verdict.comparison}, {pair(verdict)}, {verdict.channel}"
+        console.print(f"[yellow]![/yellow] {escape(where)} has no accepted figures", highlight=False, soft_wrap=True)
     colour = "green" if outcome.ok else "red"
     console.print(f"[bold {colour}]{outcome.headline}[/bold {colour}]")
     return 0 if outcome.ok else 1
@@ -71,11 +78,13 @@ def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]
 
 def cases_table(cases: Iterable[Case]) -> Table:
     """The case library."""
-    table = Table("case", "title", "tags", "variants", "engines", header_style="bold")
+    table = Table("case", "title", "tags", "variants", "engines", "accepted figures", header_style="bold")
     for case in cases:
         engines = dict.fromkeys(name for each in case.run.variants for name in (*each.engines, *each.also))
         variants = ", ".join(variant.name for variant in case.run.variants)
-        table.add_row(case.name, case.run.title, ", ".join(case.run.tags), variants, ", ".join(engines))
+        figures = sum(len(each) for each in case.accepted.values())
+        tags = ", ".join(case.run.tags)
+        table.add_row(case.name, case.run.title, tags, variants, ", ".join(engines), str(figures or "none"))
     return table
 
 

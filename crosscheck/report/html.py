@@ -15,6 +15,7 @@ from crosscheck.report.charts import payload
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.views import comparison_tables, conservation_table, control_table, overview
 from crosscheck.results import CaseResults, Session
+from crosscheck.verdict import STATUSES
 
 
 def write_report(session: Session, outcome: Outcome, file: Path) -> None:
@@ -32,6 +33,7 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
     page = templates.get_template("report.html.j2").render(
         outcome=outcome,
         counts=outcome.counts(),
+        statuses=STATUSES,
         controls=outcome.controls(),
         overview=overview(outcome.verdicts),
         cases=[_case_view(number, case, outcome) for number, case in enumerate(session.cases)],

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import msgspec
 
+from crosscheck.accepted import recordable
+from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judge import judge
 from crosscheck.results import CaseResults, Session
 from crosscheck.verdict import Verdict
-
-NOT_GREEN = ("did not run", "refused", "failed", "crashed", "did not finish")
 
 
 @dataclass(frozen=True)
@@ -29,10 +29,12 @@ class Absence:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All verdicts of a session, by case; all absences."""
+    """All verdicts of a session, by case; all absences. `strict`: figures worse than recorded, or of which none are
+    recorded, are not as expected."""
 
     verdicts: dict[str, list[Verdict]]
     absences: list[Absence]
+    strict: bool = False
 
     @property
     def all(self) -> list[Verdict]:
@@ -45,6 +47,16 @@ class Outcome:
         return [verdict for verdict in self.all if not verdict.ok]
 
     @property
+    def worse(self) -> list[Verdict]:
+        """Verdicts as expected, whose E or U has grown beyond what was accepted."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.worse]
+
+    @property
+    def unrecorded(self) -> list[Verdict]:
+        """Verdicts as expected between the library's own engines, for which no figures were accepted yet."""
+        return [each for each in self.all if each.ok and each.accepted is None and recordable(each, BUILT_IN)]
+
+    @property
     def not_run(self) -> list[Absence]:
         """What was asked for and did not run at all."""
         return [absence for absence in self.absences if absence.status == "did not run"]
@@ -52,7 +64,8 @@ class Outcome:
     @property
     def ok(self) -> bool:
         """Every verdict is the expected one, everything asked for ran, and there was something to judge."""
-        return bool(self.all) and not self.unexpected and not self.not_run
+        sound = bool(self.all) and not self.unexpected and not self.not_run
+        return sound and not (self.strict and (self.worse or self.unrecorded))
 
     @property
     def headline(self) -> str:
@@ -60,13 +73,18 @@ class Outcome:
         if not self.all:
             return "Nothing was compared"
         if self.ok:
-            return f"All {len(self.all)} verdicts are as expected"
+            grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
+            return f"All {len(self.all)} verdicts are as expected{grown}"
         parts = []
         if self.unexpected:
             parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
         if self.not_run:
             runs = "run" if len(self.not_run) == 1 else "runs"
             parts.append(f"{len(self.not_run)} {runs} asked for did not happen")
+        if self.worse:
+            parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
+        if self.strict and self.unrecorded:
+            parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
         return " and ".join(parts)
 
     def counts(self) -> Counter[str]:
@@ -79,11 +97,12 @@ class Outcome:
         return sum(noticed), len(noticed)
 
 
-def conclude(session: Session) -> Outcome:
+def conclude(session: Session, strict: bool = False) -> Outcome:
     """Judge every case of a session."""
     return Outcome(
         verdicts={case.case.case: judge(case) for case in session.cases},
         absences=[absence for case in session.cases for absence in _absences(case)],
+        strict=strict,
     )
 
 
@@ -101,6 +120,6 @@ def _absences(case: CaseResults) -> list[Absence]:
     found = []
     for variant, engine, role in wanted:
         result = case.get(variant, engine, role)
-        if result.status in NOT_GREEN:
+        if result.status != "finished":
             found.append(Absence(case.case.case, variant, engine, role, result.status, result.message))
     return found

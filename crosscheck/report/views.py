@@ -6,14 +6,23 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from crosscheck.report.summary import pair
-from crosscheck.verdict import Verdict
+from crosscheck.verdict import Status, Verdict
 from flexmb.channels import family
 
-SYMBOLS = {
-    "agree": "✓", "differ": "≠", "unresolved": "?", "refused": "⊘", "failed": "✕", "crashed": "✕",
-    "did not finish": "✕", "did not run": "–",
-}  # fmt: skip
-GRAVITY = ("did not run", "crashed", "did not finish", "failed", "refused", "differ", "unresolved", "agree")
+SYMBOLS: dict[Status, str] = {
+    "agree": "✓",
+    "differ": "≠",
+    "unresolved": "?",
+    "refused": "⊘",
+    "diverged": "↗",
+    "failed": "✕",
+    "did not finish": "⧖",
+    "crashed": "☠",
+    "did not run": "–",
+}
+GRAVITY: tuple[Status, ...] = (
+    "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
+)  # fmt: skip
 FAMILIES = {
     "marker.position": "Marker positions",
     "marker.orientation": "Marker orientations",
@@ -160,9 +169,22 @@ def _cell(group: list[Verdict]) -> Cell:
         text += f" {alike}" if alike == len(group) else f" {alike} of {len(group)}"
     if worst.expected != "agree" and worst.kind != "control":
         text += " (expected)" if worst.ok else f" (expected {worst.expected})"
-    shown = bad or [verdict for verdict in group if verdict.status == worst.status]
-    reasons = tuple(f"{verdict.channel}, {pair(verdict)}: {verdict.reason}" for verdict in shown[:12])
+    grown = [verdict for verdict in group if verdict.ok and verdict.worse]
+    if grown:
+        text += ", worse than recorded" if len(grown) == len(group) else f", {len(grown)} worse than recorded"
+    shown = bad or grown or [verdict for verdict in group if verdict.status == worst.status]
+    reasons = tuple(f"{verdict.channel}, {pair(verdict)}: {_reason(verdict)}" for verdict in shown[:12])
     return Cell(worst.status, look, text, _numbers(worst), reasons)
+
+
+def _reason(verdict: Verdict) -> str:
+    """Why, and what was accepted."""
+    if verdict.worse:
+        return f"{verdict.reason}; worse than recorded: {verdict.worse}"
+    if verdict.accepted is None:
+        return verdict.reason
+    doubt = f", U {verdict.accepted.U:.1e}" if verdict.accepted.U else ""
+    return f"{verdict.reason} (accepted: E {verdict.accepted.E:.1e}{doubt})"
 
 
 def _numbers(verdict: Verdict) -> str:

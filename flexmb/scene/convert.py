@@ -11,7 +11,7 @@ from msgspec import inspect
 from flexmb.scene.problems import Place, Problem, SceneError, closest
 from flexmb.scene.units import split_unit
 
-Struct = TypeVar("Struct", bound=msgspec.Struct)
+Struct = TypeVar("Struct")
 
 ROOT = Place()
 KINDS = {
@@ -54,7 +54,7 @@ def _name_of(data: Any) -> str:
     return str(data.get("name", "")) if isinstance(data, dict) else ""
 
 
-def _explain(message: str, data: Any, kind: type[msgspec.Struct], place: Place) -> Problem:
+def _explain(message: str, data: Any, kind: Any, place: Place) -> Problem:
     """One msgspec message ("what - at `$.path`") as a Problem."""
     what, _, path = message.partition(" - at ")
     steps: list[str | int] = [
@@ -104,7 +104,7 @@ def _remedy(what: str, place: Place, value: Any, node: inspect.Type) -> str:
         return closest(word, map(str, node.values))
     key = place.path.rpartition(".")[2].partition("[")[0]
     unit = split_unit(key)[1]
-    return f"give {key} {'in ' + unit + ' ' if unit else ''}as the reference table of the scene file says"
+    return f"give {key} {'in ' + unit + ' ' if unit else ''}as the reference of its file says"
 
 
 def _tags(node: inspect.Type) -> str:

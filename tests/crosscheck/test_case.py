@@ -10,7 +10,8 @@ import msgspec
 import pytest
 
 from crosscheck import case as case_module
-from crosscheck.case import CaseError, Comparison, Refined, RunFile, Side, Variant, check_run_file
+from crosscheck.case import CaseError, Comparison, Refined, RunFile, Side, Variant
+from crosscheck.case_check import check_run_file
 from crosscheck.library import load_case, resolve
 from crosscheck.plan import refine, variant_scene
 from crosscheck.selection import select
@@ -40,13 +41,13 @@ def test_the_documented_example_is_valid() -> None:
         ('reason = "above the critical speed the unstiffened body diverges"', "", "needs a reason"),
         ("segments = 16", "", r"\$.variant\[2\].segments"),
         ('transform = "segments"', "", r"\$.variant\[2\].segments"),
-        ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments: give it exactly"),
-        ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces: give it exactly"),
+        ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments .*: give it exactly"),
+        ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces .*: give it exactly"),
         ("refined = { segments = 32 }", "refined = { pieces = 32 }", r"\$.variant\[2\].refined.pieces"),
         ('scene = "flexible.toml"', "eigenmodes = 1", r"\$.variant\[1\].eigenmodes"),
         ('scene = "flexible.toml"', 'split_body = "a"', r"\$.variant\[1\].split_body"),
         ('engines = ["native"]', "engines = []", "name at least one engine"),
-        ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also: native is among the engines already"),
+        ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also .*: native is among"),
         ('name = "full"', 'name = "rigid"', "two variants have the same name"),
         ('reference = "rigid"', 'reference = "stiff"', 'no variant "stiff"'),
         ("duration_s = 10.0", "duration_s = 0.0", "needs a duration"),
@@ -103,7 +104,7 @@ def test_all_pairs_and_selections_of_engines() -> None:
     run = example()
     everything = pairs(select(run, ()))
     assert ("mujoco", "exudyn") in everything
-    assert len(select(run, ()).comparisons) == 6 + 1
+    assert len(select(run, ()).comparisons) == 6 + 2
     assert pairs(select(run, ("native", "mujoco"))) == {("native", "mujoco")}
     alone = select(run, ("mujoco",))
     assert pairs(alone) == {pair for pair in everything if "mujoco" in pair}

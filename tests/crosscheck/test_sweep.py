@@ -88,7 +88,7 @@ def test_efforts_without_effect_leave_the_uncertainty_unknown(tmp_path) -> None:
         ("refuser", "refused", "revolute hinges are beyond it"),
         ("crasher", "crashed", "exit code 139"),
         ("raiser", "failed", "RuntimeError: the solver gave up on purpose"),
-        ("diverger", "failed", "diverged at t = 0.9 s: the step fell below"),
+        ("diverger", "diverged", "diverged at t = 0.9 s: the step fell below"),
     ],
 )
 def test_an_engine_that_gives_no_result_is_never_green(faulty: Outcome, engine: str, status: str, words: str) -> None:
@@ -100,7 +100,7 @@ def test_an_engine_that_gives_no_result_is_never_green(faulty: Outcome, engine: 
     assert absence.status == status
 
 
-def test_an_expected_failure_is_as_expected(tmp_path) -> None:
+def test_an_expected_divergence_is_as_expected(tmp_path) -> None:
     run_file = """
 [[variant]]
 name = "rigid"
@@ -110,12 +110,13 @@ engines = ["fine", "diverger"]
 name = "beyond the diverging engine"
 variant = "rigid"
 goals = { "marker:tip.position" = 1e-6 }
-expect = "failed"
+expect = "diverged"
+diverged_s = [0.8, 1.0]
 reason = "it gives up half way"
 """
     outcome = run_case(copy_case(tmp_path, run_file), tmp_path / "records.jsonl")
     assert outcome.ok
-    assert [verdict.status for verdict in outcome.all] == ["failed"]
+    assert [verdict.status for verdict in outcome.all] == ["diverged"]
 
 
 def test_a_channel_that_nobody_has_did_not_run(tmp_path) -> None:

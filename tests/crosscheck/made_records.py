@@ -1,0 +1,91 @@
+"""Records made by hand: what engines might have left behind, judged without running any."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterable
+
+import msgspec
+import numpy as np
+from numpy.typing import NDArray
+
+from crosscheck.accepted import Accepted
+from crosscheck.case import RunFile
+from crosscheck.records import CaseRecord, RunRecord, VariantInfo, pack
+from crosscheck.report.outcome import Outcome, conclude
+from crosscheck.results import collect
+from crosscheck.selection import select
+from crosscheck.verdict import Verdict
+
+Array = NDArray[np.float64]
+TIMES = np.linspace(0.0, 1.0, 11)
+TIP = "marker:tip.position"
+HEAD = 'title = "made"\nduration_s = 1.0\nsamples = 11\n'
+ONE_PAIR = """
+[[variant]]
+name = "rigid"
+engines = ["one", "two"]
+
+[[comparison]]
+name = "both"
+variant = "rigid"
+goals = { "marker:tip.position" = 1e-3 }
+"""
+
+
+def run_file(text: str) -> RunFile:
+    return msgspec.convert(tomllib.loads(HEAD + text), RunFile)
+
+
+def way(height: float = 1.0, axis: int = 0) -> Array:
+    """A signal (T, 3): up and down again along one axis, so that the last sample is where the first was."""
+    values = np.zeros((len(TIMES), 3))
+    values[:, axis] = height * np.sin(np.pi * TIMES)
+    values[-1] = 0.0
+    return values
+
+
+def ladder(
+    engine: str, signals: dict[str, Array], *, spread: float = 1e-6, variant: str = "rigid", role: str = "main"
+) -> list[RunRecord]:
+    """Three tolerances of an engine that converge to the signals: off by 100, 10 and 1 times `spread` of them."""
+    return [
+        RunRecord(
+            case="made/made",
+            variant=variant,
+            role=role,
+            engine=engine,
+            version="1",
+            scene="s",
+            status="finished",
+            effort=f"rtol={rung}",
+            effort_kind="tolerance",
+            effort_method="m",
+            effort_value=10.0 ** -(rung + 6),
+            rung=rung,
+            rungs=3,
+            evaluations=100 * (rung + 1),
+            times=pack(TIMES),
+            channels={name: pack(values * (1.0 + spread * 10.0 ** (2 - rung))) for name, values in signals.items()},
+        )
+        for rung in range(3)
+    ]
+
+
+def ended(run: RunRecord, status: str, message: str = "for a reason", **changes: object) -> RunRecord:
+    """The run as one that ended otherwise."""
+    return msgspec.structs.replace(run, status=status, message=message, **changes)
+
+
+def judged(text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False) -> Outcome:
+    """The outcome of a session that left these runs."""
+    run = select(run_file(text), ())
+    infos = {variant.name: VariantInfo(level="rigid", drawing=None) for variant in run.variants}
+    case = CaseRecord(case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {})
+    return conclude(collect([case, *runs]), strict)
+
+
+def single(outcome: Outcome) -> Verdict:
+    """The only verdict."""
+    (verdict,) = outcome.all
+    return verdict
