@@ -31,6 +31,8 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
     for each in outcome.not_run:
         where = f"{each.case}, {each.variant}, {each.engine}"
         console.print(f"[yellow]–[/yellow] {escape(where)} did not run: {escape(each.reason)}", soft_wrap=True)
+    for line in outcome.broken[:SHOWN]:
+        console.print(f"[red]✕[/red] {escape(line)}", highlight=False, soft_wrap=True)
     colour = "green" if outcome.ok else "red"
     console.print(f"[bold {colour}]{outcome.headline}[/bold {colour}]")
     return 0 if outcome.ok else 1

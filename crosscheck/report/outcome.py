@@ -29,10 +29,11 @@ class Absence:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All verdicts of a session, by case; all absences."""
+    """All verdicts of a session, by case; all absences; lines of the records that are none, in words."""
 
     verdicts: dict[str, list[Verdict]]
     absences: list[Absence]
+    broken: tuple[str, ...] = ()
 
     @property
     def all(self) -> list[Verdict]:
@@ -51,14 +52,14 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Every verdict is the expected one, everything asked for ran, and there was something to judge."""
-        return bool(self.all) and not self.unexpected and not self.not_run
+        """Every verdict is the expected one, everything asked for ran, nothing is lost, and there was something."""
+        return bool(self.all) and not self.unexpected and not self.not_run and not self.broken
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
         if not self.all:
-            return "Nothing was compared"
+            return "Nothing was compared" + (f": {self._lost}" if self.broken else "")
         if self.ok:
             return f"All {len(self.all)} verdicts are as expected"
         parts = []
@@ -67,7 +68,13 @@ class Outcome:
         if self.not_run:
             runs = "run" if len(self.not_run) == 1 else "runs"
             parts.append(f"{len(self.not_run)} {runs} asked for did not happen")
+        if self.broken:
+            parts.append(self._lost)
         return " and ".join(parts)
+
+    @property
+    def _lost(self) -> str:
+        return f"{len(self.broken)} line{' is' if len(self.broken) == 1 else 's are'} no record: what stood there is lost"
 
     def counts(self) -> Counter[str]:
         """Number of verdicts of each status, controls apart: there *differ* is the good news."""
@@ -84,6 +91,7 @@ def conclude(session: Session) -> Outcome:
     return Outcome(
         verdicts={case.case.case: judge(case) for case in session.cases},
         absences=[absence for case in session.cases for absence in _absences(case)],
+        broken=tuple(str(line) for line in session.broken),
     )
 
 

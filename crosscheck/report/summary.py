@@ -32,6 +32,8 @@ def write_summary(outcome: Outcome, file: Path) -> None:
         for each in outcome.absences:
             what = f"**{each.status}** {each.case}, {each.variant}, {each.engine}"
             lines.append(f"- {what}{_role(each.role)}: {_flat(each.reason)}")
+    if outcome.broken:
+        lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -49,6 +51,12 @@ def write_junit(outcome: Outcome, file: Path) -> None:
         suite.set("tests", str(len(tests) + len(missing)))
         suite.set("failures", str(tests.count("failure") + len(missing)))
         suite.set("skipped", str(tests.count("skipped")))
+    if outcome.broken:
+        count = str(len(outcome.broken))
+        suite = ElementTree.SubElement(suites, "testsuite", name="records", tests=count, failures=count)
+        for line in outcome.broken:
+            test = ElementTree.SubElement(suite, "testcase", classname="records", name="the line is a record")
+            ElementTree.SubElement(test, "failure", type="broken", message=line)
     if not outcome.all:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
         test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
