@@ -137,7 +137,7 @@ def pack(values: Array) -> Packed:
 
 
 def unpack(packed: Packed) -> Array:
-    """Text -> array; exact. ValueError where shape and data do not belong together; never more memory than the shape."""
+    """Text -> array; exact. ValueError where the data are not the shape's; takes no more memory than the shape says."""
     size = packed_bytes(packed)
     unpacker = zlib.decompressobj()
     try:
@@ -214,13 +214,12 @@ def decoded_lines(file: Path, kind: Any) -> list[Any]:
 
 def _lines(stream: BinaryIO) -> Iterator[bytes]:
     """Whole lines with their ends; of a line beyond LONGEST_LINE only its beginning, which is no record."""
-    pieces = 0
+    begun = b""
     while piece := stream.readline(LONGEST_LINE):
-        first = piece if pieces == 0 else first[:80]
-        pieces += 1
+        begun = begun[:80] or piece
         if piece.endswith(b"\n"):
-            yield first
-            pieces = 0
+            yield begun
+            begun = b""
 
 
 def _checked(record: Any, limit: int) -> int:
@@ -229,14 +228,16 @@ def _checked(record: Any, limit: int) -> int:
         check_run_file(record.run)
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
             raise ValueError("its variants are not those of its run file")
+        if any(comparison.a is None or comparison.b is None for comparison in record.run.comparisons):
+            raise ValueError("a comparison does not name its two sides")
     if not isinstance(record, RunRecord):
         return 0
-    if record.effort and not (0 <= record.rung < record.rungs and 0.0 < record.effort_value < math.inf):
+    if not (0 <= record.rung <= max(record.rungs - 1, 0) and 0.0 <= record.effort_value < math.inf):
         raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
     arrays = [*record.channels.values(), *([] if record.times is None else [record.times])]
     size = sum(packed_bytes(packed) for packed in arrays)
     if size > limit:
-        raise ValueError(f"its arrays would take {size / MIB:.3g} MiB of memory, more than a file of this size can hold")
+        raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
     _check_shapes(record)
     for packed in arrays:
         unpack(packed)
@@ -256,7 +257,7 @@ def _check_shapes(record: RunRecord) -> None:
 
 
 def _set_broken_lines_aside(file: Path, kind: Any) -> None:
-    """Leave only whole records in a file that is to be appended to; move broken lines to `<file>.broken`, with a warning.
+    """Leave only whole records in a file to append to; broken lines move to `<file>.broken`, with a warning.
 
     The end of a run that was killed is no loss to speak of: it is cut off without a word.
     """

@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Column, Table
+from rich.text import Text
 
 from crosscheck.engine_list import EngineState
 from crosscheck.library import Case
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.summary import pair
 from crosscheck.verdict import Verdict
+from flexmb.printable import printable
 
 STATUSES = ("agree", "differ", "unresolved", "refused", "failed", "did not run")
 SHOWN = 20
@@ -27,15 +28,25 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {pair(worst)}, {channels}"
         text = f"{worst.status}, expected {worst.expected}: {worst.reason}"
-        console.print(f"[red]✕[/red] {escape(where)}: {escape(text)}", highlight=False, soft_wrap=True)
+        console.print(marked("✕", "red", f"{where}: {text}"), soft_wrap=True)
     for each in outcome.not_run:
         where = f"{each.case}, {each.variant}, {each.engine}"
-        console.print(f"[yellow]–[/yellow] {escape(where)} did not run: {escape(each.reason)}", soft_wrap=True)
+        console.print(marked("–", "yellow", f"{where} did not run: {each.reason}"), soft_wrap=True)
     for line in outcome.broken[:SHOWN]:
-        console.print(f"[red]✕[/red] {escape(line)}", highlight=False, soft_wrap=True)
+        console.print(marked("✕", "red", line), soft_wrap=True)
     colour = "green" if outcome.ok else "red"
-    console.print(f"[bold {colour}]{outcome.headline}[/bold {colour}]")
+    console.print(words(outcome.headline, f"bold {colour}"))
     return 0 if outcome.ok else 1
+
+
+def words(text: str, style: str = "") -> Text:
+    """Text as it stands, brackets and colons too: only `Text` is safe from rich's markup and emoji."""
+    return Text(printable(text), style)
+
+
+def marked(mark: str, style: str, text: str) -> Text:
+    """A coloured sign, and text."""
+    return Text.assemble((mark, style), " ", words(text))
 
 
 def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
@@ -51,17 +62,15 @@ def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
         good = sum(verdict.ok for verdict in group)
         colour = "green" if good == len(group) else "red"
         cells = [_count(group, status) for status in occurring]
-        shown = "" if case == previous else escape(case)
-        table.add_row(shown, escape(name), f"[{colour}]{good} of {len(group)}[/{colour}]", *cells)
+        shown = "" if case == previous else case
+        table.add_row(words(shown), words(name), words(f"{good} of {len(group)}", colour), *cells)
         previous = case
     return table
 
 
-def _count(group: list[Verdict], status: str) -> str:
+def _count(group: list[Verdict], status: str) -> Text:
     found = [verdict for verdict in group if verdict.status == status]
-    if not found:
-        return ""
-    return f"[{'green' if all(verdict.ok for verdict in found) else 'red'}]{len(found)}[/]"
+    return words(str(len(found) or ""), "green" if all(verdict.ok for verdict in found) else "red")
 
 
 def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]:
@@ -78,7 +87,8 @@ def cases_table(cases: Iterable[Case]) -> Table:
     for case in cases:
         engines = dict.fromkeys(name for each in case.run.variants for name in (*each.engines, *each.also))
         variants = ", ".join(variant.name for variant in case.run.variants)
-        table.add_row(case.name, case.run.title, ", ".join(case.run.tags), variants, ", ".join(engines))
+        cells = (case.name, case.run.title, ", ".join(case.run.tags), variants, ", ".join(engines))
+        table.add_row(*map(words, cells))
     return table
 
 
@@ -86,8 +96,6 @@ def engines_table(states: Iterable[EngineState]) -> Table:
     """The engines."""
     table = Table(Column("engine", no_wrap=True), "what it is", "version", "how to install", header_style="bold")
     for state in states:
-        version = (
-            "[yellow]not installed[/yellow]" if state.version is None else f"[green]{escape(state.version)}[/green]"
-        )
-        table.add_row(state.name, escape(state.summary), version, escape(state.advice))
+        version = words("not installed", "yellow") if state.version is None else words(state.version, "green")
+        table.add_row(words(state.name), words(state.summary), version, words(state.advice))
     return table

@@ -74,7 +74,8 @@ class Outcome:
 
     @property
     def _lost(self) -> str:
-        return f"{len(self.broken)} line{' is' if len(self.broken) == 1 else 's are'} no record: what stood there is lost"
+        lines = "line is" if len(self.broken) == 1 else "lines are"
+        return f"{len(self.broken)} {lines} no record: what stood there is lost"
 
     def counts(self) -> Counter[str]:
         """Number of verdicts of each status, controls apart: there *differ* is the good news."""

@@ -1,4 +1,4 @@
-"""Named arrays from an `.npz`, believed only as far as its headers are sound: real numbers, bounded before unpacking."""
+"""Named arrays from an `.npz`, believed as far as its headers are sound: real numbers, bounded before unpacking."""
 
 from __future__ import annotations
 
@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 REAL = "fiu"
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 ENCRYPTED = 0x1
+ONE_ARRAY = np.lib.format.MAGIC_PREFIX
 DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, OverflowError, ValueError)
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
@@ -29,6 +30,9 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Array]:
     """
     try:
         left = allowance(regular_size(file))
+        with open(file, "rb") as stream:
+            if stream.read(len(ONE_ARRAY)) == ONE_ARRAY:
+                raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
         found: dict[str, Array] = {}
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():
@@ -40,7 +44,8 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Array]:
     except Unreadable as error:
         raise ValueError(f'"{file}": {error}') from None
     except DAMAGED as error:
-        raise ValueError(f'"{file}" is not an .npz archive of plain arrays ({error}): write it with numpy.savez') from None
+        what = f'"{file}" is not an .npz archive of plain arrays ({error})'
+        raise ValueError(f"{what}: write it with numpy.savez") from None
 
 
 def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str]) -> str:

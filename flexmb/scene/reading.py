@@ -1,4 +1,4 @@
-"""Files that somebody else wrote: regular ones, of a size that can be meant, in UTF-8, nested as deep as people write."""
+"""Files that somebody else wrote: regular ones, of a size that can be meant, in UTF-8, nested as people write."""
 
 from __future__ import annotations
 
@@ -43,13 +43,14 @@ def read_text(path: str | os.PathLike[str], limit: int = TEXT_LIMIT) -> str:
     """Text of a regular file, with any line ends and with or without a byte order mark. OSError, or Unreadable."""
     size = regular_size(path)
     if size > limit:
-        raise Unreadable(f"{size / MIB:.0f} MiB are more than the {limit // MIB} MiB that such a file may have", "divide it")
+        raise Unreadable(f"{size / MIB:.0f} MiB are more than such a file may have, {limit // MIB} MiB", "divide it")
     data = Path(path).read_bytes()
     try:
         text = data.decode("utf-8-sig")
     except UnicodeDecodeError as error:
         line = data.count(b"\n", 0, error.start) + 1
-        raise Unreadable(f"line {line} is not UTF-8 (byte 0x{data[error.start]:02x})", "save the file as UTF-8") from None
+        what = f"line {line} is not UTF-8 (byte 0x{data[error.start]:02x})"
+        raise Unreadable(what, "save the file as UTF-8") from None
     return io.StringIO(text, newline=None).read()
 
 

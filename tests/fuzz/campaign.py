@@ -61,8 +61,9 @@ def _work(folder: Path, seed: int, keep: Path, asked: list[tuple[str, int]]) -> 
 
 def _start(folder: Path, seed: int, keep: Path) -> Any:
     worker = subprocess.Popen(
-        [sys.executable, "-m", "tests.fuzz.worker", str(folder), str(seed), str(keep)], text=True, bufsize=1,
-        cwd=Path(__file__).resolve().parents[2], stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
+        [sys.executable, "-m", "tests.fuzz.worker", str(folder), str(seed), str(keep)],
+        cwd=Path(__file__).resolve().parents[2], text=True, bufsize=1,
+        stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
     )  # fmt: skip
     if not _wait(worker, START_S):
         raise RuntimeError("the worker does not start: run python -m tests.fuzz.worker to see why")

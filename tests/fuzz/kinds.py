@@ -13,7 +13,7 @@ import math
 import tomllib
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +21,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.case import CaseError
+from crosscheck.columns import VerifyError, read_columns
 from crosscheck.execute import execute
 from crosscheck.library import load_case
 from crosscheck.plan import plan
@@ -30,7 +31,6 @@ from crosscheck.stability import records as maps
 from crosscheck.stability.console import read_verdicts
 from crosscheck.stability.judge import MapVerdict
 from crosscheck.stability.map import Axis
-from crosscheck.verify import VerifyError, read_signals
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import dumps, load_scene, loads
 from flexmb.scene.modal_data import modal_arrays
@@ -66,14 +66,16 @@ def kinds(folder: Path) -> dict[str, Kind]:
     grounds = tuple(file.read_bytes() for file in sorted(SHIPPED.glob("*/*/provenance.toml")))
     table = (*mutate.TEXT, mutate.cells, mutate.cells, mutate.cells, mutate.cells, mutate.cells)
     records = (*jsonl, mutate.arrays_of_records, mutate.arrays_of_records)
+    archive = (*mutate.BYTES[:3], *[mutate.members] * 6)
     case = lambda path: _case(path.parent)  # noqa: E731
     return {
-        "scene": Kind("scene.toml", _scenes(), toml, (SceneError,), _scene),
+        "scene": Kind("scene.toml", _scenes(), toml, (SceneError,), _scene, 'scene "'),
         "run file": Kind("run.toml", (run, *runs), toml, (CaseError,), case),
         "provenance": Kind("provenance.toml", grounds, toml, (CaseError,), case),
         "readme": Kind("README.md", ((CASE / "README.md").read_bytes(),), mutate.BYTES, (CaseError,), case),
-        "verify csv": Kind("my.csv", (_csv("t", "tip.p"),), table, (VerifyError,), _csv_file),
-        "npz": Kind("panel.npz", _npz(), (*mutate.BYTES[:3], *[mutate.members] * 6), (SceneError,), _modal, 'body "panel"'),
+        "verify csv": Kind("my.csv", (_csv(),), table, (VerifyError,), _csv_file),
+        "trajectory csv": Kind("trajectory.csv", (_trajectory(),), table, (VerifyError,), _csv_file),
+        "npz": Kind("panel.npz", _npz(), archive, (SceneError,), _modal, 'body "panel"'),
         "records": Kind("records.jsonl", (_records(),), records, (ValueError,), _session),
         "map records": Kind("map.jsonl", (_map(),), jsonl, (ValueError,), _cells),
         "map verdicts": Kind("maps.json", (_verdicts(),), jsonl, (ValueError,), _maps),
@@ -94,10 +96,19 @@ def _scenes() -> tuple[bytes, ...]:
     return (dumps(satellite().scene()).encode(), (CASE / "scene.toml").read_bytes(), *shipped)
 
 
-def _csv(time: str, prefix: str) -> bytes:
-    head = ",".join([time, *(prefix + letter for letter in "xyz"), *(f"elbow.{name}" for name in ("tx", "ty", "tz"))])
-    rows = [",".join(f"{value:.17g}" for value in (t, *np.cos(t + np.arange(6.0)))) for t in TIMES]
-    return "\n".join([head, *rows, ""]).encode()
+def _csv() -> bytes:
+    return _table(["t", *(f"tip.p{letter}" for letter in "xyz"), *(f"elbow.t{letter}" for letter in "xyz")])
+
+
+def _trajectory() -> bytes:
+    torque = [f"elbow.torque.{letter} [N m]" for letter in "xyz"]
+    return _table(["t [s]", *(f"tip.position.{letter} [m]" for letter in "xyz"), *torque, "energy.total [J]"])
+
+
+def _table(names: list[str]) -> bytes:
+    count = len(names) - 1.0
+    rows = [",".join(f"{value:.17g}" for value in (t, *np.cos(t + np.arange(count)))) for t in TIMES]
+    return "\n".join([",".join(names), *rows, ""]).encode()
 
 
 def _npz() -> tuple[bytes, ...]:
@@ -111,7 +122,7 @@ def _npz() -> tuple[bytes, ...]:
 
 def _records() -> bytes:
     case = load_case(CASE)
-    case = type(case)(case.name, case.folder, msgspec.structs.replace(case.run, samples=21), case.provenance, case.readme)
+    case = replace(case, run=msgspec.structs.replace(case.run, samples=21))
     record, jobs = plan(case, (), PROVIDER)
     found: list[Any] = [environment(), record]
     for job in jobs:
@@ -145,7 +156,7 @@ def _scene(path: Path) -> str | None:
     check_scene(scene)
     if loads(dumps(scene)) != scene:
         return "writing and reading changes the scene"
-    data, value = tomllib.loads(path.read_text(encoding="utf-8")), msgspec.to_builtins(scene)
+    data, value = _toml(path), msgspec.to_builtins(scene)
     return _differs(data, value) or _not_finite(value) or _unphysical(value)
 
 
@@ -154,31 +165,36 @@ def _case(folder: Path) -> str | None:
         if not (folder / name).exists() and not (folder / name).is_symlink():
             (folder / name).write_bytes((CASE / name).read_bytes())
     case = load_case(folder)
-    data = tomllib.loads((folder / "run.toml").read_text(encoding="utf-8"))
+    data = _toml(folder / "run.toml")
     value = msgspec.to_builtins(case.run)
     wrong = _differs(data, value) or _not_finite(value) or _unjudgeable(value)
     if case.provenance is None:
         return wrong or "the provenance is there and was not read"
-    ground = tomllib.loads((folder / "provenance.toml").read_text(encoding="utf-8"))
+    ground = _toml(folder / "provenance.toml")
     return wrong or _differs(ground, msgspec.to_builtins(case.provenance))
 
 
+def _toml(path: Path) -> Any:
+    return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+
+
 def _csv_file(path: Path) -> str | None:
-    signals = read_signals(path, TIMES)
+    columns = read_columns(path, TIMES)
     head, *rows = csv.reader(io.StringIO(path.read_text(encoding="utf-8-sig")))
     names = [name.strip() for name in head]
-    if len(set(names)) < len(names):
+    if len(set(filter(None, names))) < len(list(filter(None, names))):
         return "a column is doubled"
-    rows = [row for row in rows if row]
+    rows = [row for row in rows if any(cell.strip() for cell in row)]
     table = np.array([[float(cell) if cell.strip() else math.nan for cell in row] for row in rows])
     if len(table) != len(TIMES) or np.max(np.abs(table[:, 0] - TIMES)) > 1e-9:
         return "the times are not those asked for"
-    given = [table[:, j] for j in range(1, len(names)) if not np.all(np.isnan(table[:, j]))]
-    taken = [column for values in signals.values() for column in values.T]
+    left_out = {name for name in names if name.rpartition(" [")[0] in columns.left_out}
+    compared = (j for j in range(1, len(names)) if names[j] not in left_out)
+    given = [table[:, j] for j in compared if not np.all(np.isnan(table[:, j]))]
+    taken = [column for values in columns.channels.values() for column in values.T]
     if not np.all(np.isfinite(taken)):
         return "a cell is not a finite number"
-    return None if len(given) == len(taken) and np.allclose(sorted(map(tuple, given)), sorted(map(tuple, taken)), 0, 0) \
-        else "not every column was taken"
+    return None if sorted(map(tuple, given)) == sorted(map(tuple, taken)) else "not every column was taken"
 
 
 def _modal(path: Path) -> str | None:
@@ -260,7 +276,8 @@ def _differs(data: Any, value: Any, place: str = "$") -> str | None:
         return next((wrong for i, (a, b) in pairs if (wrong := _differs(a, b, f"{place}[{i}]"))), None)
     number = isinstance(data, int | float) and isinstance(value, int | float)
     alike = type(data) is type(value) or (number and isinstance(data, bool) == isinstance(value, bool))
-    return None if alike and (data == value or number and float(data) == float(value)) else f"{place}: {data!r:.60} was taken as {value!r:.60}"
+    equal = alike and (data == value or (number and float(data) == float(value)))
+    return None if equal else f"{place}: {data!r:.60} was taken as {value!r:.60}"
 
 
 def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
@@ -275,7 +292,8 @@ def _leaves(value: Any, key: str = "") -> Iterator[tuple[str, Any]]:
 
 
 def _not_finite(value: Any) -> str | None:
-    return next((f"{key} is {leaf}" for key, leaf in _leaves(value) if isinstance(leaf, float) and not math.isfinite(leaf)), None)
+    bad = (f"{key} is {leaf}" for key, leaf in _leaves(value) if isinstance(leaf, float) and not math.isfinite(leaf))
+    return next(bad, None)
 
 
 def _unphysical(scene: Any) -> str | None:
@@ -285,7 +303,7 @@ def _unphysical(scene: Any) -> str | None:
             return f"{key} is {leaf}"
     for collection in ("bodies", "hinges", "markers", "wheels"):
         names = [item["name"] for item in scene[collection]]
-        if len(set(names)) < len(names):
+        if len(set(filter(None, names))) < len(list(filter(None, names))):
             return f"two {collection} have one name"
     bodies = {body["name"] for body in scene["bodies"]} | {"ground"}
     if any(hinge["child"] not in bodies or hinge["parent"] not in bodies for hinge in scene["hinges"]):

@@ -18,8 +18,8 @@ from typing import Any
 import numpy as np
 
 NASTY = (
-    "[red]", "[/]", "[/red] x", "</script><script>alert(1)</script>", "<!--", "]]>", "a|b", "`", "a,b", "../../x", "'\"",
-    "${HOME}", "\u2028", "\u202e", "", " ", "x" * 5000, "\\", "%s{0}", "marker:*", "é\u0301", "nan", "a.b:c",
+    "[red]", "[/]", "[/red] x", "</script><script>alert(1)</script>", "<!--", "]]>", "a|b", "`", "a,b", "../../x",
+    "'\"", "${HOME}", "\u2028", "\u202e", "", " ", "x" * 5000, "\\", "%s{0}", "marker:*", "é\u0301", "nan", "a.b:c",
 )  # fmt: skip
 NUMBERS = (
     "nan", "inf", "-inf", "-1", "0", "-0.0", "1e308", "-1e308", "1e-320", "1e999", "9" * 400, "9" * 5000, "true", '"1"',
@@ -57,8 +57,8 @@ def flip(random: Random, data: bytes) -> bytes:
 
 def insert(random: Random, data: bytes) -> bytes:
     at = random.randrange(len(data) + 1)
-    what = random.choice((b"\0", b"\xff", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"[", b"\xc0\x80", b"," * 2000, b"\n" * 2000))
-    return data[:at] + what + data[at:]
+    what = (b"\0", b"\xff", b"\xef\xbb\xbf", b"\n", b"\r", b'"', b"[", b"\xc0\x80", b"," * 2000, b"\n" * 2000)
+    return data[:at] + random.choice(what) + data[at:]
 
 
 def truncate(random: Random, data: bytes) -> bytes:
@@ -113,8 +113,11 @@ def string(random: Random, data: bytes) -> bytes:
 
 def key(random: Random, data: bytes) -> bytes:
     """A key of TOML renamed, doubled, or joined by one that nobody knows."""
+
     def new(old: bytes) -> bytes:
-        return random.choice((old + b"x", b'"' + old + b' "', b"surprise = 1\n" + old, old + b" = 1\n" + old, b"a.b." + old))
+        unknown, doubled = b"surprise = 1\n" + old, old + b" = 1\n" + old
+        return random.choice((old + b"x", b'"' + old + b' "', unknown, doubled, b"a.b." + old))
+
     return _replace(random, data, KEY, new)
 
 
@@ -174,8 +177,8 @@ def fields(random: Random, data: bytes) -> bytes:
     walk(content)
     inside, step = random.choice(spots)
     old = inside[step]
-    values = (None, True, "", "x", 1, -1, 0, 1.5, 1e308, 10**30, [], {}, [old], {"a": old}, random.choice(NASTY),
-              -old if isinstance(old, int | float) else old[: len(old) // 2] if isinstance(old, str) else old)  # fmt: skip
+    less = -old if isinstance(old, int | float) else old[: len(old) // 2] if isinstance(old, str) else old
+    values = (None, True, "", "x", 1, -1, 0, 1.5, 1e308, 10**30, [], {}, [old], {"a": old}, random.choice(NASTY), less)
     match random.randrange(5):
         case 0 if isinstance(inside, dict):
             inside["surprise"] = random.choice(values)
@@ -217,6 +220,9 @@ def arrays_of_records(random: Random, data: bytes) -> bytes:
     return b"\n".join(rows) + b"\n"
 
 
+TYPES = (complex, np.float16, np.float32, np.longdouble, np.int32, bool, "S8", "U4", object, "M8[s]", ">f8")
+
+
 class _Callee:
     """What unpickling must never reach."""
 
@@ -233,7 +239,7 @@ def members(random: Random, data: bytes) -> bytes:
     extra: list[tuple[str, bytes]] = []
     match random.randrange(12):
         case 0:
-            given[name] = old.astype(random.choice((complex, np.float16, np.int32, bool, "S8", "U4", object, "M8[s]", ">f8")))
+            given[name] = old.astype(random.choice(TYPES))
         case 1:
             given[name] = old + 1j
         case 2:

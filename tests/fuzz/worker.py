@@ -100,7 +100,8 @@ def _refusal(kind: Kind, path: Path, error: Exception) -> tuple[str, str]:
     """A documented error says which file it is about; any other kind of ValueError came through from below."""
     if not isinstance(error, OSError) and type(error) not in kind.refusals:
         return "traceback", f"{type(error).__name__}: {error}\n{traceback.format_exc()[-1500:]}"
-    return ("refused", str(error)[:300]) if (kind.place or path.name) in str(error) else ("no file named", f"{error!s:.300}")
+    named = path.name in str(error) or (kind.place and kind.place in str(error))
+    return ("refused" if named else "no file named"), f"{error!s:.300}"
 
 
 def _keep(path: Path, data: bytes | str, why: str) -> None:
