@@ -47,6 +47,14 @@ def check_accepted(accepted: Accepted, run: RunFile) -> None:
     _refuse(_accepted(accepted, run))
 
 
+def check_recorded(run: RunFile) -> None:
+    """Refuse a run file as records hold it, every comparison a pair, that names a variant or engine it does not have.
+
+    Its numbers are judged as they are: judging is total, and archives outlive the rules that have been added since.
+    """
+    _refuse(_recorded(run))
+
+
 def _refuse(problems: Iterator[Problem]) -> None:
     found = [str(problem) for problem in problems]
     if found:
@@ -75,6 +83,21 @@ def _run(run: RunFile) -> Iterator[Problem]:
     seen: set[tuple[str, str, str]] = set()
     for i, conservation in enumerate(run.conservations):
         yield from _conservation(run, conservation, ROOT.key("conservation", i), seen)
+    for i, chart in enumerate(run.charts):
+        yield from _chart(run, chart, ROOT.key("chart", i))
+
+
+def _recorded(run: RunFile) -> Iterator[Problem]:
+    yield from _unique([variant.name for variant in run.variants], ROOT.key("variant"), "variants")
+    for kind, items in (("comparison", run.comparisons), ("control", run.controls)):
+        for i, item in enumerate(items):
+            for side in (item.a, item.b):
+                if side is None:
+                    yield _problem(ROOT.key(kind, i), "it does not name its two sides", "run the case again")
+                else:
+                    yield from _sides_run(run, side.variant, (side.engine,), ROOT.key(kind, i))
+    for i, conservation in enumerate(run.conservations):
+        yield from _sides_run(run, conservation.variant, conservation.engines, ROOT.key("conservation", i))
     for i, chart in enumerate(run.charts):
         yield from _chart(run, chart, ROOT.key("chart", i))
 

@@ -11,7 +11,6 @@ from typing import Annotated, NoReturn
 
 import typer
 from rich.console import Console
-from rich.markup import escape
 
 from crosscheck import library
 from crosscheck.accept import NotAccepted, accept_figures
@@ -20,10 +19,11 @@ from crosscheck.engine_list import describe_engines
 from crosscheck.live import LiveProgress
 from crosscheck.lock import FolderInUseError, locked
 from crosscheck.report import Choice, write_all
-from crosscheck.report.console import cases_table, engines_table, print_outcome
+from crosscheck.report.console import cases_table, engines_table, print_outcome, words
 from crosscheck.session import last_session, standing
 from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
+from crosscheck.verify_table import channels_table
 from flexmb.scene.problems import closest
 
 EXIT_USAGE = 2
@@ -39,7 +39,7 @@ Start with `crosscheck run canonical`, then open the report whose path it prints
 `crosscheck list` shows the cases, `crosscheck engines` the codes that are installed here.
 """,
 )
-console = Console()
+console = Console(markup=False, emoji=False)  # names and paths stand in what it prints
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
 TimeLimit = Annotated[
@@ -150,7 +150,12 @@ def verify(
     `tip.px tip.py tip.pz` (m), `tip.qw tip.qx tip.qy tip.qz`, `tip.vx tip.vy tip.vz` (m/s), `tip.wx tip.wy tip.wz`
     (rad/s); for a hinge `elbow` `elbow.tx elbow.ty elbow.tz` (Nm) and `elbow.fx elbow.fy elbow.fz` (N), the load on the
     outboard body about the hinge point. World axes; quaternions scalar-first, body to World. Only whole groups count,
-    any subset of groups will do; `--template` writes a file with the times and all columns to fill in.
+    any subset of groups will do; `--template` writes a file with the times and all columns to fill in. flexmb's own
+    `trajectory.csv` will do as it is: it is compared in whatever the case sets a goal for.
+
+    **Shows** each channel's distance E, uncertainty U, the time at which it is worst, and what is wrong where that can
+    be guessed: thousandths, degrees, a sign, exchanged components, quaternions conjugate or scalar-last, body axes,
+    another origin, shifted times.
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
@@ -158,11 +163,14 @@ def verify(
         (chosen,) = _found((case,))
         if template:
             csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
-            console.print(f"Fill in {csv}, then run the command again without --template.")
+            console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
     except ValueError as error:
         _refuse(str(error))
+    console.print(channels_table(outcome))
+    if outcome.left_out:
+        console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
     raise typer.Exit(print_outcome(console, outcome))
 
 
@@ -237,23 +245,23 @@ def _accept(cases: tuple[library.Case, ...], records: Path, partial: bool) -> No
     """Write what the cases have reached beside their run files, or say why not and leave with 1."""
     try:
         for file, count in accept_figures(cases, records, partial):
-            console.print(f"{count} figures accepted: review {escape(str(file))}", soft_wrap=True)
+            console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
     except NotAccepted as error:
-        console.print(f"[red]{escape(str(error))}[/red]", soft_wrap=True)
+        console.print(words(str(error), "red"), soft_wrap=True)
 
 
 def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice) -> None:
     """Judge, write everything, show the table, and leave with the exit code."""
     outcome, page = write_all(records, out, strict, chosen)
     code = print_outcome(console, outcome)
-    console.print(f"Report: [bold]{page}[/bold]", soft_wrap=True)
+    console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code)
 
 
 def _refuse(message: str) -> NoReturn:
-    console.print(f"[red]{escape(message)}[/red]", soft_wrap=True)
+    console.print(words(message, "red"), soft_wrap=True)
     raise typer.Exit(EXIT_USAGE)
 
 

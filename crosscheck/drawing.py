@@ -21,14 +21,14 @@ LARGEST_ASPECT = 12.0
 RIM_POINTS = 24
 
 
-class Point(msgspec.Struct, frozen=True, array_like=True):
+class Point(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A marker ("" is the World origin) and an offset in its axes (m)."""
 
     marker: str
     offset: Vector
 
 
-class Line(msgspec.Struct, frozen=True, kw_only=True):
+class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """A polyline of one body; `kind` chooses its style."""
 
     body: str
@@ -36,7 +36,7 @@ class Line(msgspec.Struct, frozen=True, kw_only=True):
     points: tuple[Point, ...]
 
 
-class Drawing(msgspec.Struct, frozen=True, kw_only=True):
+class Drawing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """All lines of a scene, and the markers that are worth a trail."""
 
     lines: tuple[Line, ...]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import tomllib
+import os
 from dataclasses import dataclass, field
 from importlib.resources import as_file, files
 from pathlib import Path
@@ -15,6 +15,7 @@ from crosscheck.case_check import check_accepted, check_run_file
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError
+from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
 T = TypeVar("T")
@@ -61,7 +62,7 @@ def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
 
 def _resolve_one(word: str) -> tuple[Case, ...]:
     folder = Path(word)
-    if (folder / "run.toml").is_file():
+    if os.path.isfile(folder / "run.toml"):  # False for whatever cannot even be a path
         return (load_case(folder),)
     cases = shipped_cases()
     named = tuple(case for case in cases if word in (case.name, case.name.partition("/")[2]))
@@ -84,7 +85,7 @@ def load_case(folder: Path) -> Case:
     except CaseError as error:
         raise CaseError(f"{folder / 'run.toml'}: {error}") from None
     for variant in run.variants:
-        if not (folder / variant.scene).is_file():
+        if not os.path.isfile(folder / variant.scene):
             missing = f'variant "{variant.name}" needs {variant.scene}, which is not there'
             raise CaseError(f"{folder / 'run.toml'}: {missing}")
     accepted: Accepted = {}
@@ -99,16 +100,28 @@ def load_case(folder: Path) -> Case:
         name=f"{folder.parent.name}/{folder.name}",
         folder=folder,
         run=run,
-        provenance=_read(provenance_file, Provenance) if provenance_file.is_file() else None,
-        readme=readme.read_text(encoding="utf-8") if readme.is_file() else "",
+        provenance=_read(provenance_file, Provenance) if _present(provenance_file) else None,
+        readme=_text(readme) if _present(readme) else "",
         accepted=accepted,
     )
 
 
+def _present(file: Path) -> bool:
+    """Whether anything stands at the file's place: what cannot be read is refused there, not passed over."""
+    return os.path.lexists(file)
+
+
 def _read(file: Path, kind: type[T]) -> T:
     try:
-        return to_struct(tomllib.loads(file.read_text(encoding="utf-8")), kind, str(file))
-    except (tomllib.TOMLDecodeError, SceneError) as error:
+        return to_struct(parse_toml(_text(file)), kind, str(file))
+    except (Unreadable, SceneError, RecursionError, OverflowError) as error:
+        raise CaseError(f"{file}: {error}") from None
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_text(file)
+    except Unreadable as error:
         raise CaseError(f"{file}: {error}") from None
     except OSError as error:
         raise CaseError(f"{file}: {error.strerror}") from None

@@ -7,12 +7,13 @@ from collections.abc import Sequence
 from types import TracebackType
 
 from rich.console import Console
-from rich.markup import escape
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
 
 from crosscheck.plan import Job
 from crosscheck.pool import Event
 from crosscheck.records import RunRecord
+from flexmb.printable import printable
 
 MARKS = {
     "finished": "[green]✓[/green]",
@@ -31,7 +32,7 @@ class LiveProgress:
     def __init__(self, console: Console) -> None:
         self._progress = Progress(
             SpinnerColumn(),
-            TextColumn("{task.description}"),
+            TextColumn("{task.description}", markup=False),  # names stand in it
             BarColumn(bar_width=24),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
@@ -53,8 +54,8 @@ class LiveProgress:
     def hear(self, jobs: Sequence[Job], event: Event) -> None:
         """Show one event."""
         if self._overall is None:
-            self._overall = self._progress.add_task("[bold]all runs[/bold]", total=len(jobs))
-        title = escape(jobs[event.job].title)
+            self._overall = self._progress.add_task("all runs", total=len(jobs))
+        title = printable(jobs[event.job].title)
         if event.kind == "started":
             self._started[event.job] = time.perf_counter()
             self._records[event.job] = []
@@ -62,25 +63,30 @@ class LiveProgress:
         elif event.kind == "emitted" and isinstance(event.content, RunRecord):
             self._records[event.job].append(event.content)
         elif event.kind == "emitted" and isinstance(event.content, str):
-            self._progress.update(self._lines[event.job], description=f"{title}: {escape(event.content)}")
+            self._progress.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
         elif event.kind != "emitted":
             self._progress.remove_task(self._lines.pop(event.job))
             self._progress.advance(self._overall)
-            self._progress.console.print(self._ending(title, event), highlight=False)
+            self._progress.console.print(self._ending(title, event))
 
-    def _ending(self, title: str, event: Event) -> str:
+    def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""
         if event.kind in ("crashed", "stopped"):
             status = "crashed" if event.kind == "crashed" else "did not finish"
-            return f"{MARKS[status]} {title}: {status}: {escape(event.content)}"
+            return _line(status, f"{title}: {status}: {event.content}")
         records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
         if not records:
-            return f"{MARKS['finished']} {title}: already recorded"
+            return _line("finished", f"{title}: already recorded")
         last = records[-1]
         if last.status != "finished":
-            return f"{MARKS[last.status]} {title}: {last.status}: {escape(_in_short(last.message))}"
+            return _line(last.status, f"{title}: {last.status}: {_in_short(last.message)}")
         efforts = f"{len(records)} effort{'s' if len(records) > 1 else ''}"
-        return f"{MARKS['finished']} {title}: {efforts} in {spent:.1f} s"
+        return _line("finished", f"{title}: {efforts} in {spent:.1f} s")
+
+
+def _line(status: str, text: str) -> Text:
+    """The mark of a status, and text as it stands: names and messages may look like markup."""
+    return Text.from_markup(MARKS[status]) + Text(" " + printable(text))
 
 
 def _in_short(message: str) -> str:

@@ -2,19 +2,25 @@
 
 A file of records is the archive: verdicts and report are made from it alone, with no engine installed. Signals are
 stored as float64, deflated and in base64, so that replaying a verdict gives the same digits. A run that was killed
-leaves at most one broken line at the end, which reading skips and resuming cuts off.
+leaves at most one broken line at the end, which reading skips and resuming cuts off. Any other line that is no record
+is a `BrokenLine` to whoever reads: it is named, what it held counts as lost, and no session that has one is green.
+Resuming sets such lines aside, in a file of their own, and runs again what they held.
 """
 
 from __future__ import annotations
 
 import base64
+import math
 import os
 import platform
+import warnings
 import zlib
+from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, BinaryIO, Literal
 
 import msgspec
 import numpy as np
@@ -22,10 +28,13 @@ from numpy.typing import NDArray
 
 from crosscheck.accepted import Accepted
 from crosscheck.case import Provenance, RunFile
+from crosscheck.case_check import check_recorded
 from crosscheck.drawing import Drawing
+from flexmb.scene.reading import MIB, allowance, regular_size
 
 Array = NDArray[np.float64]
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
+LONGEST_LINE = 128 * MIB  # a hundred markers at ten thousand times fit
 PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec", "plotly")
 
 
@@ -50,7 +59,7 @@ class Environment(_Strict, frozen=True, kw_only=True, tag="environment"):
     confirms: bool = False
 
 
-class VariantInfo(msgspec.Struct, frozen=True, kw_only=True):
+class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """What the report needs of a variant's scene: levels of its bodies, how to draw it, or why it could not be made."""
 
     level: str
@@ -70,7 +79,7 @@ class CaseRecord(_Strict, frozen=True, kw_only=True, tag="case"):
     accepted: Accepted = {}
 
 
-class Packed(msgspec.Struct, frozen=True, kw_only=True):
+class Packed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """An array of float64: little-endian, row-major, deflated, base64."""
 
     shape: tuple[int, ...]
@@ -127,7 +136,24 @@ class Confirmed(_Strict, frozen=True, kw_only=True, tag="confirmed"):
     made_by: str
 
 
-Record = Environment | CaseRecord | RunRecord | Confirmed
+@dataclass(frozen=True)
+class BrokenLine:
+    """A line of a file of records that is none, and why."""
+
+    file: str
+    number: int
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.file}, line {self.number}: not a record of this version: {self.reason}"
+
+
+class BrokenRecords(UserWarning):
+    """Lines were set aside from a file of records."""
+
+
+Written = Environment | CaseRecord | RunRecord | Confirmed
+Record = Written | BrokenLine
 
 
 def pack(values: Array) -> Packed:
@@ -137,9 +163,23 @@ def pack(values: Array) -> Packed:
 
 
 def unpack(packed: Packed) -> Array:
-    """Text -> array; exact."""
-    data = zlib.decompress(base64.b64decode(packed.data))
+    """Text -> array; exact. ValueError where the data are not the shape's; takes no more memory than the shape says."""
+    size = packed_bytes(packed)
+    unpacker = zlib.decompressobj()
+    try:
+        data = unpacker.decompress(base64.b64decode(packed.data, validate=True), size + 1)
+    except (zlib.error, ValueError) as error:
+        raise ValueError(f"an array is damaged: {error}") from None
+    if len(data) != size or not unpacker.eof:
+        raise ValueError(f"an array of shape {packed.shape} does not hold the numbers that it should")
     return np.frombuffer(data, dtype="<f8").reshape(packed.shape).astype(np.float64)
+
+
+def packed_bytes(packed: Packed) -> int:
+    """Size of an array in memory, by its shape. ValueError for a shape that no array has."""
+    if not 1 <= len(packed.shape) <= 2 or any(length < 0 for length in packed.shape):
+        raise ValueError(f"no signal has the shape {packed.shape}")
+    return 8 * math.prod(packed.shape)
 
 
 def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), confirms: bool = False) -> Environment:
@@ -160,9 +200,10 @@ def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), conf
 class Archive:
     """A records file open for appending; every record is on disk when `write` returns."""
 
-    def __init__(self, file: Path) -> None:
+    def __init__(self, file: Path, kind: Any = Written) -> None:
+        """`kind` are the records that the file holds; lines that are none of them are set aside (BrokenRecords)."""
         file.parent.mkdir(parents=True, exist_ok=True)
-        _cut_broken_end(file)
+        _set_broken_lines_aside(file, kind)
         self._stream = file.open("ab")
         self._encoder = msgspec.json.Encoder()
 
@@ -177,31 +218,99 @@ class Archive:
 
 
 def read(file: Path) -> list[Record]:
-    """All records of a file, in order; a last line without its end is skipped. ValueError names a wrong line."""
-    return decoded_lines(file, Record)
+    """All records of a file, in order; a last line without its end is skipped, a line that is no record a BrokenLine.
+
+    What is returned is sound: arrays unpack, cases can be run. OSError where the file is none or cannot be read.
+    """
+    return decoded_lines(file, Written)
 
 
 def decoded_lines(file: Path, kind: Any) -> list[Any]:
     """`read` for records of any tagged struct or union of them."""
     decoder = msgspec.json.Decoder(kind)
-    found = []
+    left = allowance(regular_size(file))
+    found: list[Any] = []
     with file.open("rb") as stream:
-        for number, line in enumerate(stream, start=1):
-            if not line.endswith(b"\n"):
-                break
+        for number, line in enumerate(_lines(stream), start=1):
             try:
-                found.append(decoder.decode(line))
-            except msgspec.DecodeError as error:
-                raise ValueError(f"{file}, line {number}: not a record of this version: {error}") from None
+                record = decoder.decode(line)
+                left -= _checked(record, left)
+            except (ValueError, RecursionError) as error:  # broken JSON, another schema, text that is not UTF-8
+                record = BrokenLine(str(file), number, str(error))
+            found.append(record)
     return found
 
 
-def _cut_broken_end(file: Path) -> None:
+def _lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Whole lines with their ends; of a line beyond LONGEST_LINE only its beginning, which is no record."""
+    begun = b""
+    while piece := stream.readline(LONGEST_LINE):
+        begun = begun[:80] or piece
+        if piece.endswith(b"\n"):
+            yield begun
+            begun = b""
+
+
+def _checked(record: Any, limit: int) -> int:
+    """Bytes of memory that a record's arrays take. ValueError where the record contradicts itself, or is a bomb."""
+    if isinstance(record, CaseRecord):
+        check_recorded(record.run)
+        if record.variants.keys() != {variant.name for variant in record.run.variants}:
+            raise ValueError("its variants are not those of its run file")
+    if not isinstance(record, RunRecord):
+        return 0
+    if not (0 <= record.rung <= max(record.rungs - 1, 0) and 0.0 <= record.effort_value < math.inf):
+        raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
+    arrays = [*record.channels.values(), *([] if record.times is None else [record.times])]
+    size = sum(packed_bytes(packed) for packed in arrays)
+    if size > limit:
+        raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
+    _check_shapes(record)
+    for packed in arrays:
+        unpack(packed)
+    return size
+
+
+def _check_shapes(record: RunRecord) -> None:
+    """Channels are tables of a row a time. ValueError names one that is not."""
+    rows = None if record.times is None else record.times.shape
+    if record.status == "finished" and not (rows and rows[0]):
+        raise ValueError("it is finished but has no times")
+    if rows is not None and len(rows) != 1:
+        raise ValueError(f"its times have the shape {rows}")
+    for name, packed in record.channels.items():
+        if rows is None or len(packed.shape) != 2 or packed.shape[:1] != rows or packed.shape[1] == 0:
+            raise ValueError(f"{name} of shape {packed.shape} does not belong to times of shape {rows}")
+
+
+def _set_broken_lines_aside(file: Path, kind: Any) -> None:
+    """Leave only whole records in a file to append to; broken lines move to `<file>.broken`, with a warning.
+
+    The end of a run that was killed is no loss to speak of: it is cut off without a word.
+    """
     if not file.exists():
         return
-    text = file.read_bytes()
-    if not text.endswith(b"\n"):
-        file.write_bytes(text[: text.rfind(b"\n") + 1])
+    broken = {record.number: record for record in decoded_lines(file, kind) if isinstance(record, BrokenLine)}
+    if not broken and _ended(file):
+        return
+    aside, kept = file.with_name(file.name + ".broken"), file.with_name(file.name + ".kept")
+    with file.open("rb") as stream, kept.open("wb") as whole:
+        for number, line in enumerate(stream, start=1):
+            if number in broken:
+                with aside.open("ab") as lost:
+                    lost.write(line)
+            elif line.endswith(b"\n"):
+                whole.write(line)
+    os.replace(kept, file)
+    for each in broken.values():
+        warnings.warn(f"{each}; moved to {aside.name}, and what it held is run again", BrokenRecords, stacklevel=3)
+
+
+def _ended(file: Path) -> bool:
+    """Whether the last line is whole."""
+    with file.open("rb") as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - 1))
+        return stream.read() in (b"", b"\n")
 
 
 def _package_version(name: str) -> str:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.records import CaseRecord, Environment, Packed, Record, RunRecord, RunStatus, unpack
+from crosscheck.records import BrokenLine, CaseRecord, Environment, Packed, Record, RunRecord, RunStatus, unpack
 from crosscheck.uncertainty import Rung, Uncertainty, estimate, spatial, unknown
 from crosscheck.verdict import Ending, Signal
 from flexmb.channels import family, magnitude, signal_range
@@ -171,10 +171,11 @@ class CaseResults:
 
 @dataclass(frozen=True)
 class Session:
-    """Everything a file of records says."""
+    """Everything a file of records says; `broken` are its lines that say nothing."""
 
     environments: tuple[Environment, ...]
     cases: tuple[CaseResults, ...]
+    broken: tuple[BrokenLine, ...] = ()
 
 
 def collect(records: Sequence[Record]) -> Session:
@@ -190,6 +191,7 @@ def collect(records: Sequence[Record]) -> Session:
         cases=tuple(
             _case_results(case, [run for run in runs.values() if run.case == name]) for name, case in cases.items()
         ),
+        broken=tuple(record for record in records if isinstance(record, BrokenLine)),
     )
 
 

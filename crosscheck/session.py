@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.records import CaseRecord, Confirmed, Environment, Record, RunRecord
+from crosscheck.records import BrokenLine, CaseRecord, Confirmed, Environment, Record, RunRecord
 
 
 def standing(records: Sequence[Record]) -> list[Record]:
@@ -40,11 +40,14 @@ def last_session(records: Sequence[Record]) -> list[Record]:
     cases = {record.case for record in records[begin:] if isinstance(record, CaseRecord)}
     found = standing(records)
     latest = next((record for record in reversed(found) if isinstance(record, Environment)), None)
-    return [
-        record
-        for record in found
-        if (record is latest if isinstance(record, Environment) else record.case in cases)
-    ]
+    return [record for record in found if record is latest or _belongs(record, cases)]
+
+
+def _belongs(record: Record, cases: set[str]) -> bool:
+    """Whether a record is of one of the cases; what a broken line was nobody knows."""
+    if isinstance(record, BrokenLine):
+        return True
+    return not isinstance(record, Environment) and record.case in cases
 
 
 def _work(record: RunRecord | Confirmed) -> tuple[str, ...]:

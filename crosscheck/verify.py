@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import msgspec
@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from crosscheck.case import RunFile, Variant
+from crosscheck.causes import likely_cause
+from crosscheck.columns import LOAD_GROUPS, MARKER_GROUPS, Columns, VerifyError, read_columns
 from crosscheck.execute import execute
 from crosscheck.library import Case
 from crosscheck.plan import MAIN, plan, sample_times, variant_scene
@@ -21,22 +23,26 @@ from crosscheck.results import Result, collect
 from crosscheck.sweep import PROVIDER
 from crosscheck.uncertainty import Rung, Uncertainty, estimate
 from crosscheck.verdict import Finding, Signal, Verdict, compare
-from flexmb.channels import matches, signal_range
+from flexmb.channels import distance, matches, signal_range
 
 Array = NDArray[np.float64]
-MARKER_GROUPS = {
-    "position": ("px", "py", "pz"),
-    "orientation": ("qw", "qx", "qy", "qz"),
-    "velocity": ("vx", "vy", "vz"),
-    "angular_velocity": ("wx", "wy", "wz"),
-}
-LOAD_GROUPS = {"torque": ("tx", "ty", "tz"), "force": ("fx", "fy", "fz")}
-TIME_MATCH_S = 1e-9
 YOURS = "csv"
 
 
-class VerifyError(ValueError):
-    """A CSV or a request that cannot be compared; the message says what to change."""
+@dataclass(frozen=True)
+class Detail:
+    """Of one channel: the time (s) at which it is farthest from the reference, and why, if there is a guess."""
+
+    worst_s: float
+    cause: str = ""
+
+
+@dataclass(frozen=True)
+class Checked(Outcome):
+    """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared."""
+
+    details: dict[str, Detail] = field(default_factory=dict)
+    left_out: tuple[str, ...] = ()
 
 
 def verify_csv(
@@ -47,45 +53,36 @@ def verify_csv(
     variant: str | None = None,
     engine: str = "native",
     provider: str = PROVIDER,
-) -> Outcome:
+) -> Checked:
     """Verdicts on every channel of a CSV against `engine` on a variant (by default the first) of a case.
 
-    The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the case's goal.
+    The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the case's goal. Of
+    a whole trajectory.csv those channels are compared that the case sets a goal for and the engine offers.
     """
     chosen = _variant(case, variant)
     times = sample_times(case.run, chosen)
-    signals = read_signals(file, times)
-    rough = read_signals(coarse, times) if coarse is not None else {}
+    mine = read_columns(file, times)
+    rough = read_columns(coarse, times) if coarse is not None else Columns({})
     reference = _reference(case, chosen, engine, provider)
-    verdicts = []
-    for channel, values in signals.items():
+    verdicts, details, left_out = [], {}, list(mine.left_out)
+    for name, values in mine.channels.items():
+        channel = _known_as(name, reference)
         goal = _goal(case.run, chosen, channel)
-        finding = _judge(reference, channel, values, rough.get(channel), goal)
+        if mine.own and (goal is None or channel not in reference.channels):
+            left_out.append(channel)
+            continue
+        finding = _judge(reference, channel, values, rough.channels.get(name), goal)
+        if goal is not None and finding.E is not None:
+            details[channel] = detail = _detail(reference, channel, values, goal, times, finding)
+            cause = f"; {detail.cause}?" if detail.cause else ""
+            finding = replace(finding, reason=f"{finding.reason}; worst at t = {detail.worst_s:.6g} s{cause}")
         verdicts.append(_verdict(case, chosen, channel, engine, goal or 0.0, finding))
-    return Outcome(verdicts={case.name: verdicts}, absences=[])
+    return Checked({case.name: verdicts}, [], details=details, left_out=tuple(left_out))
 
 
 def read_signals(file: Path, times: Array) -> dict[str, Array]:
     """Channels (T, k) of a CSV whose times are the case's; groups such as tip.px, tip.py, tip.pz must be whole."""
-    columns = _columns(file)
-    if len(columns["t"]) != len(times) or np.max(np.abs(columns["t"] - times)) > TIME_MATCH_S:
-        asked = f"{len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s"
-        raise VerifyError(f"{file}: its times are not the case's ({asked}); --template writes a file with them")
-    return _grouped(file, {name: values for name, values in columns.items() if name != "t"})
-
-
-def _columns(file: Path) -> dict[str, Array]:
-    """Columns of a CSV by name; an empty cell is NaN."""
-    try:
-        with file.open(encoding="utf-8", newline="") as stream:
-            header, *rows = csv.reader(stream)
-        table = np.array([[float(cell) if cell.strip() else np.nan for cell in row] for row in rows])
-        columns = dict(zip((name.strip() for name in header), table.T, strict=True))
-    except (OSError, ValueError) as error:
-        raise VerifyError(f"{file} cannot be read as a CSV of numbers with one header line: {error}") from None
-    if next(iter(columns)) != "t":
-        raise VerifyError(f'{file}: the first column must be "t"; it is "{next(iter(columns))}"')
-    return columns
+    return read_columns(file, times).channels
 
 
 def sample_times_csv(case: Case, variant: str | None) -> str:
@@ -99,28 +96,6 @@ def sample_times_csv(case: Case, variant: str | None) -> str:
     writer.writerow(["t", *names])
     writer.writerows([[repr(float(t)), *([""] * len(names))] for t in sample_times(case.run, chosen)])
     return text.getvalue()
-
-
-def _grouped(file: Path, columns: dict[str, Array]) -> dict[str, Array]:
-    """Whole groups of filled columns as channels; VerifyError for a column that belongs to no whole group."""
-    found: dict[str, Array] = {}
-    filled = {name: values for name, values in columns.items() if not np.all(np.isnan(values))}
-    for item in dict.fromkeys(name.rpartition(".")[0] for name in filled):
-        for prefix, groups in (("marker", MARKER_GROUPS), ("load", LOAD_GROUPS)):
-            for part, letters in groups.items():
-                names = [f"{item}.{letter}" for letter in letters]
-                if all(name in filled for name in names):
-                    found[f"{prefix}:{item}.{part}"] = np.column_stack([filled.pop(name) for name in names])
-    if filled:
-        raise VerifyError(f"{file}: no whole group contains {', '.join(filled)}; the groups are {_groups_text()}")
-    if not found:
-        raise VerifyError(f"{file}: there is nothing in it but times")
-    return found
-
-
-def _groups_text() -> str:
-    groups = (*MARKER_GROUPS.values(), *LOAD_GROUPS.values())
-    return ", ".join("NAME." + "/".join(group) for group in groups)
 
 
 def _variant(case: Case, name: str | None) -> Variant:
@@ -163,14 +138,32 @@ def _judge(reference: Result, channel: str, values: Array, rough: Array | None, 
         return Finding("did not run", f"the reference has no channel {channel}: check the name")
     if goal is None:
         return Finding("refused", "the case sets no goal for this channel")
-    if not np.all(np.isfinite(values)):
-        return Finding("failed", "there are empty cells or values that are not numbers")
     target = reference.signal(channel, across=False)
     if rough is not None:
         doubt = estimate(channel, "tolerance", [Rung(2.0, rough), Rung(1.0, values)], 0, target.sizes[0])
     else:
         doubt = _claimed(channel, target, goal)
     return compare(channel, Signal(values, doubt, target.sizes), target, goal)
+
+
+def _known_as(channel: str, reference: Result) -> str:
+    """The channel; a load that no hinge has is that of the wheel of the same name."""
+    wheel = f"wheel_{channel}"
+    return wheel if channel not in reference.channels and wheel in reference.channels else channel
+
+
+def _detail(reference: Result, channel: str, values: Array, goal: float, times: Array, finding: Finding) -> Detail:
+    target = reference.values(channel)
+    worst = float(times[int(np.argmax(distance(channel, values, target)))])
+    if finding.status == "agree":
+        return Detail(worst)
+    allowed = max(goal * signal_range(channel, target), reference.uncertainty(channel).value)
+    markers = {
+        name.partition(":")[2].rpartition(".")[0]: reference.values(name)
+        for name in reference.channels
+        if name.endswith(".orientation")
+    }
+    return Detail(worst, likely_cause(channel, values, target, allowed, markers))
 
 
 def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
@@ -199,3 +192,6 @@ def _verdict(case: Case, variant: Variant, channel: str, engine: str, goal: floa
         scale=finding.scale,
         reason=finding.reason,
     )
+
+
+__all__ = ["Checked", "Detail", "VerifyError", "read_signals", "sample_times_csv", "verify_csv"]

@@ -11,6 +11,7 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
+from flexmb.printable import printable
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.reference import json_schema
@@ -32,8 +33,8 @@ Find every defect of a scene: `flexmb check scene.toml`
 Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out results`
 """,
 )
-console = Console()
-errors = Console(stderr=True)
+console = Console(markup=False, emoji=False)  # names and paths stand in what they print
+errors = Console(stderr=True, markup=False, emoji=False)
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
 End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
@@ -86,7 +87,7 @@ def simulate(
         from flexmb.simulation import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.summary import summary
 
-        with console.status(f"simulating {scene} (the first run after an update compiles)"):
+        with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             trajectory = run(
                 load_scene(scene), t_end, method,  # type: ignore[arg-type]
                 rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
@@ -116,7 +117,7 @@ def check(scene: SceneFile, t_end: End = None) -> None:
     counts = ", ".join(
         f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
     )
-    console.print(f"[green]sound[/green]: {loaded.name} ({counts})")
+    console.print(Text.assemble(("sound", "green"), printable(f": {loaded.name} ({counts})")))
 
 
 @app.command()
@@ -210,7 +211,7 @@ def advise(
         from flexmb.advisor.verdict import verdict
 
         loaded = load_scene(scene)
-        with console.status(f"trying models of {scene} (the first run after an update compiles)"):
+        with console.status(Text(f"trying models of {scene} (the first run after an update compiles)")):
             advice = search(loaded, tol, quantity, t_end)
         console.print(verdict(advice, trials))
         if advice.scene is None or advice.method is None:
@@ -263,7 +264,7 @@ def linearize(
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
         loaded = load_scene(scene)
         try:
-            with console.status(f"linearising {scene} (the first time after an update compiles)"):
+            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
                 system = compile(loaded)
                 if spin is not None:
                     model = steady_spin(system, spin, rate).linearize()
@@ -272,7 +273,7 @@ def linearize(
                 else:
                     model = linearized(system)
         except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
         written = None if export is None else model.save(export)
     console.print(modes_table(model))
@@ -312,10 +313,10 @@ def campbell(
 
         loaded, values = load_scene(scene), _range("rates", rates)
         try:
-            with console.status(f"linearising {scene} (the first time after an update compiles)"):
+            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
                 result = diagram(loaded, hinge, values)
         except EquilibriumError as error:
-            errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
         written = [write_campbell_plot(result, picture, modes), *([] if csv is None else [result.to_csv(csv)])]
     console.print(campbell_table(result))
@@ -365,7 +366,7 @@ def _no_traceback() -> Iterator[None]:
     try:
         yield
     except (SceneError, NotImplementedError, ValueError, OSError) as error:
-        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+        errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from flexmb.printable import chart_text
 from flexmb.trajectory import Array, Trajectory
 
 _SIZE = (9.0, 5.5)  # inches
@@ -32,7 +33,7 @@ def _write(trajectory: Trajectory, path: Path, draw: Callable[[Trajectory, Figur
     figure = Figure(figsize=_SIZE, layout="constrained")
     draw(trajectory, figure)
     stopped = "" if trajectory.finished else f": {trajectory.message.split(':')[0]}"
-    figure.suptitle(f"{trajectory.scene}{stopped}")
+    figure.suptitle(chart_text(f"{trajectory.scene}{stopped}"))
     for axes in figure.axes:
         axes.grid(alpha=0.3)
         if axes.get_legend_handles_labels()[0]:
@@ -54,7 +55,7 @@ def _markers(trajectory: Trajectory, figure: Figure) -> None:
     panels = _rows(figure, "x (m)", "y (m)", "z (m)")
     for name, path in trajectory.markers.items():
         for axis, panel in enumerate(panels):
-            panel.plot(trajectory.t, path.position[:, axis], label=name)
+            panel.plot(trajectory.t, path.position[:, axis], label=chart_text(name))
 
 
 def _energy(trajectory: Trajectory, figure: Figure) -> None:
@@ -78,15 +79,15 @@ def _loads(trajectory: Trajectory, figure: Figure) -> None:
     """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
     torque, force = _rows(figure, "|torque| (N m)", "|force| (N)")
     for name, load in (trajectory.loads | trajectory.wheel_loads).items():
-        torque.plot(trajectory.t, _magnitude(load[:, :3]), label=name)
-        force.plot(trajectory.t, _magnitude(load[:, 3:]), label=name)
+        torque.plot(trajectory.t, _magnitude(load[:, :3]), label=chart_text(name))
+        force.plot(trajectory.t, _magnitude(load[:, 3:]), label=chart_text(name))
 
 
 def _drives(trajectory: Trajectory, figure: Figure) -> None:
     (panel,) = _rows(figure, "drive load (N or N m)")
     for name, drive in trajectory.drives.items():
         for i in range(drive.shape[1]):
-            panel.plot(trajectory.t, drive[:, i], label=name if drive.shape[1] == 1 else f"{name}[{i}]")
+            panel.plot(trajectory.t, drive[:, i], label=chart_text(name if drive.shape[1] == 1 else f"{name}[{i}]"))
 
 
 def _magnitude(vectors: Array) -> Array:

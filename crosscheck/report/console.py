@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from rich.console import Console
-from rich.markup import escape
 from rich.table import Column, Table
+from rich.text import Text
 
 from crosscheck.engine_list import EngineState
 from crosscheck.library import Case
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.summary import pair
 from crosscheck.verdict import STATUSES, Verdict
+from flexmb.printable import printable
 
 SHOWN = 20
 
@@ -26,20 +27,33 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {pair(worst)}, {channels}"
         text = f"{worst.status}, expected {worst.expected}: {worst.reason}"
-        console.print(f"[red]✕[/red] {escape(where)}: {escape(text)}", highlight=False, soft_wrap=True)
+        console.print(marked("✕", "red", f"{where}: {text}"), soft_wrap=True)
     for each in outcome.not_run:
         where = f"{each.case}, {each.variant}, {each.engine}"
-        console.print(f"[yellow]–[/yellow] {escape(where)} did not run: {escape(each.reason)}", soft_wrap=True)
+        console.print(marked("–", "yellow", f"{where} did not run: {each.reason}"), soft_wrap=True)
     for verdict in outcome.worse[:SHOWN]:
-        where = f"{verdict.case}, {verdict.comparison}, {pair(verdict)}, {verdict.channel}"
-        text = f"[yellow]![/yellow] {escape(where)} worse than recorded: {escape(verdict.worse)}"
-        console.print(text, highlight=False, soft_wrap=True)
+        console.print(marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}"), soft_wrap=True)
     for verdict in outcome.unrecorded[:SHOWN] if outcome.strict else ():
-        where = f"{verdict.case}, {verdict.comparison}, {pair(verdict)}, {verdict.channel}"
-        console.print(f"[yellow]![/yellow] {escape(where)} has no accepted figures", highlight=False, soft_wrap=True)
+        console.print(marked("!", "yellow", f"{_place(verdict)} has no accepted figures"), soft_wrap=True)
+    for line in outcome.broken[:SHOWN]:
+        console.print(marked("✕", "red", line), soft_wrap=True)
     colour = "green" if outcome.ok else "red"
-    console.print(f"[bold {colour}]{outcome.headline}[/bold {colour}]")
+    console.print(words(outcome.headline, f"bold {colour}"))
     return 0 if outcome.ok else 1
+
+
+def _place(verdict: Verdict) -> str:
+    return f"{verdict.case}, {verdict.comparison}, {pair(verdict)}, {verdict.channel}"
+
+
+def words(text: str, style: str = "") -> Text:
+    """Text as it stands, brackets and colons too: only `Text` is safe from rich's markup and emoji."""
+    return Text(printable(text), style)
+
+
+def marked(mark: str, style: str, text: str) -> Text:
+    """A coloured sign, and text."""
+    return Text.assemble((mark, style), " ", words(text))
 
 
 def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
@@ -55,17 +69,15 @@ def _verdict_table(verdicts: Sequence[Verdict]) -> Table:
         good = sum(verdict.ok for verdict in group)
         colour = "green" if good == len(group) else "red"
         cells = [_count(group, status) for status in occurring]
-        shown = "" if case == previous else escape(case)
-        table.add_row(shown, escape(name), f"[{colour}]{good} of {len(group)}[/{colour}]", *cells)
+        shown = "" if case == previous else case
+        table.add_row(words(shown), words(name), words(f"{good} of {len(group)}", colour), *cells)
         previous = case
     return table
 
 
-def _count(group: list[Verdict], status: str) -> str:
+def _count(group: list[Verdict], status: str) -> Text:
     found = [verdict for verdict in group if verdict.status == status]
-    if not found:
-        return ""
-    return f"[{'green' if all(verdict.ok for verdict in found) else 'red'}]{len(found)}[/]"
+    return words(str(len(found) or ""), "green" if all(verdict.ok for verdict in found) else "red")
 
 
 def _groups(verdicts: Iterable[Verdict]) -> dict[tuple[str, ...], list[Verdict]]:
@@ -84,7 +96,8 @@ def cases_table(cases: Iterable[Case]) -> Table:
         variants = ", ".join(variant.name for variant in case.run.variants)
         figures = sum(len(each) for each in case.accepted.values())
         tags = ", ".join(case.run.tags)
-        table.add_row(case.name, case.run.title, tags, variants, ", ".join(engines), str(figures or "none"))
+        cells = (case.name, case.run.title, tags, variants, ", ".join(engines), str(figures or "none"))
+        table.add_row(*map(words, cells))
     return table
 
 
@@ -92,8 +105,6 @@ def engines_table(states: Iterable[EngineState]) -> Table:
     """The engines."""
     table = Table(Column("engine", no_wrap=True), "what it is", "version", "how to install", header_style="bold")
     for state in states:
-        version = (
-            f"[yellow]{state.absence}[/yellow]" if state.version is None else f"[green]{escape(state.version)}[/green]"
-        )
-        table.add_row(state.name, escape(state.summary), version, escape(state.advice))
+        version = words(state.absence, "yellow") if state.version is None else words(state.version, "green")
+        table.add_row(words(state.name), words(state.summary), version, words(state.advice))
     return table

@@ -16,6 +16,7 @@ from crosscheck.report.outcome import Outcome
 from crosscheck.report.views import comparison_tables, conservation_table, control_table, overview
 from crosscheck.results import CaseResults, Session
 from crosscheck.verdict import STATUSES
+from flexmb.printable import printable
 
 
 def write_report(session: Session, outcome: Outcome, file: Path) -> None:
@@ -26,6 +27,7 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
         trim_blocks=True,
         lstrip_blocks=True,
         keep_trailing_newline=False,
+        finalize=_shown,
     )
     templates.filters["code"] = _code
     templates.filters["breakable"] = _breakable
@@ -41,9 +43,22 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
         engines=_engines(session),
         style=_inline(templates, "style.css"),
         scripts=[Markup(get_plotlyjs()), *(_inline(templates, name) for name in ("charts.js", "scene.js", "page.js"))],
-        data=Markup(msgspec.json.encode(data).decode().replace("</", "<\\/")),
+        data=embedded(data),
     )
-    file.write_text(page, encoding="utf-8")
+    file.write_text(page, encoding="utf-8", errors="backslashreplace")
+
+
+def embedded(data: Any) -> Markup:
+    """Data as JSON that may stand in a script element: nothing in it looks like the end of one or of a line."""
+    text = msgspec.json.encode(data).decode()
+    for character in "<>&\u2028\u2029":
+        text = text.replace(character, f"\\u{ord(character):04x}")
+    return Markup(text)
+
+
+def _shown(value: Any) -> Any:
+    """What a template prints: of plain text only what prints; markup is our own."""
+    return printable(value) if type(value) is str else value
 
 
 def _inline(templates: Environment, name: str) -> Markup:
@@ -54,12 +69,12 @@ def _inline(templates: Environment, name: str) -> Markup:
 
 def _code(text: str) -> Markup:
     """Text of a README or a note with `words in backticks` set as code."""
-    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(text))))
+    return Markup(re.sub(r"`([^`]+)`", r"<code>\1</code>", str(escape(printable(text)))))
 
 
 def _breakable(text: str) -> Markup:
     """Text that may be broken after a slash."""
-    return Markup(str(escape(text)).replace("/", "/<wbr>"))
+    return Markup(str(escape(printable(text))).replace("/", "/<wbr>"))
 
 
 def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:

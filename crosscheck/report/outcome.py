@@ -29,11 +29,14 @@ class Absence:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All verdicts of a session, by case; all absences. `strict`: figures worse than recorded, or of which none are
-    recorded, are not as expected."""
+    """All verdicts of a session, by case; all absences; lines of the records that are none, in words.
+
+    `strict`: figures worse than recorded, or of which none are recorded, are not as expected.
+    """
 
     verdicts: dict[str, list[Verdict]]
     absences: list[Absence]
+    broken: tuple[str, ...] = ()
     strict: bool = False
 
     @property
@@ -63,15 +66,15 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Every verdict is the expected one, everything asked for ran, and there was something to judge."""
-        sound = bool(self.all) and not self.unexpected and not self.not_run
+        """Every verdict is the expected one, everything asked for ran, nothing is lost, and there was something."""
+        sound = bool(self.all) and not self.unexpected and not self.not_run and not self.broken
         return sound and not (self.strict and (self.worse or self.unrecorded))
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
         if not self.all:
-            return "Nothing was compared"
+            return "Nothing was compared" + (f": {self._lost}" if self.broken else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
             return f"All {len(self.all)} verdicts are as expected{grown}"
@@ -85,7 +88,14 @@ class Outcome:
             parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
         if self.strict and self.unrecorded:
             parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
+        if self.broken:
+            parts.append(self._lost)
         return " and ".join(parts)
+
+    @property
+    def _lost(self) -> str:
+        lines = "line is" if len(self.broken) == 1 else "lines are"
+        return f"{len(self.broken)} {lines} no record: what stood there is lost"
 
     def counts(self) -> Counter[str]:
         """Number of verdicts of each status, controls apart: there *differ* is the good news."""
@@ -102,6 +112,7 @@ def conclude(session: Session, strict: bool = False) -> Outcome:
     return Outcome(
         verdicts={case.case.case: judge(case) for case in session.cases},
         absences=[absence for case in session.cases for absence in _absences(case)],
+        broken=tuple(str(line) for line in session.broken),
         strict=strict,
     )
 

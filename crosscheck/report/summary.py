@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
@@ -10,19 +11,22 @@ from crosscheck.accepted import recordable
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.report.outcome import Outcome
 from crosscheck.verdict import STATUSES, Verdict
+from flexmb.printable import printable
 
 SHOWN = 40
+# What means something to Markdown within a line: an underscore not between letters, a sign of a list at the beginning.
+MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
 
 
 def write_summary(outcome: Outcome, file: Path) -> None:
     """summary.md: headline, counts by case, what is not as expected, what did not run."""
-    lines = [f"# {'✅' if outcome.ok else '❌'} {outcome.headline}", ""]
+    lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
     lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
     lines += ["|---" * (3 + len(STATUSES)) + "|"]
     for case, verdicts in outcome.verdicts.items():
         counts = [sum(verdict.ok for verdict in verdicts)]
         counts += [sum(verdict.status == status for verdict in verdicts) for status in STATUSES]
-        lines.append(f"| {case} | {len(verdicts)} | {' | '.join(map(str, counts))} |")
+        lines.append(f"| {_flat(case)} | {len(verdicts)} | {' | '.join(map(str, counts))} |")
     if outcome.unexpected:
         lines += ["", "## Not as expected", "", "| case | comparison | channel | pair | status | expected | reason |"]
         lines += ["|---|---|---|---|---|---|---|"]
@@ -35,8 +39,10 @@ def write_summary(outcome: Outcome, file: Path) -> None:
     if outcome.absences:
         lines += ["", "## What did not run to the end, and why", ""]
         for each in outcome.absences:
-            what = f"**{each.status}** {each.case}, {each.variant}, {each.engine}"
-            lines.append(f"- {what}{_role(each.role)}: {_flat(each.reason)}")
+            what = _flat(f"{each.case}, {each.variant}, {each.engine}{_role(each.role)}: {each.reason}")
+            lines.append(f"- **{each.status}** {what}")
+    if outcome.broken:
+        lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -57,10 +63,18 @@ def write_junit(outcome: Outcome, file: Path) -> None:
         suite.set("tests", str(len(tests) + len(missing)))
         suite.set("failures", str(tests.count("failure") + len(missing)))
         suite.set("skipped", str(tests.count("skipped")))
+    if outcome.broken:
+        count = str(len(outcome.broken))
+        suite = ElementTree.SubElement(suites, "testsuite", name="records", tests=count, failures=count)
+        for line in outcome.broken:
+            test = ElementTree.SubElement(suite, "testcase", classname="records", name="the line is a record")
+            ElementTree.SubElement(test, "failure", type="broken", message=line)
     if not outcome.all:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
         test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
         ElementTree.SubElement(test, "failure", type="nothing", message=outcome.headline)
+    for element in suites.iter():  # XML has no way to write most control characters: they are written out
+        element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
     ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
 
 
@@ -105,8 +119,8 @@ def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -
         return []
     lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
     for verdict in verdicts[:SHOWN]:
-        cells = (verdict.case, verdict.comparison, f"`{verdict.channel}`", pair(verdict), say(verdict))
-        lines.append("| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |")
+        cells = (_flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(pair(verdict)))
+        lines.append(f"| {' | '.join(cells)} | {_flat(say(verdict))} |")
     if len(verdicts) > SHOWN:
         lines += ["", f"... and {len(verdicts) - SHOWN} more, in verdicts.json."]
     return lines
@@ -114,15 +128,15 @@ def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -
 
 def _row(verdict: Verdict) -> str:
     cells = (
-        verdict.case,
-        verdict.comparison,
-        f"`{verdict.channel}`",
-        pair(verdict),
+        _flat(verdict.case),
+        _flat(verdict.comparison),
+        _code(verdict.channel),
+        _flat(pair(verdict)),
         f"**{verdict.status}**",
         verdict.expected,
         _flat(verdict.reason),
     )
-    return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+    return "| " + " | ".join(cells) + " |"
 
 
 def _role(role: str) -> str:
@@ -130,4 +144,13 @@ def _role(role: str) -> str:
 
 
 def _flat(text: str) -> str:
-    return " ".join(text.split())
+    """Text on one line, of which Markdown makes nothing but that text."""
+    return MARKDOWN.sub(r"\\\g<0>", printable(" ".join(text.split())))
+
+
+def _code(text: str) -> str:
+    """Text as code on one line: between more backticks than it holds itself; a bar would end a table's cell."""
+    flat = printable(" ".join(text.split()))
+    fence = "`" * (1 + max(map(len, re.findall("`+", flat)), default=0))
+    space = " " if flat.startswith("`") or flat.endswith("`") else ""
+    return f"{fence}{space}{flat}{space}{fence}".replace("|", "\\|")

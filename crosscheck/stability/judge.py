@@ -16,7 +16,7 @@ FAR = 10**6
 WRONG, NO_EVIDENCE = -1, -2  # instead of the number of a class
 
 
-class MapVerdict(msgspec.Struct, frozen=True, kw_only=True):
+class MapVerdict(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The judgement of a map.
 
     `status`: "agree", "differ", or "did not run" where cells did not or none says anything. `distance` is the largest

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,8 +19,7 @@ STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours for the classes of maps that 
 DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
 
 
-@dataclass(frozen=True)
-class Axis:
+class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter from `low` to `high` in `cells` coarse cells, equal in its logarithm if `log`.
 
     With `categories` it is one row of cells for each of them, which are not divided, and its values are 0, 1, 2 ...

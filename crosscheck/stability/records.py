@@ -9,7 +9,7 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.made_by import made_by
-from crosscheck.records import Environment, decoded_lines
+from crosscheck.records import BrokenLine, Environment, decoded_lines
 from crosscheck.stability.map import Axis, CellStatus, StabilityMap
 from crosscheck.stability.refine import Cell
 
@@ -45,7 +45,8 @@ class CellRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         return Cell(self.level, self.i, self.j)
 
 
-Record = Environment | MapRecord | CellRecord
+Written = Environment | MapRecord | CellRecord
+Record = Written | BrokenLine
 
 
 def identity(what: StabilityMap) -> str:
@@ -56,8 +57,8 @@ def identity(what: StabilityMap) -> str:
 
 
 def read(file: Path) -> list[Record]:
-    """All records of a file, in order. ValueError names a wrong line."""
-    return decoded_lines(file, Record)
+    """All records of a file, in order; lines that are none are a BrokenLine, and their cells are asked for again."""
+    return decoded_lines(file, Written)
 
 
 def cells_of(records: Sequence[Record], wanted: str) -> dict[Cell, CellRecord]:

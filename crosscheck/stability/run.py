@@ -17,7 +17,7 @@ from crosscheck.pool import Event, run_jobs
 from crosscheck.records import Archive, environment
 from crosscheck.stability.judge import MapVerdict, judge, label
 from crosscheck.stability.map import Outcome, StabilityMap
-from crosscheck.stability.records import CellRecord, MapRecord, cells_of, identity, read
+from crosscheck.stability.records import CellRecord, MapRecord, Written, cells_of, identity, read
 from crosscheck.stability.refine import Cell, Mesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"
@@ -70,7 +70,7 @@ def run_map(
     mark = identity(what)
     known = cells_of(read(records), mark) if records.exists() else {}
     used: dict[Cell, CellRecord] = {}
-    archive = Archive(records)
+    archive = Archive(records, Written)
     try:
         archive.write(environment())
         archive.write(MapRecord(map=name, identity=mark, quantity=what.quantity, x=what.x, y=what.y))

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import json
 import os
-import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ import msgspec
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.problems import Problem, SceneError
+from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
 LINE = 110  # characters: longer arrays are written one item a line
@@ -32,7 +32,11 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
     Types, keys and lengths are checked here, the physics by `check_scene`.
     """
     path = Path(path)
-    return loads(path.read_text(encoding="utf-8"), path.parent, name=str(path))
+    try:
+        text = read_text(path)
+    except Unreadable as error:
+        raise _unreadable(str(path), error) from None
+    return loads(text, path.parent, name=str(path))
 
 
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
@@ -44,9 +48,9 @@ def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
 def loads(text: str, folder: str | os.PathLike[str] | None = None, *, name: str = "<text>") -> Scene:
     """A scene from TOML text; with a `folder`, file references are made absolute from there. `name` is for errors."""
     try:
-        data = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as error:
-        raise SceneError(name, [Problem(name, f"not TOML: {error}", "correct the syntax at that line")]) from None
+        data = parse_toml(text)
+    except Unreadable as error:
+        raise _unreadable(name, error) from None
     scene = to_struct(data, Scene, name)
     return scene if folder is None else _with_files(scene, lambda file: os.path.abspath(os.path.join(folder, file)))
 
@@ -69,6 +73,10 @@ def dumps(scene: Scene, folder: str | os.PathLike[str] | None = None) -> str:
 def inline(value: Any) -> str:
     """One value (struct, array, number, string) as TOML on one line, keys at their default left out."""
     return _value(_sparse(value), 0)
+
+
+def _unreadable(name: str, error: Unreadable) -> SceneError:
+    return SceneError(name, [Problem(name, error.what, error.remedy)])
 
 
 def _relative(file: str, folder: str | os.PathLike[str]) -> str:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from typing import NamedTuple
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from flexmb.scene.bodies import InertiaPoint, ModalBody, ModalNode
 from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.npz import read_arrays
 
 Array = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ def modal_arrays(body: ModalBody) -> ModalArrays:
 
     Raises OSError where the file cannot be read, and ValueError naming an array that is missing or has a wrong shape.
     """
-    given = _from_file(body.file) if body.file is not None else _from_points(body.points)
+    given = read_arrays(body.file, ModalArrays._fields) if body.file is not None else _from_points(body.points)
     for name in OF_BODY:
         if matrix := getattr(body, name):
             if name in given:
@@ -113,17 +113,6 @@ def inertia_points(
     return tuple(points)
 
 
-def _from_file(file: str) -> dict[str, Array]:
-    try:
-        archive = np.load(file, allow_pickle=False)
-    except (BadZipFile, EOFError, ValueError):
-        raise ValueError(f'"{file}" is not an .npz archive of plain arrays') from None
-    if not isinstance(archive, np.lib.npyio.NpzFile):
-        raise ValueError(f'"{file}" holds one array: save the arrays by name with numpy.savez')
-    with archive:
-        return {name: _array(name, archive[name]) for name in archive.files}
-
-
 def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Array]:
     if not points:
         return {}
@@ -154,9 +143,12 @@ def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> A
 
 def _array(name: str, value: ArrayLike) -> Array:
     try:
-        return np.asarray(value, dtype=np.float64)
+        array = np.asarray(value)
+        if not np.iscomplexobj(array):
+            return array.astype(np.float64)
     except (TypeError, ValueError):
         raise ValueError(f'"{name}" is not a full array of numbers: its rows differ in length') from None
+    raise ValueError(f'"{name}" is complex: give real numbers')
 
 
 def _shaped(given: dict[str, Array]) -> ModalArrays:

@@ -14,6 +14,9 @@ function colour(name) {
   return COLOURS[name];
 }
 
+// Plotly takes text for markup and for a template: names are written in character references.
+const plain = text => String(text).replace(/[&<>%${}]/g, c => "&#" + c.charCodeAt(0) + ";");
+
 function decode(series) {
   if (!series.values) {
     const bytes = Uint8Array.from(atob(series.data), c => c.charCodeAt(0));
@@ -45,7 +48,7 @@ function sides(channel, series) {
   const traces = [], wide = channel.sides.length;
   channel.sides.forEach((side, i) => channel.components.forEach((component, j) => traces.push({
     x: column(series[side.times], 0), y: column(series[side.values], j), type: "scatter", mode: "lines",
-    name: side.label, legendgroup: side.label, showlegend: j === 0, hovertemplate: "%{y:.6g}",
+    name: plain(side.label), legendgroup: side.label, showlegend: j === 0, hovertemplate: "%{y:.6g}",
     line: { color: colour(side.engine + (side.label === side.engine ? "" : side.label)), width: 1.4 + 2.2 * (wide - 1 - i), dash: DASHES[j % 3] },
     opacity: i === wide - 1 ? 1 : 0.55,
   })));
@@ -55,7 +58,7 @@ function sides(channel, series) {
 function distances(channel, series) {
   const traces = [];
   channel.pairs.forEach((pair, i) => {
-    const x = column(series[pair.times], 0), name = pair.a + " – " + pair.b, tone = PAIRS[i % PAIRS.length];
+    const x = column(series[pair.times], 0), name = plain(pair.a + " – " + pair.b), tone = PAIRS[i % PAIRS.length];
     const common = { x, type: "scatter", mode: "lines", yaxis: "y2", legendgroup: name };
     traces.push({ ...common, y: positive(column(series[pair.error], 0)), name: "|" + name + "|", line: { color: tone, width: 1.5 },
       hovertemplate: "E %{y:.2e}" });
@@ -81,7 +84,7 @@ function drawChannel(node, channel, series) {
 
 function drawDrift(node, drift, series) {
   const traces = drift.curves.map(curve => ({
-    x: column(series[curve.times], 0), y: positive(column(series[curve.values], 0)), type: "scatter", mode: "lines", name: curve.engine,
+    x: column(series[curve.times], 0), y: positive(column(series[curve.values], 0)), type: "scatter", mode: "lines", name: plain(curve.engine),
     line: { color: colour(curve.engine), width: 1.6 }, hovertemplate: "%{y:.2e}",
   }));
   Plotly.react(node, traces, layout({
@@ -102,16 +105,16 @@ function drawWork(node, work) {
   }
   const low = Math.floor(Math.log10(Math.min(...errors, work.doubt))) - 0.7;
   const quickest = Math.min(...work.points.map(p => p.wall_s).filter(s => s > 0)), wall = p => p.wall_s || quickest;
-  const text = p => `${p.effort}<br>${p.evaluations || "?"} evaluations<br>${p.message || ""}`;
+  const text = p => `${plain(p.effort)}<br>${p.evaluations || "?"} evaluations<br>${plain(p.message || "")}`;
   const traces = [];
   for (const [key, points] of groups) {
     const good = points.filter(p => p.error > 0), bad = points.filter(p => !(p.error > 0));
     const marker = { color: colour(points[0].engine), symbol: SYMBOLS[variants.indexOf(points[0].variant) % SYMBOLS.length], size: 8 };
-    traces.push({ x: good.map(wall), y: good.map(p => p.error), text: good.map(text), name: key, legendgroup: key, type: "scatter",
-      mode: "lines+markers", line: { color: marker.color, width: 1 }, marker, hovertemplate: "%{x:.3g} s, error %{y:.2e}<br>%{text}<extra>" + key + "</extra>" });
-    if (bad.length) traces.push({ x: bad.map(wall), y: bad.map(() => margin), text: bad.map(text), name: key + " failed", legendgroup: key,
+    traces.push({ x: good.map(wall), y: good.map(p => p.error), text: good.map(text), name: plain(key), legendgroup: key, type: "scatter",
+      mode: "lines+markers", line: { color: marker.color, width: 1 }, marker, hovertemplate: "%{x:.3g} s, error %{y:.2e}<br>%{text}<extra>" + plain(key) + "</extra>" });
+    if (bad.length) traces.push({ x: bad.map(wall), y: bad.map(() => margin), text: bad.map(text), name: plain(key) + " failed", legendgroup: key,
       showlegend: !good.length, type: "scatter", mode: "markers", marker: { ...marker, symbol: "x", size: 9 },
-      hovertemplate: "failed after %{x:.3g} s<br>%{text}<extra>" + key + "</extra>" });
+      hovertemplate: "failed after %{x:.3g} s<br>%{text}<extra>" + plain(key) + "</extra>" });
   }
   const front = work.points.filter(p => p.best && p.error > 0);
   traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
@@ -119,12 +122,12 @@ function drawWork(node, work) {
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
     xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)", standoff: 4 }, exponentformat: "power" },
-    yaxis: { type: "log", title: { text: "error of " + work.observable + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
+    yaxis: { type: "log", title: { text: "error of " + plain(work.observable) + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
       range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 12) },
     shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: "#eef1f4", line: { width: 0 }, layer: "below" }],
     annotations: [
       { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: "#5b6675" },
-        text: "below the reference's own uncertainty (" + work.reference + ")" },
+        text: "below the reference's own uncertainty (" + plain(work.reference) + ")" },
       { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: "#5b6675" }, text: "× at the top: failed runs" }],
     legend: { orientation: "h", y: -0.19, yanchor: "top", font: { size: 11 } },
   }), CONFIG);

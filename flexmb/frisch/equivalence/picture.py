@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 from numpy.typing import NDArray
 
 from flexmb.frisch.equivalence.advice import Equivalence
+from flexmb.printable import chart_text
 
 Array = NDArray[np.float64]
 
@@ -27,7 +28,7 @@ def write_equivalence_plot(result: Equivalence, path: Path) -> Path:
     _shape(result, figure.add_subplot(grid[0, :]))
     _mismatches(result, figure.add_subplot(grid[1, 0]))
     _convergence(result, figure.add_subplot(grid[1, 1]))
-    figure.suptitle(f"{result.appendage.name}: modes against a rigid body on a spring hinge")
+    figure.suptitle(chart_text(f"{result.appendage.name}: modes against a rigid body on a spring hinge"))
     for axes in figure.axes:
         axes.grid(alpha=0.3)
         axes.set_axisbelow(True)

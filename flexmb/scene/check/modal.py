@@ -13,7 +13,7 @@ from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
 from flexmb.scene.check import inertia
 from flexmb.scene.check.beams import mode_count
 from flexmb.scene.check.second_order import second_order
-from flexmb.scene.check.walk import entries, sound
+from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene
@@ -77,10 +77,12 @@ def _read(place: Place, body: ModalBody) -> Generator[Problem, None, ModalArrays
     except ValueError as error:
         yield Problem(str(spot), str(error), "give arrays of the shapes that the reference of ModalBody lists")
     else:
-        broken = next((name for name, array in arrays.given.items() if not np.all(np.isfinite(array))), None)
+        huge = (name for name, array in arrays.given.items() if not np.all(np.abs(array) <= LARGEST))
+        broken = next(huge, None)
         if broken is None:
             return arrays
-        yield Problem(str(spot), f'"{broken}" holds a NaN or an infinity', "give finite numbers")
+        remedy = f"give finite numbers, of at most {LARGEST:g}"
+        yield Problem(str(spot), f'"{broken}" holds a NaN or an infinity', remedy)
     return None
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import hypot, isfinite
+from math import hypot
 from typing import Any
 
 import msgspec
@@ -14,6 +14,8 @@ from flexmb.scene.schema import Scene
 
 # Data printed to ten digits are unit vectors to 1e-10; what is further off than this was never normalised.
 UNIT_LENGTH = 1e-9
+# No quantity of mechanics is near it in SI units, and products of five such numbers are still finite.
+LARGEST = 1e60
 AXES = ("axis", "direction", "directions")
 
 
@@ -42,8 +44,8 @@ def values(place: Place, struct: msgspec.Struct) -> Iterator[tuple[Place, str, A
 
 
 def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
-    """Index and value of the first NaN or infinity in a number or nested tuple of numbers."""
-    if isinstance(value, float) and not isfinite(value):
+    """Index and value of the first NaN, infinity, or size beyond LARGEST in a number or nested tuple of numbers."""
+    if isinstance(value, float) and not abs(value) <= LARGEST:
         return (), value
     if isinstance(value, tuple):
         for i, item in enumerate(value):
@@ -53,10 +55,11 @@ def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
 
 
 def finite_numbers(scene: Scene) -> Iterator[Problem]:
-    """No NaN and no infinity, anywhere."""
+    """No NaN, no infinity and nothing whose powers are infinite, anywhere."""
     for place, _, value in values(ROOT, scene):
         if found := non_finite(value):
-            yield Problem(str(place.key(*found[0])), f"the number is {found[1]}", "give a finite number")
+            remedy = f"give a finite number, of at most {LARGEST:g}"
+            yield Problem(str(place.key(*found[0])), f"the number is {found[1]}", remedy)
 
 
 def unit_vectors(scene: Scene) -> Iterator[Problem]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from dataclasses import replace
 
+import msgspec
 import numpy as np
 
 from crosscheck.engines.contract import EngineMissing
@@ -64,7 +65,8 @@ def shifted(by: float) -> Overlay:
 def maps() -> dict[str, StabilityMap]:
     """By name."""
     quarter = Axis("x", "m", 0.0, 1.0, 4)
-    corner = replace(CIRCLE, name="corner", measure=with_bad_corner, x=quarter, y=replace(quarter, name="y"), depth=1)
+    across = msgspec.structs.replace(quarter, name="y")
+    corner = replace(CIRCLE, name="corner", measure=with_bad_corner, x=quarter, y=across, depth=1)
     found = (
         CIRCLE,
         corner,

@@ -6,6 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -36,7 +37,7 @@ def coarse(axis: Axis, high: float | None = None, decades: float = 2.0) -> Axis:
     if axis.categories:
         return axis
     count = round(np.log10(axis.high / axis.low) / decades) if axis.log else 0
-    return replace(axis, cells=min(axis.cells, max(5, count)), high=high or axis.high)
+    return msgspec.structs.replace(axis, cells=min(axis.cells, max(5, count)), high=high or axis.high)
 
 
 def coarse_maps() -> dict[str, StabilityMap]:

@@ -1,5 +1,8 @@
 """What is unusual but right passes the checks, and a scene's defects are reported together."""
 
+import tracemalloc
+import zipfile
+
 import msgspec
 import numpy as np
 import pytest
@@ -8,7 +11,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.check.profiles import start_of
-from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.modal_data import inertia_points, modal_arrays
 from flexmb.scene.shapes import cuboid_inertia
 from flexmb.scene.tree import ordered
 from tests.flexmb.scene.bad_scenes import BALL, NONE, satellite
@@ -186,7 +189,12 @@ NPZ = {
     "wrong shape": ({"rotation_modes": np.ones((2, 3, 2))}, r"\(2, 3, 2\), expected \(2, 3, 1\)"),
     "unknown array": ({"inertias": np.ones(2)}, '"inertias" is not one of'),
     "NaN": ({"mass": np.array([1.0, np.nan])}, '"mass" holds a NaN'),
-    "text": ({"mass": np.array(["a", "b"])}, '"mass" is not a full array of numbers'),
+    "text": ({"mass": np.array(["a", "b"])}, '"mass" holds numbers of type <U1'),
+    "complex": ({"mass": np.ones(2) + 0j}, '"mass" holds numbers of type complex128'),
+    "objects": ({"mass": np.array([1.0, None])}, '"mass" holds numbers of type object'),
+    "truth values": ({"mass": np.ones(2, bool)}, '"mass" holds numbers of type bool'),
+    "beyond all powers": ({"mass": np.array([1.0, 1e300])}, "at most 1e\\+60"),
+    "bomb": ({"second_translation": np.zeros((2, 3, 2200, 2200))}, "would take 222 MiB of memory, more than a file"),
 }
 
 
@@ -205,9 +213,34 @@ def test_an_npz_is_read(tmp_path):
 @pytest.mark.parametrize(("change", "message"), NPZ.values(), ids=NPZ)
 def test_a_bad_npz_is_refused(tmp_path, change, message):
     arrays = {name: array for name, array in (ARRAYS | change).items() if array is not None}
-    np.savez(tmp_path / "panel.npz", **arrays)
+    np.savez_compressed(tmp_path / "panel.npz", **arrays)
+    tracemalloc.start()
     with pytest.raises(SceneError, match=message):
         npz_scene(tmp_path / "panel.npz").scene()
+    assert tracemalloc.get_traced_memory()[1] < 1e7
+    tracemalloc.stop()
+
+
+def test_a_doubled_array_is_refused(tmp_path):
+    np.savez(tmp_path / "panel.npz", **ARRAYS)
+    with pytest.warns(UserWarning, match="Duplicate"), zipfile.ZipFile(tmp_path / "panel.npz", "a") as archive:
+        archive.writestr("mass.npy", archive.read("mass.npy"))
+    with pytest.raises(SceneError, match='"mass" is there twice'):
+        npz_scene(tmp_path / "panel.npz").scene()
+
+
+def test_arrays_in_columns_and_of_other_real_types_are_read(tmp_path):
+    modes = np.arange(6.0).reshape(2, 3, 1)
+    given = {"mass": np.array([1, 2]), "translation_modes": np.asfortranarray(modes)}
+    np.savez(tmp_path / "panel.npz", **(ARRAYS | given))
+    arrays = modal_arrays(npz_scene(tmp_path / "panel.npz").scene().bodies[0])
+    np.testing.assert_array_equal(arrays.mass, [1.0, 2.0])
+    np.testing.assert_array_equal(arrays.translation_modes, modes)
+
+
+def test_complex_numbers_are_refused_wherever_arrays_are_given():
+    with pytest.raises(ValueError, match='"mass" is complex'):
+        inertia_points(np.ones(2) + 1j, np.eye(3)[:2], np.ones((2, 3, 1)))
 
 
 def test_a_file_that_is_no_npz_is_refused(tmp_path):
