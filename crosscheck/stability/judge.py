@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import distance_transform_cdt
 
-from crosscheck.stability.map import StabilityMap
+from crosscheck.stability.map import NO_PREDICTION, StabilityMap
 from crosscheck.stability.records import CellRecord
 from crosscheck.stability.refine import Cell, Mesh
 
@@ -71,8 +73,8 @@ def judge(what: StabilityMap, mesh: Mesh, records: dict[Cell, CellRecord]) -> Ma
 
 def measured_class(what: StabilityMap, record: CellRecord) -> int:
     """Number of a cell's class; `WRONG` where it has none, `NO_EVIDENCE` where that says nothing."""
-    if record.status == "measured" and record.value is not None:
-        return what.kind(record.value)
+    if record.status == "measured":
+        return what.kind(record.value) if record.value is not None and math.isfinite(record.value) else WRONG
     if record.status == "did not finish" and what.skips:
         return NO_EVIDENCE
     return WRONG if what.failure is None or record.status == "did not run" else what.failure
@@ -80,7 +82,7 @@ def measured_class(what: StabilityMap, record: CellRecord) -> int:
 
 def label(what: StabilityMap, record: CellRecord) -> str:
     """What a cell is called and coloured by: its class, or its status where there is no value."""
-    if record.status == "measured" and record.value is not None:
+    if record.status == "measured" and record.value is not None and math.isfinite(record.value):
         return what.kinds[what.kind(record.value)].name
     return record.status
 
@@ -118,7 +120,8 @@ def _chessboard(wanted: NDArray[np.bool_]) -> NDArray[np.intp]:
 def _place(what: StabilityMap, x: float, y: float, record: CellRecord, expected: int) -> str:
     named = f"{what.y.name} {what.y.categories[round(y)]}" if what.y.categories else f"{what.y.name} {y:.4g}"
     found = label(what, record) + (f" ({record.message})" if record.message else "")
-    return f"at {what.x.name} {x:.4g}, {named}: {found}, expected {what.kinds[expected].name}"
+    awaited = "that the theory says something" if expected == NO_PREDICTION else what.kinds[expected].name
+    return f"at {what.x.name} {x:.4g}, {named}: {found}, expected {awaited}"
 
 
 def _counts(what: StabilityMap, found: list[CellRecord]) -> dict[str, int]:

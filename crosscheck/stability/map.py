@@ -15,6 +15,7 @@ from flexmb.scene.schema import Scene
 Array = NDArray[np.float64]
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
+NO_PREDICTION = -3  # instead of the number of a class
 STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours for the classes of maps that ask nothing but that
 DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
 
@@ -97,8 +98,9 @@ class Overlay:
     bound: bool = False
 
     def classes(self, x: Array, y: Array) -> NDArray[np.intp]:
-        """Numbers of the classes expected at x, y."""
-        return np.searchsorted(self.levels, self.predict(x, y), side="right")
+        """Numbers of the classes expected at x, y; `NO_PREDICTION` where the theory gives no number."""
+        predicted = self.predict(x, y)
+        return np.where(np.isnan(predicted), NO_PREDICTION, np.searchsorted(self.levels, predicted, side="right"))
 
 
 @dataclass(frozen=True)
