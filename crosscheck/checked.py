@@ -82,6 +82,7 @@ def checked_run(found: Any, times: Array, scene: Scene) -> Trajectory:
     _require(finished or bool(message.strip()), f'a "{found.status}" run says in its message when and why')
     count = _reached(found.times, times, finished)
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
+    loaded = hinges | _names(scene.closures) | _names(scene.point_masses)
     run = Trajectory(
         status=found.status,
         message=message,
@@ -90,7 +91,7 @@ def checked_run(found: Any, times: Array, scene: Scene) -> Trajectory:
             name: _path(path, f"markers[{name!r}]", count)
             for name, path in _named_by(found.markers, "markers", _names(scene.markers))
         },
-        loads=_loads(found.loads, "loads", hinges | _names(scene.point_masses), count),
+        loads=_loads(found.loads, "loads", loaded, count),
         wheel_loads=_loads(found.wheel_loads, "wheel_loads", wheels, count),
         drives={
             name: _array(values, f"drives[{name!r}]", count, None)
