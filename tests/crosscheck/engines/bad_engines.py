@@ -243,8 +243,8 @@ def _gallery() -> tuple[dict[str, Bad], dict[str, Bad]]:
         "version_empty": ("version() is empty", None, {"version": lambda: " "}),
         "version_raises": ("KeyError", None, {"version": lambda: {}["version"]}),
         "supports_true": ("a bool, not a Support", None, {"supports": lambda scene: True}),
-        "supports_perhaps": ("of kind 'perhaps'", None, {"supports": lambda scene: Support("perhaps")}),  # type: ignore[arg-type]
-        "supports_without_reason": ("not text", None, {"supports": lambda scene: Support("exact", None)}),  # type: ignore[arg-type]
+        "supports_perhaps": ("supports() is 'perhaps'", None, {"supports": lambda scene: Support("perhaps")}),
+        "supports_without_reason": ("not text", None, {"supports": lambda scene: Support("exact", None)}),
         "no_efforts": ("efforts() has 0 efforts", None, efforts()),
         "two_efforts": ("efforts() has 2 efforts", None, efforts(1e-3, 1e-6)),
         "the_same_effort_twice": ("the same effort twice", None, efforts(1e-3, 1e-6, 1e-6)),
