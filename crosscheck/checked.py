@@ -48,8 +48,7 @@ def checked_version(found: Any) -> str:
 def checked_support(found: Any) -> Support:
     """What `supports` returned."""
     _instance(found, Support, "supports()")
-    known = found.kind in ("exact", "surrogate", "no")
-    _require(known, f'supports() is of kind {found.kind!r}: it is "exact", "surrogate" or "no"')
+    _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
 
 
@@ -76,12 +75,12 @@ def checked_model(found: Any) -> Model:
 def checked_run(found: Any, times: Array, scene: Scene) -> Trajectory:
     """What `simulate` returned for the sample times asked for; an unfinished run is cut to its finite samples."""
     _instance(found, Trajectory, "simulate()")
-    statuses = get_args(Status)
-    _require(found.status in statuses, f"the status is {found.status!r}: it is one of {', '.join(statuses)}")
+    _one_of(found.status, get_args(Status), "the status")
     finished, message = found.status == "finished", _text(found.message, "message")
     _require(finished or bool(message.strip()), f'a "{found.status}" run says in its message when and why')
     count = _reached(found.times, times, finished)
     hinges, wheels = _names(scene.hinges), _names(scene.wheels)
+    loaded = hinges | _names(scene.closures) | _names(scene.point_masses)
     run = Trajectory(
         status=found.status,
         message=message,
@@ -90,7 +89,7 @@ def checked_run(found: Any, times: Array, scene: Scene) -> Trajectory:
             name: _path(path, f"markers[{name!r}]", count)
             for name, path in _named_by(found.markers, "markers", _names(scene.markers))
         },
-        loads=_loads(found.loads, "loads", hinges | _names(scene.point_masses), count),
+        loads=_loads(found.loads, "loads", loaded, count),
         wheel_loads=_loads(found.wheel_loads, "wheel_loads", wheels, count),
         drives={
             name: _array(values, f"drives[{name!r}]", count, None)
@@ -206,11 +205,16 @@ def _cut(run: Trajectory, count: int) -> Trajectory:
 
 def _effort(found: Any, where: str) -> Effort:
     _instance(found, Effort, where)
-    _require(found.kind in ("tolerance", "step"), f'{where} is of kind {found.kind!r}: "tolerance" or "step"')
+    _one_of(found.kind, ("tolerance", "step"), f"{where}.kind")
     method = _text(found.method, f"{where}.method")
     value = _number(found.value, f"{where}.value")
     _require(value > 0.0, f"{where}.value is {value:g}: a tolerance or a step (s) is positive")
     return Effort(found.kind, value, method)
+
+
+def _one_of(found: Any, words: tuple[str, ...], where: str) -> None:
+    right = isinstance(found, str) and found in words
+    _require(right, f"{where} is {found!r:.80}: it is one of {', '.join(words)}")
 
 
 def _text(found: Any, where: str) -> str:

@@ -211,7 +211,9 @@ def _watch(worker: _Worker, held: dict[int, int], memory_bytes: float) -> Event 
 
 def _death(worker: _Worker) -> Event:
     assert worker.job is not None and worker.process is not None
-    worker.process.join(TICK_S)
+    patience = time.monotonic() + TICK_S
+    while worker.process.exitcode is None and time.monotonic() < patience:  # `join` waits for ever if it lives on
+        time.sleep(0.01)
     code = worker.process.exitcode
     how = "closed its pipe" if code is None else f"died (exit code {code})"
     return Event(worker.job, "crashed", f"the worker process {how}")

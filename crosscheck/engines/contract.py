@@ -66,10 +66,10 @@ class MarkerSnapshot:
 class Snapshot:
     """Pointwise results at the scene's initial state and t = 0.
 
-    `loads[hinge]` (6,) [torque; force]: total load across the hinge on the outboard body about the outboard hinge
-    point; an engine may add its point masses, under their names. `wheel_loads[wheel]` (6,): on the wheel about its
-    centre. `drives[name]` (n,): generalised drive load of each prescribed coordinate of a hinge or wheel, beyond
-    springs and motors. `energy`: "kinetic", "strain", "spring", "gravity" (J), as far as the engine knows them.
+    `loads[hinge]` (6,) [torque; force]: total load across the hinge, or closure, on the outboard body about the
+    outboard hinge point; an engine may add its point masses, under their names. `wheel_loads[wheel]` (6,): on the wheel
+    about its centre. `drives[name]` (n,): generalised drive load of each prescribed coordinate of a hinge or wheel,
+    beyond springs and motors. `energy`: "kinetic", "strain", "spring", "gravity" (J), as far as the engine knows them.
     `momentum` (6,): [angular about the World origin; linear].
     """
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -151,3 +152,24 @@ def test_list_shows_the_shipped_cases(runner: CliRunner, monkeypatch: pytest.Mon
     output = runner.invoke(cli.app, ["list"], env=WIDE).output
     assert "pendulum/single" in output
     assert "fine, stepper" in output
+
+
+@pytest.mark.parametrize("limit", ["nan", "inf", "0", "-1"])
+def test_a_time_limit_is_a_positive_number(runner: CliRunner, tmp_path: Path, limit: str) -> None:
+    for words in (["run", str(CASE)], ["stability", "free_spin"]):
+        result = runner.invoke(cli.app, [*words, "--time-limit", limit, "--out", str(tmp_path)], env=WIDE)
+        assert (result.exit_code, "give a positive number of seconds" in result.output) == (2, True)
+
+
+def test_a_run_reports_what_it_was_asked_for_and_report_shows_all(runner: CliRunner, tmp_path: Path) -> None:
+    """Two cases into one folder: each run judges its own, the archive holds both."""
+    folder, out = copy_case(tmp_path), tmp_path / "out"
+    other = folder.with_name("other")
+    shutil.copytree(folder, other)
+    for case in (folder, other):
+        assert runner.invoke(cli.app, ["run", str(case), "--out", str(out)], env=WIDE).exit_code == 0
+    assert "pendulum/single" not in (out / "summary.md").read_text(encoding="utf-8")
+    assert "pendulum/other; engines: all that the cases name" in (out / "report.html").read_text(encoding="utf-8")
+    assert runner.invoke(cli.app, ["report", str(out / "records.jsonl"), "--out", str(out)], env=WIDE).exit_code == 0
+    summary = (out / "summary.md").read_text(encoding="utf-8")
+    assert "pendulum/single" in summary and "pendulum/other" in summary

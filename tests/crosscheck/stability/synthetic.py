@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import time
 from dataclasses import replace
 
 import msgspec
@@ -45,6 +46,18 @@ def with_bad_corner(scene: Scene, x: float, y: float) -> Outcome:
     return Outcome(status="did not finish", message="too long") if y > CORNER else measure(scene, x, y)
 
 
+def with_slow_place(scene: Scene, x: float, y: float) -> Outcome:
+    """Takes for ever in one corner."""
+    if x > CORNER and y > CORNER:
+        time.sleep(3600.0)
+    return measure(scene, x, y)
+
+
+def without_end(scene: Scene, x: float, y: float) -> Outcome:
+    """Says nowhere anything."""
+    return Outcome(status="did not finish", message="too long")
+
+
 def without_library(scene: Scene, x: float, y: float) -> Outcome:
     """What an engine says that is not installed."""
     raise EngineMissing("pip install it")
@@ -70,6 +83,8 @@ def maps() -> dict[str, StabilityMap]:
     found = (
         CIRCLE,
         corner,
+        replace(corner, name="slow", measure=with_slow_place, depth=0),
+        replace(CIRCLE, name="silent", measure=without_end, depth=0, skips=True),
         replace(CIRCLE, name="absent", measure=without_library, depth=1),
         replace(CIRCLE, name="wrong", overlay=shifted(0.05)),
         replace(CIRCLE, name="close", overlay=shifted(0.015)),

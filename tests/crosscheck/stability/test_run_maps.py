@@ -10,12 +10,12 @@ import pytest
 from matplotlib.image import imread
 from typer.testing import CliRunner
 
-from crosscheck import cli
+from crosscheck import cli, made_by
 from crosscheck.stability import console, run
 from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.judge import judge
 from crosscheck.stability.picture import STATUSES, draw
-from crosscheck.stability.records import CellRecord, read
+from crosscheck.stability.records import CellRecord, cells_of, identity, read
 from crosscheck.stability.run import Finished, run_here, run_map
 from tests.crosscheck.stability import synthetic
 from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
@@ -70,6 +70,41 @@ def test_what_did_not_run_is_never_green_and_asked_for_again(tmp_path: Path) -> 
     assert done.verdict.status == "did not run" and not done.verdict.ok
     assert run_it("absent", tmp_path).verdict.cells == {"did not run": 64}
     assert len([each for each in read(tmp_path / "absent.jsonl") if isinstance(each, CellRecord)]) == 128
+
+
+def test_cells_that_exceed_a_limit_did_not_run_and_are_asked_for_again(tmp_path: Path) -> None:
+    """Whatever the machine could not do says nothing about the map."""
+    done = run_it("slow", tmp_path, scheduler=run.run_jobs, workers=2, time_limit_s=1.0)
+    stopped = [record for record in done.records.values() if record.status != "measured"]
+    assert stopped and {record.status for record in stopped} == {"did not run"}
+    assert all("stopped at its limit of 1 s" in record.message for record in stopped)
+    assert not done.verdict.ok
+    kept = cells_of(read(tmp_path / "slow.jsonl"), identity(done.map))
+    assert {record.cell for record in stopped}.isdisjoint(kept)
+
+
+def test_a_map_without_evidence_is_not_green(tmp_path: Path) -> None:
+    done = run_it("silent", tmp_path)
+    assert (done.verdict.status, done.verdict.ok) == ("did not run", False)
+
+
+def test_cells_of_other_sources_are_measured_again(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """An edit in any file that the map's scene or measure reaches, in the mechanics as in the map itself."""
+    map_of = stability_maps()["free_spin"]
+    first, of_synthetic = identity(map_of), identity(CIRCLE)
+    text = made_by._text
+    monkeypatch.setattr(made_by, "_text", lambda file: "edited" if file.name == "dynamics.py" else text(file))
+    made_by._key.cache_clear()
+    assert identity(map_of) != first
+    assert identity(CIRCLE) == of_synthetic
+    monkeypatch.undo()
+    made_by._key.cache_clear()
+    assert identity(map_of) == first
+
+
+def test_maps_of_other_codes_depend_on_their_adapters() -> None:
+    measure = stability_maps()["integrator_mujoco_euler"].measure.__module__
+    assert "crosscheck.engines.mujoco.model" in made_by.sources([measure]).files
 
 
 def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

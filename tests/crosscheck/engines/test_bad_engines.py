@@ -1,0 +1,174 @@
+"""Bad plug-ins, installed as plug-ins are: each gets its one status, none is green, none takes others with it."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import psutil
+import pytest
+from typer.testing import CliRunner
+
+from crosscheck import cli
+from crosscheck.engine_list import describe_engines
+from crosscheck.pool import Event
+from crosscheck.records import RunRecord, read
+from crosscheck.sweep import sweep
+from tests.crosscheck.engines.bad_engines import (
+    ANSWERS,
+    CRASHES,
+    ENDLESS,
+    GALLERY,
+    HANGING_MODULES,
+    MODULES,
+    TIDY,
+    UNTIDY,
+)
+from tests.crosscheck.sessions import copy_case
+
+SOUND = ("fine", "stepper")
+EXPECTED = {name: (bad.status, bad.words) for name, bad in (GALLERY | ENDLESS).items()}
+EXPECTED |= {name: (status, words) for name, (status, words, _) in (MODULES | HANGING_MODULES).items()}
+MILD = (*ANSWERS, *TIDY)
+HARD = (*CRASHES, *MODULES, *UNTIDY)
+LATE = (*ENDLESS, *HANGING_MODULES)
+LIMIT_S = 6.0
+LIMIT_BYTES = 700e6
+
+
+def install(folder: Path, names: tuple[str, ...]) -> None:
+    """A distribution of plug-ins in a folder of the path."""
+    texts = MODULES | HANGING_MODULES
+    own = {name: f"{name}:make" for name in texts if name in names}
+    for name in own:
+        (folder / f"{name}.py").write_text(texts[name][2] + "\n", encoding="utf-8")
+    known = {name: f"tests.crosscheck.engines.bad_engines:{name}" for name in names if name not in own}
+    info = folder / "bad_engines-1.0.dist-info"
+    info.mkdir()
+    (info / "METADATA").write_text("Metadata-Version: 2.1\nName: bad-engines\nVersion: 1.0\n", encoding="utf-8")
+    lines = [f"{name} = {value}" for name, value in (known | own).items()]
+    (info / "entry_points.txt").write_text("\n".join(["[crosscheck.engines]", *lines, ""]), encoding="utf-8")
+
+
+class Ran:
+    """A session of `fine` against each of some engines: its exit code, records and verdicts."""
+
+    def __init__(self, folder: Path, names: tuple[str, ...], patch: pytest.MonkeyPatch, **limits: float) -> None:
+        plugs = folder / "plugs"
+        plugs.mkdir(parents=True)
+        install(plugs, (*SOUND, *names))
+        pairs = "".join(
+            f'[[comparison]]\nname = "{name}"\ngoals = {{ "marker:tip.position" = 1e-4 }}\n'
+            f'a = {{ variant = "rigid", engine = "fine" }}\nb = {{ variant = "rigid", engine = "{name}" }}\n'
+            for name in ("stepper", *names)
+        )
+        case = copy_case(folder, f'[[variant]]\nname = "rigid"\nengines = {json.dumps([*SOUND, *names])}\n{pairs}')
+        with patch.context() as inner:
+            inner.syspath_prepend(plugs)
+            inner.setenv("CHILDREN", str(folder / "children"))
+            if limits:
+                inner.setattr(cli, "sweep", lambda *words, **more: sweep(*words, **(more | limits)))
+            result = CliRunner().invoke(cli.app, ["run", str(case), "--out", str(folder / "out"), "--jobs", "2"])
+        assert result.exception is None or isinstance(result.exception, SystemExit), result.output
+        self.code, self.folder = result.exit_code, folder
+        self.records = [each for each in read(folder / "out" / "records.jsonl") if isinstance(each, RunRecord)]
+        verdicts = json.loads((folder / "out" / "verdicts.json").read_text(encoding="utf-8"))
+        self.verdicts = {verdict["engine_b"]: verdict for verdict in verdicts}
+
+
+@pytest.fixture(scope="module")
+def patch() -> pytest.MonkeyPatch:
+    return pytest.MonkeyPatch()
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
+    return Ran(tmp_path_factory.mktemp("alone"), (), patch)
+
+
+def here(function: Callable[..., None], jobs: Sequence[Any], *_: object) -> Iterator[Event]:
+    """A scheduler without processes."""
+    for number, job in enumerate(jobs):
+        found: list[Any] = []
+        yield Event(number, "started")
+        function(job, found.append)
+        yield from (Event(number, "emitted", content) for content in found)
+        yield Event(number, "ended")
+
+
+@pytest.fixture(scope="module")
+def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
+    """What does no harm to its process, all in this one, which is quicker."""
+    with patch.context() as inner:
+        inner.setattr("crosscheck.sweep.run_jobs", here)
+        return Ran(tmp_path_factory.mktemp("mild"), MILD, inner)
+
+
+@pytest.fixture(scope="module")
+def hard(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
+    return Ran(tmp_path_factory.mktemp("hard"), HARD, patch)
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
+    return Ran(tmp_path_factory.mktemp("late"), LATE, patch, time_limit_s=LIMIT_S, memory_limit_bytes=LIMIT_BYTES)
+
+
+def of(name: str, request: pytest.FixtureRequest) -> Ran:
+    sessions = {"mild": MILD, "hard": HARD, "late": LATE}
+    ran: Ran = request.getfixturevalue(next(session for session, names in sessions.items() if name in names))
+    return ran
+
+
+def test_the_gallery_is_large_enough() -> None:
+    assert len(EXPECTED) >= 30
+
+
+@pytest.mark.parametrize("name", EXPECTED)
+def test_each_gets_its_one_status_with_the_reason_and_is_not_green(name: str, request: pytest.FixtureRequest) -> None:
+    ran, (status, words) = of(name, request), EXPECTED[name]
+    last = [record for record in ran.records if record.engine == name][-1]
+    assert (last.status, words in last.message) == (status, True), last.message
+    assert not ran.verdicts[name]["ok"]
+    assert words in ran.verdicts[name]["reason"]
+    assert ran.code == 1
+
+
+@pytest.mark.parametrize("which", ["mild", "hard", "late"])
+def test_the_sound_pair_has_the_verdict_it_has_alone(alone: Ran, which: str, request: pytest.FixtureRequest) -> None:
+    assert alone.code == 0
+    assert request.getfixturevalue(which).verdicts["stepper"] == alone.verdicts["stepper"]
+
+
+@pytest.mark.parametrize("name", [*TIDY, *UNTIDY])
+def test_what_is_odd_but_right_runs_and_agrees(name: str, request: pytest.FixtureRequest) -> None:
+    """Single precision runs; whether it agrees is for its uncertainty to say."""
+    ran = of(name, request)
+    assert [record.status for record in ran.records if record.engine == name] == ["finished"] * 3
+    assert ran.verdicts[name]["status"] == "agree" or name == "single_precision", ran.verdicts[name]["reason"]
+
+
+def test_no_process_of_an_engine_survives(hard: Ran, late: Ran) -> None:
+    children = [int(line) for line in (hard.folder / "children").read_text(encoding="utf-8").split()]
+    assert children
+    assert not [pid for pid in children if psutil.pid_exists(pid) and psutil.Process(pid).status() != "zombie"]
+    left = [process.cmdline() for process in psutil.Process().children(recursive=True)]
+    assert not [words for words in left if "resource_tracker" not in " ".join(words)]
+
+
+def test_what_engines_print_goes_to_the_log(hard: Ran) -> None:
+    assert (hard.folder / "out" / "records.log").stat().st_size > 2**22
+
+
+def test_engines_lists_bad_plug_ins_with_the_reason(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    names = ("module_missing", "exits_at_import", "leaves_at_import", "falls_at_import", "version_none")
+    install(tmp_path, (*names, "fine"))
+    monkeypatch.syspath_prepend(tmp_path)
+    states = {state.name: state for state in describe_engines()}
+    assert states["fine"].version == "1.0"
+    for name in names:
+        assert states[name].version is None
+        assert EXPECTED[name][1] in states[name].advice
+    assert states["native"].version is not None
