@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import warnings
 import webbrowser
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, NoReturn
 
@@ -19,6 +22,7 @@ from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
 from crosscheck.verify_table import channels_table
 from flexmb.scene.problems import closest
+from flexmb.writing import folder, in_words
 
 EXIT_USAGE = 2
 
@@ -67,8 +71,10 @@ def run(
     `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
     """
     chosen = _found(tuple(cases))
-    with LiveProgress(console) as live:
-        sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, listener=live.hear)
+    with _in_one_line():
+        folder(out)
+        with LiveProgress(console) as live:
+            sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, listener=live.hear)
     _conclude(out / "records.jsonl", out, open_report)
 
 
@@ -128,15 +134,13 @@ def verify(
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
-    try:
+    with _in_one_line():
         (chosen,) = _found((case,))
         if template:
             csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
-    except ValueError as error:
-        _refuse(str(error))
     console.print(channels_table(outcome))
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
@@ -176,9 +180,9 @@ def stability(
     for name in chosen:
         if name not in known:
             _refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
-    raise typer.Exit(
-        run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs)
-    )
+    with _in_one_line():
+        code = run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs)
+    raise typer.Exit(code)
 
 
 def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
@@ -191,12 +195,28 @@ def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
 
 def _conclude(records: Path, out: Path, open_report: bool) -> None:
     """Judge, write everything, show the table, and leave with the exit code."""
-    outcome, page = write_all(records, out)
+    with _in_one_line():
+        outcome, page = write_all(records, out)
     code = print_outcome(console, outcome)
     console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code)
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """What the user can put right ends the command with one line, and warnings are lines too: no tracebacks."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+        try:
+            yield
+        except BrokenPipeError:  # whoever read the output has read enough
+            raise
+        except OSError as error:
+            _refuse(in_words(error))
+        except ValueError as error:
+            _refuse(str(error))
 
 
 def _refuse(message: str) -> NoReturn:

@@ -255,7 +255,7 @@ def members(random: Random, data: bytes) -> bytes:
             flat.flat[random.randrange(old.size)] = random.choice((np.nan, np.inf, -np.inf, -1.0, 1e308, 0.0))
             given[name] = flat
         case 7:
-            given[name] = np.zeros((2 * 10**7, 3) if random.random() < 0.3 else (1000, 3, 4))
+            given[name] = np.zeros((2 * 10**7, 3) if random.random() < 0.1 else (1000, 3, 4))
         case 8:
             extra.append((name + ".npy", _npy(old)))
         case 9:
