@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 import webbrowser
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,7 @@ from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
 from crosscheck.verify_table import channels_table
 from flexmb.scene.problems import closest
+from flexmb.writing import folder, in_words
 
 EXIT_USAGE = 2
 
@@ -159,15 +161,13 @@ def verify(
 
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
-    try:
+    with _in_one_line():
         (chosen,) = _found((case,))
         if template:
             csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
-    except ValueError as error:
-        _refuse(str(error))
     console.print(channels_table(outcome))
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
@@ -228,12 +228,9 @@ def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
 
 @contextmanager
 def _sole_writer(out: Path) -> Iterator[None]:
-    """Hold the folder, or end the program with exit code 2 where another process does."""
-    try:
-        with locked(out):
-            yield
-    except FolderInUseError as error:
-        _refuse(str(error))
+    """Hold the folder for as long as something is written there; what the user can put right is one line."""
+    with _in_one_line(), locked(out):
+        yield
 
 
 def _check_limit(seconds: float | None) -> None:
@@ -258,6 +255,21 @@ def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen:
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code)
+
+
+@contextmanager
+def _in_one_line() -> Iterator[None]:
+    """What the user can put right ends the command with one line, and warnings are lines too: no tracebacks."""
+    with warnings.catch_warnings():
+        warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+        try:
+            yield
+        except BrokenPipeError:  # whoever read the output has read enough
+            raise
+        except OSError as error:
+            _refuse(in_words(error))
+        except (ValueError, FolderInUseError) as error:
+            _refuse(str(error))
 
 
 def _refuse(message: str) -> NoReturn:

@@ -10,6 +10,8 @@ from pathlib import Path
 
 from filelock import FileLock, Timeout
 
+from flexmb.writing import folder as made
+
 LOCK, HOLDER = ".crosscheck.lock", ".crosscheck.holder"
 
 
@@ -23,7 +25,7 @@ def locked(folder: Path) -> Iterator[None]:
 
     The lock is the operating system's: it goes with its process, however that ends.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    made(folder)
     lock, holder = FileLock(folder / LOCK), folder / HOLDER
     try:
         lock.acquire(blocking=False)

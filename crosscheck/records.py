@@ -31,6 +31,7 @@ from crosscheck.case import Provenance, RunFile
 from crosscheck.case_check import check_recorded
 from crosscheck.drawing import Drawing
 from flexmb.scene.reading import MIB, allowance, regular_size
+from flexmb.writing import folder, writing
 
 Array = NDArray[np.float64]
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
@@ -202,19 +203,22 @@ class Archive:
 
     def __init__(self, file: Path, kind: Any = Written) -> None:
         """`kind` are the records that the file holds; lines that are none of them are set aside (BrokenRecords)."""
-        file.parent.mkdir(parents=True, exist_ok=True)
+        folder(file.parent)
+        self._file = file
         _set_broken_lines_aside(file, kind)
         self._stream = file.open("ab")
         self._encoder = msgspec.json.Encoder()
 
     def write(self, record: msgspec.Struct) -> None:
         """Append one line."""
-        self._stream.write(self._encoder.encode(record) + b"\n")
-        self._stream.flush()
+        with writing(self._file):
+            self._stream.write(self._encoder.encode(record) + b"\n")
+            self._stream.flush()
 
     def close(self) -> None:
         """Close the file."""
-        self._stream.close()
+        with writing(self._file):
+            self._stream.close()
 
 
 def read(file: Path) -> list[Record]:

@@ -167,8 +167,13 @@ def _detail(reference: Result, channel: str, values: Array, goal: float, times: 
 
 
 def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
-    """The U that, with the reference's, just makes the goal (less a rounding, so that it does)."""
-    allowed = goal * signal_range(channel, target.values) * (1.0 - 1e-12)
+    """The U that, with the reference's, just makes the goal (less a rounding, so that it does).
+
+    The goal is relative to what the verdict takes for the signal's size: that of its family where the signal is zero.
+    """
+    sizes = (signal_range(channel, target.values), *target.sizes)
+    size = next((size for size in sizes if size > target.uncertainty.value), 0.0)
+    allowed = goal * size * (1.0 - 1e-12)
     value = max(allowed - target.uncertainty.value, 0.0)
     return Uncertainty(np.full(len(target.values), value), value, "claimed: the case's goal")
 

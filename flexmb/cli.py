@@ -15,6 +15,7 @@ from flexmb.printable import printable
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.reference import json_schema
+from flexmb.writing import check_folder, folder, in_words, writing
 
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
@@ -87,16 +88,19 @@ def simulate(
         from flexmb.simulation import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.summary import summary
 
+        check_folder(out)
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             trajectory = run(
                 load_scene(scene), t_end, method,  # type: ignore[arg-type]
                 rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
                 spectral_radius=spectral_radius,
             )  # fmt: skip
-        out.mkdir(parents=True, exist_ok=True)
-        trajectory.to_csv(out / "trajectory.csv")
-        written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
-    console.print(summary(trajectory))
+        console.print(summary(trajectory))  # first: a full disk takes the files only
+        folder(out)
+        with writing(out / "trajectory.csv"):
+            trajectory.to_csv(out / "trajectory.csv")
+        with writing(out):
+            written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
@@ -163,6 +167,7 @@ def equivalence(
 
         loaded = load_scene(scene)
         check_scene(loaded)
+        check_folder(picture.parent)
         result = compare(
             appendage_of(loaded, body, modes),
             accuracy=accuracy,
@@ -170,8 +175,9 @@ def equivalence(
             modes=tuple(number - 1 for number in mode) if mode else None,
             point=None if point is None else _vector("point", point),
         )
-        written = write_equivalence_plot(result, picture)
-    console.print(equivalence_tables(result, angle))
+        console.print(equivalence_tables(result, angle))
+        with writing(picture):
+            written = write_equivalence_plot(result, picture)
     console.print("wrote", str(written), soft_wrap=True)
 
 
@@ -211,13 +217,15 @@ def advise(
         from flexmb.advisor.verdict import verdict
 
         loaded = load_scene(scene)
+        check_folder(out.parent)
         with console.status(Text(f"trying models of {scene} (the first run after an update compiles)")):
             advice = search(loaded, tol, quantity, t_end)
         console.print(verdict(advice, trials))
         if advice.scene is None or advice.method is None:
             raise typer.Exit(EXIT_STOPPED)
-        out.parent.mkdir(parents=True, exist_ok=True)
-        save_scene(advice.scene, out)
+        folder(out.parent)
+        with writing(out):
+            save_scene(advice.scene, out)
     console.print("wrote", str(out), soft_wrap=True)
     console.print(f"flexmb simulate {out} --t-end {t_end:g} {advice.method.words()}", soft_wrap=True)
 
@@ -275,10 +283,10 @@ def linearize(
         except EquilibriumError as error:
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
-        written = None if export is None else model.save(export)
-    console.print(modes_table(model))
-    if written is not None:
-        console.print("wrote", str(written), soft_wrap=True)
+        console.print(modes_table(model))
+        if export is not None:
+            with writing(export):
+                console.print("wrote", str(model.save(export)), soft_wrap=True)
 
 
 @app.command()
@@ -312,14 +320,20 @@ def campbell(
         from flexmb.linear.table import campbell_table
 
         loaded, values = load_scene(scene), _range("rates", rates)
+        for file in (picture, *([] if csv is None else [csv])):
+            check_folder(file.parent)
         try:
             with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
                 result = diagram(loaded, hinge, values)
         except EquilibriumError as error:
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
-        written = [write_campbell_plot(result, picture, modes), *([] if csv is None else [result.to_csv(csv)])]
-    console.print(campbell_table(result))
+        console.print(campbell_table(result))
+        with writing(picture):
+            written = [write_campbell_plot(result, picture, modes)]
+        if csv is not None:
+            with writing(csv):
+                written.append(result.to_csv(csv))
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
 
 
@@ -365,8 +379,11 @@ def _no_traceback() -> Iterator[None]:
     """What the user can put right is a message, not a traceback."""
     try:
         yield
+    except BrokenPipeError:  # whoever read the output has read enough
+        raise
     except (SceneError, NotImplementedError, ValueError, OSError) as error:
-        errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
+        text = in_words(error) if isinstance(error, OSError) else str(error)
+        errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None
 
 

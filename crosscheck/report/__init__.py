@@ -9,6 +9,7 @@ from crosscheck.report.outcome import Outcome, conclude, write_verdicts
 from crosscheck.report.summary import write_junit, write_summary
 from crosscheck.results import collect
 from crosscheck.session import standing
+from flexmb.writing import folder, writing
 
 __all__ = ["Choice", "Outcome", "write_all"]
 
@@ -24,9 +25,10 @@ def write_all(
     """
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)
-    out.mkdir(parents=True, exist_ok=True)
-    write_verdicts(outcome, out / "verdicts.json")
-    write_summary(outcome, out / "summary.md")
-    write_junit(outcome, out / "junit.xml")
-    write_report(session, outcome, out / "report.html")
+    folder(out)
+    with writing(out):
+        write_verdicts(outcome, out / "verdicts.json")
+        write_summary(outcome, out / "summary.md")
+        write_junit(outcome, out / "junit.xml")
+        write_report(session, outcome, out / "report.html")
     return outcome, out / "report.html"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -21,16 +22,7 @@ from flexmb.printable import printable
 
 def write_report(session: Session, outcome: Outcome, file: Path) -> None:
     """Write the report of a judged session."""
-    templates = Environment(
-        loader=PackageLoader("crosscheck.report"),
-        autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
-        trim_blocks=True,
-        lstrip_blocks=True,
-        keep_trailing_newline=False,
-        finalize=_shown,
-    )
-    templates.filters["code"] = _code
-    templates.filters["breakable"] = _breakable
+    templates = _templates()
     data = payload([(case, outcome.verdicts[case.case.case]) for case in session.cases])
     page = templates.get_template("report.html.j2").render(
         outcome=outcome,
@@ -46,6 +38,21 @@ def write_report(session: Session, outcome: Outcome, file: Path) -> None:
         data=embedded(data),
     )
     file.write_text(page, encoding="utf-8", errors="backslashreplace")
+
+
+@cache
+def _templates() -> Environment:
+    templates = Environment(
+        loader=PackageLoader("crosscheck.report"),
+        autoescape=select_autoescape(["html.j2"], default_for_string=True, default=True),
+        trim_blocks=True,
+        lstrip_blocks=True,
+        keep_trailing_newline=False,
+        finalize=_shown,
+    )
+    templates.filters["code"] = _code
+    templates.filters["breakable"] = _breakable
+    return templates
 
 
 def embedded(data: Any) -> Markup:

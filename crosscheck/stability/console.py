@@ -19,6 +19,7 @@ from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
 from flexmb.scene.reading import regular_size
+from flexmb.writing import folder, writing
 
 VERDICTS = "maps.json"
 
@@ -37,11 +38,13 @@ def run_and_draw(
 ) -> int:  # fmt: skip
     """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
     verdicts = []
+    folder(pictures)
     for name in names:
         done = _run(console, name, out / f"{name}.jsonl", depth, fresh, workers, time_limit_s)
-        picture = draw(done, pictures / f"{name}.svg")
-        verdicts.append(done.verdict)
-        write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
+        with writing(pictures):
+            picture = draw(done, pictures / f"{name}.svg")
+            verdicts.append(done.verdict)
+            write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
         console.print(_line(done, picture), soft_wrap=True)
     good = sum(verdict.ok for verdict in verdicts)
     colour = "green" if good == len(verdicts) else "red"

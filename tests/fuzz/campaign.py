@@ -16,7 +16,7 @@ from tests.fuzz.kinds import kinds
 from tests.fuzz.worker import ALARM_S, BAD
 
 SHARES = {"scene": 6, "run file": 4, "verify csv": 5, "npz": 4, "records": 4}  # of the others one each
-GRACE_S = 10.0  # beyond the alarm, which compiled code does not hear
+GRACE_S = 30.0  # beyond the alarm, which compiled code does not hear
 START_S = 120.0
 
 

@@ -10,6 +10,7 @@ import csv
 import io
 import json
 import math
+import re
 import tomllib
 import zipfile
 from collections.abc import Callable, Iterator
@@ -62,7 +63,8 @@ def kinds(folder: Path) -> dict[str, Kind]:
     (folder / "run.toml").unlink()  # each mutant has a whole folder to itself but for what it mutates
     run, toml = (CASE / "run.toml").read_bytes(), mutate.TOML
     jsonl = (*mutate.BYTES, mutate.lines, mutate.string, mutate.nest, mutate.fields, mutate.fields, mutate.fields)
-    runs = tuple(file.read_bytes() for file in sorted(SHIPPED.glob("*/*/run.toml")))
+    shipped = (file.read_bytes() for file in sorted(SHIPPED.glob("*/*/run.toml")))
+    runs = tuple(re.sub(rb'scene = "[^"]*"', b'scene = "scene.toml"', text) for text in shipped)
     grounds = tuple(file.read_bytes() for file in sorted(SHIPPED.glob("*/*/provenance.toml")))
     table = (*mutate.TEXT, mutate.cells, mutate.cells, mutate.cells, mutate.cells, mutate.cells)
     records = (*jsonl, mutate.arrays_of_records, mutate.arrays_of_records)
