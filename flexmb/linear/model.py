@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
+from flexmb import arguments
 from flexmb.arrays import Real
 from flexmb.state import State
 
@@ -129,11 +130,13 @@ class LinearModel:
         """Response (W, outputs) of all, or the named, outputs to a unit harmonic load at each omega (rad/s).
 
         (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names that do not exist,
-        ValueError at an undamped resonance.
+        ValueError at an undamped resonance and for frequencies that are not finite, TypeError for what is no number.
         """
         b = self.B[:, _place(self.inputs, input, "input")]
         rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
-        frequencies = np.atleast_1d(np.asarray(omega, float))
+        frequencies = arguments.finite("omega", np.atleast_1d(arguments.array("omega", omega)))
+        if frequencies.ndim != 1:
+            raise ValueError(f"omega: give frequencies in a row, not an array of shape {frequencies.shape}")
         out, unit = np.empty((len(frequencies), len(rows)), complex), np.eye(len(self.A))
         for i, frequency in enumerate(frequencies):
             try:
@@ -149,8 +152,9 @@ class LinearModel:
 
     def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
         """The state displaced along a mode, its largest displacement `size` (rad, m), for display; `phase` in rad."""
+        size, phase = arguments.number("size", size), arguments.number("phase", phase)
         xi = np.real(mode.shape * size * np.exp(1j * phase))
-        return State(self.state.q + self.motion @ xi, self.state.u.copy(), self.state.t)
+        return replace(self.state, q=self.state.q + self.motion @ xi)
 
     def to_scipy(self) -> Any:
         """As `scipy.signal.StateSpace`."""
