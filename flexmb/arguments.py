@@ -49,6 +49,13 @@ def finite(name: str, values: Vector) -> Vector:
     return values
 
 
+def representable(result: Vector) -> Vector:
+    """The array itself; OverflowError where an entry is not finite: of arguments that are."""
+    if not np.isfinite(result).all():
+        raise OverflowError("the result is not finite: the numbers given are so large that their products overflow")
+    return result
+
+
 def number(name: str, value: Any) -> float:
     """A finite float."""
     if type(value) is not float:

@@ -375,6 +375,9 @@ def _no_traceback() -> Iterator[None]:
     except (SceneError, NotImplementedError, ValueError, ImportError, OSError) as error:
         errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None
+    except ArithmeticError as error:  # there are no accelerations, or they overflow
+        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+        raise typer.Exit(EXIT_STOPPED) from None
 
 
 def main() -> None:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb import arguments
 from flexmb.arrays import Real
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
@@ -90,7 +91,7 @@ class ClosedSystem(System):
     def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
         """Fields of a `flexmb.propagate.Route`; ClosureError where there is no motion to run."""
         _refuse_others(self.scene, algorithm)
-        if not (np.isfinite(stabilise) and stabilise >= 0.0):
+        if arguments.number("stabilise", stabilise) < 0.0:
             raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
         self._refuse_locked()
 

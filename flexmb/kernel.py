@@ -14,7 +14,6 @@ from __future__ import annotations
 import hashlib
 import re
 import tempfile
-import warnings
 from collections.abc import Callable, Iterator
 from functools import cache
 from pathlib import Path
@@ -24,7 +23,7 @@ from numba import config, njit, types
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
-from flexmb.kernel_cache import KernelCache
+from flexmb.kernel_cache import KernelCache, warn_once
 from flexmb.parts import PartCompiler
 
 if config.DISABLE_JIT:
@@ -97,11 +96,9 @@ def cache_directory(source: Path) -> str | None:
         directory.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
     except OSError as problem:
-        warnings.warn(
+        warn_once(
             f"compiled kernels cannot be kept in {root} ({problem.strerror}), and every process compiles them again: "
-            "permit writing there, or set NUMBA_CACHE_DIR to a folder where it is",
-            RuntimeWarning,
-            stacklevel=1,
+            "permit writing there, or set NUMBA_CACHE_DIR to a folder where it is"
         )
         return None
     return str(directory)

@@ -16,6 +16,7 @@ import sys
 import uuid
 import warnings
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -71,11 +72,9 @@ class KernelCache(NullCache):  # type: ignore[misc]
             os.replace(written, file)
         except OSError as problem:
             if not file.is_file():  # else another process was faster
-                warnings.warn(
+                warn_once(
                     f"compiled kernels cannot be kept in {self._folder.parent} ({problem.strerror}), and the next "
-                    "process compiles them again: make room or permit writing there, or set NUMBA_CACHE_DIR",
-                    RuntimeWarning,
-                    stacklevel=1,
+                    "process compiles them again: make room or permit writing there, or set NUMBA_CACHE_DIR"
                 )
         finally:
             written.unlink(missing_ok=True)
@@ -92,12 +91,13 @@ class KernelCache(NullCache):  # type: ignore[misc]
                 file.unlink(missing_ok=True)
         except OSError:
             pass  # where the new one cannot be put in its place either, `save_overload` says so
-        # Python shows one warning of one text and place; hence no name of a file in it.
-        warnings.warn(
-            f"damaged files in {self._folder.parent}: they were deleted, and their kernels are compiled anew",
-            RuntimeWarning,
-            stacklevel=1,
-        )
+        warn_once(f"damaged files in {self._folder.parent}: they were deleted, and their kernels are compiled anew")
+
+
+@cache
+def warn_once(text: str) -> None:
+    """In this process: numba resets what Python knows of warnings that were shown."""
+    warnings.warn(text, RuntimeWarning, stacklevel=2)
 
 
 def _digest(file: Path, contents: Any) -> bytes:

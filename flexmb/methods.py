@@ -60,8 +60,8 @@ class Settings:
             )
         if self.step is not None and self.step < SHORTEST_STEP * t_end:
             raise ValueError(
-                f"step is {self.step:g} s, by which double precision does not advance a time of {t_end:g} s: use one "
-                f"above {SHORTEST_STEP * t_end:.1e} s, and some {self.max_steps} of which make up the run (max_steps)"
+                f"step is {self.step:g} s, by which double precision does not advance a time of {t_end:g} s: max_steps "
+                f"allows {self.max_steps} of them, so use {t_end / self.max_steps:.1e} s or more"
             )
         if self.method not in FIXED and self.step is not None:
             raise ValueError(

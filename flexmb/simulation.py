@@ -33,7 +33,7 @@ if TYPE_CHECKING:
 
 OUTPUT_BYTES = 2**32
 """Memory that the outputs of one run may take."""
-_OBJECTS_BYTES = 3000  # of one evaluation, beside its numbers: objects of Python, measured
+_NUMBER_BYTES, _OBJECT_BYTES, _SAMPLE_BYTES = 16, 200, 2000  # evaluated, then gathered; of Python, measured
 _TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
 
 
@@ -134,7 +134,7 @@ def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array
         number = arguments.whole("samples", samples)
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
-        if number > OUTPUT_BYTES // 8:
+        if number > OUTPUT_BYTES // _SAMPLE_BYTES:
             raise ValueError(f"samples is {number}: {_TOO_MANY}")
         times = np.linspace(0.0, t_end, number)
         if np.all(np.diff(times) > 0.0):
@@ -157,12 +157,17 @@ def _end(t_end: float) -> float:
 
 def _refuse_too_many(samples: int, system: System) -> None:
     """ValueError where the outputs would not fit into OUTPUT_BYTES."""
+    most = OUTPUT_BYTES // sample_bytes(system)
+    if samples > most:
+        raise ValueError(f"samples is {samples}, and this scene allows {most}: {_TOO_MANY}")
+
+
+def sample_bytes(system: System) -> int:
+    """Memory that one output time of a run takes, at most."""
     scene = system.scene
     places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
     numbers = system.nq + 2 * system.nu + 24 * len(scene.markers) + 6 * places + 11
-    if samples * (8 * numbers + _OBJECTS_BYTES) > OUTPUT_BYTES:
-        most = OUTPUT_BYTES // (8 * numbers + _OBJECTS_BYTES)
-        raise ValueError(f"samples is {samples}, and this scene allows {most}: {_TOO_MANY}")
+    return _NUMBER_BYTES * numbers + _OBJECT_BYTES * (4 * len(scene.markers) + places) + _SAMPLE_BYTES
 
 
 def _route(system: System, algorithm: Algorithm, stabilise: float) -> Route:

@@ -176,10 +176,13 @@ class System(Mechanics):
 
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
-        self.layout.entering(state)
+        t, _ = self.layout.entering(state)
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
-        return self._operators.at(state.t, state.q, state.u)
+        found = self._operators.at(t, state.q, state.u)
+        for part in (found.M_m, found.a_m, found.b_m, found.V_m):
+            finite_result(part, t)
+        return found
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.

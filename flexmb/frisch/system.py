@@ -145,6 +145,7 @@ class NestedSystem:
     def partitions(self, t: float, y: Real) -> Partitions:
         """The named blocks of (111) at y."""
         motion = self.relative_motion(t, y)
+        finite_result(self._w.Z, t), finite_result(self._w.eta, t)
         first, wheels, modes, last = self._rows()
         rows = np.concatenate([first, wheels, modes, last])
         Z, eta = self._w.Z, self._w.eta
@@ -165,7 +166,9 @@ class NestedSystem:
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
         """Motion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
         w, c = self._w, self.constants
-        evaluation.assemble(*self._layout.whole(t, y), c, w)
+        t, y = self._layout.whole(t, y)
+        evaluation.assemble(t, y, c, w)
+        finite_result(w.x, t)
         S = np.zeros((len(w.x), len(c.column)))
         for j, column in enumerate(c.column):
             entries = slice(column["start"], column["stop"])

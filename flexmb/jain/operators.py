@@ -70,15 +70,16 @@ class Operators:
 
     def alpha_m(self, chi_dot: Array) -> Array:
         """Modal spatial accelerations (nbar,) (26)."""
-        return self.Phi.T @ (self.H.T @ self._speeds("chi_dot", chi_dot) + self.a_m)
+        return arguments.representable(self.Phi.T @ (self.H.T @ self._speeds("chi_dot", chi_dot) + self.a_m))
 
     def f_m(self, chi_dot: Array) -> Array:
         """Modal spatial forces (nbar,) between each body and its parent (40)."""
-        return self.Phi @ (self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation)
+        forces = self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation
+        return arguments.representable(self.Phi @ forces)
 
     def inverse_dynamics(self, chi_dot: Array) -> Array:
         """T (n,) (41)."""
-        return self.H @ self.f_m(chi_dot)
+        return arguments.representable(self.H @ self.f_m(chi_dot))
 
     @cached_property
     def M(self) -> Array:
@@ -185,7 +186,7 @@ class Operators:
         forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
         innovation = T - self.H @ (self.Psi @ forces)
         chi_dot = self.innovations_inverse.T @ (self.D_inverse @ innovation)
-        return chi_dot - self.K.T @ (self.Psi.T @ self.a_m)
+        return arguments.representable(chi_dot - self.K.T @ (self.Psi.T @ self.a_m))
 
     def driven(self, prescribed: NDArray[np.bool_], rates: Array) -> Operators:
         """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.

@@ -142,18 +142,20 @@ class LinearModel:
             try:
                 out[i] = self.C[rows] @ np.linalg.solve(1j * frequency * unit - self.A, b)
             except np.linalg.LinAlgError:
-                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite") from None
+                out[i] = np.inf
+            if not np.isfinite(out[i]).all():
+                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite")
         return out
 
     def marker_shape(self, mode: Mode, marker: str) -> Complex:
         """Displacement and rotation vector (6,) of a marker, World axes, in a mode as `Mode.shape` scales it."""
         first = _place(self.outputs, f"{marker}.x", "output")
-        return self.C[first : first + 6, : len(self.rates)] @ mode.shape
+        return self.C[first : first + 6, : len(self.rates)] @ self._shape(mode)
 
     def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
         """The state displaced along a mode, its largest displacement `size` (rad, m), for display; `phase` in rad."""
         size, phase = arguments.number("size", size), arguments.number("phase", phase)
-        xi = np.real(mode.shape * size * np.exp(1j * phase))
+        xi = np.real(self._shape(mode) * size * np.exp(1j * phase))
         return replace(self.state, q=self.state.q + self.motion @ xi)
 
     def to_scipy(self) -> Any:
@@ -188,6 +190,13 @@ class LinearModel:
             cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
             savemat(path, data | cells)
         return path
+
+    def _shape(self, mode: Mode) -> Complex:
+        if not isinstance(mode, Mode):
+            raise TypeError(f"a Mode of this model is needed, not {type(mode).__name__}: see `modes`")
+        if mode.shape.shape != self.rates.shape:
+            raise ValueError(f"the mode has {len(mode.shape)} displacements, this model {len(self.rates)}")
+        return mode.shape
 
     @cached_property
     def _decomposition(self) -> tuple[Complex, Complex, Real]:

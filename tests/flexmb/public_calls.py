@@ -22,7 +22,7 @@ import numpy as np
 import flexmb as fm
 from flexmb.closed_system import ClosedSystem
 from flexmb.factors import MassMatrixFactors
-from flexmb.frisch.system import NestedSystem, nested_system
+from flexmb.frisch.system import NestedSystem
 from flexmb.jain.operators import Operators
 from flexmb.scene import schema
 from flexmb.scene.shapes import beam_section
@@ -57,7 +57,9 @@ class World:
     @cached_property
     def chain(self) -> ClosedSystem:
         """A pendulum on a ball, with a wheel."""
-        builder = fm.SceneBuilder("chain", gravity=(0.0, 0.0, -9.81)).rigid_body("bob", mass=2.0, inertia=(0.1, 0.1, 0.1))
+        builder = fm.SceneBuilder("chain", gravity=(0.0, 0.0, -9.81)).rigid_body(
+            "bob", mass=2.0, inertia=(0.1, 0.1, 0.1)
+        )
         builder.wheel("rotor", "bob", axis=(0.0, 0.0, 1.0), mass=0.1, axial_inertia=1e-3, transverse_inertia=1e-3)
         builder.free("float", "ground", "bob")
         at = (0.25, 0.0, 0.0)
@@ -156,7 +158,8 @@ def states(_: Any) -> Iterator[Variant]:
     nq, nu = len(q), len(u)
     wrong = {
         "None": None, "a tuple": (q, u, t), "an array": W.y, "a string": "state", "short q": fm.State(q[:-1], u),
-        "short u": fm.State(q, u[:-1]), "long q": fm.State(np.append(q, 0.0), u), "moved": fm.State(W.y[: nq - 1], W.y[nq - 1 : -1]),
+        "short u": fm.State(q, u[:-1]), "long q": fm.State(np.append(q, 0.0), u),
+        "moved": fm.State(W.y[: nq - 1], W.y[nq - 1 : -1]),
         "very long": fm.State(np.zeros(10**5), np.zeros(10**5)), "empty": fm.State([], []),
         "of another system": W.chain.initial_state, "of one as large": W.renamed.initial_state,
         "NaN": fm.State(np.full(nq, np.nan), u), "infinite": fm.State(q, np.full(nu, np.inf)),
@@ -187,7 +190,8 @@ def closed_states(_: Any) -> Iterator[Variant]:
     """Of a state of the closed chain."""
     start = W.chain.initial_state
     wrong = {
-        "None": None, "a tuple": (start.q, start.u), "of another system": W.state, "short q": fm.State(start.q[:-1], start.u),
+        "None": None, "a tuple": (start.q, start.u), "of another system": W.state,
+        "short q": fm.State(start.q[:-1], start.u),
         "very long": fm.State(np.zeros(10**5), np.zeros(10**5)), "NaN": fm.State(start.q, start.u + np.nan),
         "no orientation": fm.State(0.0 * start.q, start.u),
     }  # fmt: skip
@@ -245,9 +249,9 @@ class Call:
 
 NO_NUMBER = (None, "1", 1j, np.nan, np.inf, -np.inf, True, [1.0], 10**400)
 SAMPLES = chosen(
-    None, "3", 3.0, 1, 0, -3, True, 10**9, 10**30, [], [0.0], [0.0, np.nan, 0.01], [0.0, 0.02], [0.01, 0.0], [0.0, 0.0, 0.01],
-    [[0.0, 0.01]], np.array([0.0, 0.01 + 0j]), ["0", "0.01"],
-    plain=((np.int64(3), 3), ([0, 0.005, 0.01], 3), (np.float32([0, 0.0078125, 0.01])[:1].tolist() + [0.005, 0.01], 3)),
+    None, "3", 3.0, 1, 0, -3, True, 10**9, 10**30, [], [0.0], [0.0, np.nan, 0.01], [0.0, 0.02], [0.01, 0.0],
+    [0.0, 0.0, 0.01], [[0.0, 0.01]], np.array([0.0, 0.01 + 0j]), ["0", "0.01"],
+    plain=((np.int64(3), 3), ([0, 0.005, 0.01], 3), ((0.0, 0.005, 0.01), 3)),
 )  # fmt: skip
 OF_STATE = {"state": states}
 RUN = {"t_end": chosen(*NO_NUMBER, 0.0, -1.0, plain=((np.float64(0.01), 0.01), (Fraction(1, 100), 0.01)))}
@@ -270,18 +274,38 @@ def calls() -> dict[str, Call]:
         chosen_algorithm = {"state": state, "algorithm": algorithm}
         add(f"System.accelerations, {algorithm}", tree.accelerations, chosen_algorithm, state=states, **ALGORITHM)
         arguments = {"t": 0.5, "q": state.q.copy(), "u": state.u.copy(), "algorithm": algorithm}
-        add(f"System.evaluate, {algorithm}", tree.evaluate, arguments, t=numbers, q=quaternion_first, u=vectors, **ALGORITHM)
+        add(
+            f"System.evaluate, {algorithm}",
+            tree.evaluate,
+            arguments,
+            t=numbers,
+            q=quaternion_first,
+            u=vectors,
+            **ALGORITHM,
+        )
     of_rates = {"state": state, "accelerations": rates}
     for name in ("inverse_dynamics", "modal_residual", "consistent_inverse_dynamics"):
         add(f"System.{name}", getattr(tree, name), of_rates, state=states, accelerations=vectors)
     add("System.hinge_loads", tree.hinge_loads, of_rates, state=states, accelerations=but_none(vectors))
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
-    add("System.state", tree.state, {"q": state.q.copy(), "u": state.u.copy(), "t": 0.5}, q=quaternion_first, u=vectors, t=numbers)
+    add(
+        "System.state",
+        tree.state,
+        {"q": state.q.copy(), "u": state.u.copy(), "t": 0.5},
+        q=quaternion_first,
+        u=vectors,
+        t=numbers,
+    )
     add("State", fm.State, {"q": state.q.copy(), "u": state.u.copy(), "t": 0.5}, q=rows, u=rows, t=numbers)
     for name in ("coordinate", "speed"):
         add(f"System.{name}", getattr(tree, name), {"name": "elbow"}, name=names)
-    add("System.nested", lambda algorithm: tree.nested(algorithm).reduced(0.0, W.y), {"algorithm": "frisch"}, **ALGORITHM)
+    add(
+        "System.nested",
+        lambda algorithm: tree.nested(algorithm).reduced(0.0, W.y),
+        {"algorithm": "frisch"},
+        **ALGORITHM,
+    )
     nested = tree.nested()
     for name in ("accelerations", "motion", "reduced", "partitions", "relative_motion"):
         add(f"NestedSystem.{name}", getattr(nested, name), {"t": 0.5, "y": W.y}, t=numbers, y=quaternion_first)
@@ -290,9 +314,19 @@ def calls() -> dict[str, Call]:
         function = getattr(factors, name)
         argument = next(iter(inspect.signature(function).parameters))
         add(f"MassMatrixFactors.{name}", function, {argument: rates}, **{argument: but_columns(vectors)})
-        add(f"MassMatrixFactors.{name}, columns", function, {argument: np.stack([rates, -rates], 1)}, **{argument: matrices})
+        add(
+            f"MassMatrixFactors.{name}, columns",
+            function,
+            {argument: np.stack([rates, -rates], 1)},
+            **{argument: matrices},
+        )
     operators = tree.operators(state)
-    for name, argument in {"alpha_m": "chi_dot", "f_m": "chi_dot", "inverse_dynamics": "chi_dot", "accelerations": "T"}.items():
+    for name, argument in {
+        "alpha_m": "chi_dot",
+        "f_m": "chi_dot",
+        "inverse_dynamics": "chi_dot",
+        "accelerations": "T",
+    }.items():
         add(f"Operators.{name}", getattr(operators, name), {argument: rates}, **{argument: vectors})
     driven = {"prescribed": rates < 2.0, "rates": rates}
     add(
@@ -305,31 +339,105 @@ def calls() -> dict[str, Call]:
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
     for algorithm in ("articulated", "composite"):
         arguments = {"state": start, "algorithm": algorithm}
-        add(f"ClosedSystem.accelerations, {algorithm}", chain.accelerations, arguments, state=closed_states, **ALGORITHM)
+        add(
+            f"ClosedSystem.accelerations, {algorithm}", chain.accelerations, arguments, state=closed_states, **ALGORITHM
+        )
     arguments = {"t": 0.0, "q": start.q.copy(), "u": start.u.copy()}
     add("ClosedSystem.evaluate", chain.evaluate, arguments, t=numbers, q=wrong_only, u=wrong_only)
-    add("ClosedSystem.inverse_dynamics", chain.inverse_dynamics, {"state": start, "accelerations": np.arange(1.0, chain.nu + 1.0)}, state=closed_states, accelerations=vectors)  # fmt: skip
-    add("ClosedSystem.route", chain.route, {"algorithm": "articulated", "stabilise": 0.0}, stabilise=wrong_only_number, **ALGORITHM)
+    add(
+        "ClosedSystem.inverse_dynamics",
+        chain.inverse_dynamics,
+        {"state": start, "accelerations": np.arange(1.0, chain.nu + 1.0)},
+        state=closed_states,
+        accelerations=vectors,
+    )
+    add(
+        "ClosedSystem.route",
+        chain.route,
+        {"algorithm": "articulated", "stabilise": 0.0},
+        stabilise=wrong_only_number,
+        **ALGORITHM,
+    )
 
-    add("compile", lambda scene, elimination: fm.compile(scene, elimination).accelerations(state), {"scene": W.scene, "elimination": "fastest"}, scene=chosen(None, "scene.toml", 1, W.tree), elimination=chosen(None, "nonsense", 5))  # fmt: skip
-    add("compile, closed", lambda elimination: fm.compile(chain.scene, elimination).nu, {"elimination": "fastest"}, elimination=chosen(None, "nonsense", 5))  # fmt: skip
-    add("linearize", lambda system, state: fm.linearize(system, state).A, {"system": tree, "state": state}, system=systems, state=but_none(states))
-    add("equilibrium", lambda system, guess: fm.equilibrium(system, guess), {"system": tree, "guess": state}, system=systems, guess=but_none(states))
+    add(
+        "compile",
+        lambda scene, elimination: fm.compile(scene, elimination).accelerations(state),
+        {"scene": W.scene, "elimination": "fastest"},
+        scene=chosen(None, "scene.toml", 1, W.tree),
+        elimination=chosen(None, "nonsense", 5),
+    )
+    add(
+        "compile, closed",
+        lambda elimination: fm.compile(chain.scene, elimination).nu,
+        {"elimination": "fastest"},
+        elimination=chosen(None, "nonsense", 5),
+    )
+    add(
+        "linearize",
+        lambda system, state: fm.linearize(system, state).A,
+        {"system": tree, "state": state},
+        system=systems,
+        state=but_none(states),
+    )
+    add(
+        "equilibrium",
+        lambda system, guess: fm.equilibrium(system, guess),
+        {"system": tree, "guess": state},
+        system=systems,
+        guess=but_none(states),
+    )
     arguments = {"system": tree, "hinge": "rotor", "rate": 0.5, "guess": state}
-    add("steady_spin", lambda **given: fm.steady_spin(**given).state, arguments, system=systems, hinge=names, rate=numbers, guess=but_none(states))
+    add(
+        "steady_spin",
+        lambda **given: fm.steady_spin(**given).state,
+        arguments,
+        system=systems,
+        hinge=names,
+        rate=numbers,
+        guess=but_none(states),
+    )
     add("SteadySpin.linearize", lambda: fm.steady_spin(tree, "rotor", 0.5).linearize().A, {})
     arguments = {"system": tree, "hinge": "rotor", "rates": np.array([0.5, 1.0])}
-    add("campbell", lambda **given: fm.campbell(**given).eigenvalues, arguments, system=systems, hinge=names, rates=series)
+    add(
+        "campbell",
+        lambda **given: fm.campbell(**given).eigenvalues,
+        arguments,
+        system=systems,
+        hinge=names,
+        rates=series,
+    )
     model = W.model
     arguments = {"input": model.inputs[-1][0], "omega": np.array([2.0, 3.0]), "outputs": ("centre.x",)}
-    add("LinearModel.frequency_response", model.frequency_response, arguments, input=names, omega=series, outputs=chosen(("nobody",), (None,), 5))
+    add(
+        "LinearModel.frequency_response",
+        model.frequency_response,
+        arguments,
+        input=names,
+        omega=series,
+        outputs=chosen(("nobody",), (None,), 5),
+    )
     mode = model.modes[-1]
-    add("LinearModel.marker_shape", model.marker_shape, {"mode": mode, "marker": "centre"}, mode=not_a_mode, marker=names)
+    add(
+        "LinearModel.marker_shape",
+        model.marker_shape,
+        {"mode": mode, "marker": "centre"},
+        mode=not_a_mode,
+        marker=names,
+    )
     arguments = {"mode": mode, "size": 0.5, "phase": 0.5}
     add("LinearModel.displaced", model.displaced, arguments, mode=not_a_mode, size=numbers, phase=numbers)
-    settings = {"t_end": 0.01, "method": "dop853", "rtol": 1e-6, "atol": 1e-8, "samples": 3, "max_steps": 100, "stabilise": 0.0}
+    settings = {
+        "t_end": 0.01,
+        "method": "dop853",
+        "rtol": 1e-6,
+        "atol": 1e-8,
+        "samples": 3,
+        "max_steps": 100,
+        "stabilise": 0.0,
+    }
     kinds = {
-        "method": chosen(None, "euler", 5), "rtol": chosen(*NO_NUMBER, 0.0, -1e-3, 0.2, 1e-17, plain=((np.float64(1e-6), 1e-6),)),
+        "method": chosen(None, "euler", 5),
+        "rtol": chosen(*NO_NUMBER, 0.0, -1e-3, 0.2, 1e-17, plain=((np.float64(1e-6), 1e-6),)),
         "atol": chosen(*NO_NUMBER, 0.0, -1e-3), "samples": SAMPLES, "stabilise": chosen(*NO_NUMBER, 1.0, -1.0),
         "max_steps": chosen(None, "5", 0, -1, 1e3, 10**30, True, np.nan, plain=((np.int32(100), 100),)), **RUN,
     }  # fmt: skip
@@ -338,13 +446,25 @@ def calls() -> dict[str, Call]:
     fixed = {"step": 1e-3, "spectral_radius": 0.5}
     steps = chosen(*(each for each in NO_NUMBER), 0.0, -1.0, 1e-300, 1e-320, plain=((np.float64(1e-3), 1e-3),))
     radius = chosen("1", 1j, np.nan, np.inf, -0.1, 1.5, True, plain=((1, 1.0), (np.float32(0.5), 0.5)))
-    add("simulate, in steps", lambda **given: seen(fm.simulate(tree, 0.01, "generalised_alpha", samples=3, **given)), fixed, step=steps, spectral_radius=radius)  # fmt: skip
+    add(
+        "simulate, in steps",
+        lambda **given: seen(fm.simulate(tree, 0.01, "generalised_alpha", samples=3, **given)),
+        fixed,
+        step=steps,
+        spectral_radius=radius,
+    )
     asked = {"tolerance": 1e-2, "quantity": "marker:centre.position@1", "t_end": 0.01}
     refused = chosen(*NO_NUMBER, 0.0, -1.0)
     found["advise"] = Call(lambda **given: fm.advise(W.scene, **given), asked, {
         "tolerance": chosen(*NO_NUMBER, 0.0, 1.0, -1.0), "t_end": refused, "quantity": chosen("nobody", 5, ("nobody",)),
     })  # fmt: skip
-    add("check_scene", fm.check_scene, {"scene": W.scene, "t_end": 1.0}, scene=chosen(None, "scene", 1), t_end=chosen("1", 1j, np.nan, np.inf, 0.0, -1.0, [1.0], 10**400))
+    add(
+        "check_scene",
+        fm.check_scene,
+        {"scene": W.scene, "t_end": 1.0},
+        scene=chosen(None, "scene", 1),
+        t_end=chosen("1", 1j, np.nan, np.inf, 0.0, -1.0, [1.0], 10**400),
+    )
     return found
 
 
@@ -391,7 +511,7 @@ def wrong_only_number(x: float) -> Iterator[Variant]:
 
 def series(v: np.ndarray) -> Iterator[Variant]:
     """Of a row of any length, or one number."""
-    loose = {"short", "long", "very long", "0-d", "scalar"}
+    loose = {"short", "long", "very long", "empty", "0-d", "scalar"}
     return (each for each in vectors(v) if each.name not in loose)
 
 
@@ -413,7 +533,17 @@ EXEMPT = {
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
     "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "SceneError",
 }  # fmt: skip
-CLASSES = (fm.System, ClosedSystem, NestedSystem, MassMatrixFactors, Operators, fm.Trajectory, fm.LinearModel, fm.Campbell, fm.SteadySpin)
+CLASSES = (
+    fm.System,
+    ClosedSystem,
+    NestedSystem,
+    MassMatrixFactors,
+    Operators,
+    fm.Trajectory,
+    fm.LinearModel,
+    fm.Campbell,
+    fm.SteadySpin,
+)
 
 
 def public() -> set[str]:
@@ -506,7 +636,6 @@ def main() -> None:
         count += sum(len(list(kind(call.arguments[argument]))) for argument, kind in call.kinds.items())
     print("\n".join(found))
     print(f"{count} calls, {len(found)} faults")
-    assert nested_system is not None
 
 
 if __name__ == "__main__":
