@@ -16,6 +16,7 @@ import sys
 import uuid
 import warnings
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -77,7 +78,8 @@ class KernelCache(NullCache):  # type: ignore[misc]
                     "process compiles them again: make room or permit writing there, or set NUMBA_CACHE_DIR"
                 )
         finally:
-            written.unlink(missing_ok=True)
+            with suppress(OSError):
+                written.unlink()
 
     def _file(self, sig: Any, codegen: Any) -> Path:
         key = repr((self._function, str(sig), codegen.magic_tuple()))

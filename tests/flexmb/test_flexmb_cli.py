@@ -81,7 +81,7 @@ def test_wrong_options_exit_2_with_a_remedy(scene_file, words, tmp_path):
     result = invoke("simulate", scene_file, "--out", tmp_path / "out", "--t-end", *words)
     assert result.exit_code == 2
     assert "error:" in result.output
-    assert len(result.output.strip().splitlines()) <= 2  # of a scene: its name, and what is wrong
+    assert len(result.output.strip().splitlines()) <= 3  # of a scene: its name, what is wrong, the remedy
     assert "Traceback" not in result.output
     assert not (tmp_path / "out").exists()
 

@@ -3,9 +3,14 @@
 import os
 import subprocess
 import sys
+import warnings
 from pathlib import Path
 
+import numpy as np
 import pytest
+
+import flexmb.kernel
+from flexmb.kernel_cache import warn_once
 
 ROOT = Path(__file__).parents[2]
 TINY = """
@@ -62,30 +67,56 @@ def folder(file: Path) -> None:
     (file / "inside").write_text("")
 
 
-def locked(file: Path) -> None:
-    file.chmod(0)
+DAMAGES = (emptied, cut, garbage, flipped, folder)
 
 
-def renamed(file: Path) -> None:
-    """What belongs to other types, under this name."""
-    others = [other for other in kernels(file.parents[1]) if other != file]
-    file.write_bytes(others[0].read_bytes() if others else b"other")
+def weighted(values, weight):
+    """A tiny kernel, of integers or of floats."""
+    total = 0.0
+    for value in values:
+        total += weight * value
+    return total
 
 
-DAMAGES = (emptied, cut, garbage, flipped, folder, renamed)
+def hits(cache: Path, monkeypatch) -> int:
+    """Versions of the kernel that were found in a cache: of two."""
+    monkeypatch.setattr(flexmb.kernel, "cache_directory", lambda source: str(cache / "sources"))
+    warn_once.cache_clear()
+    fresh = flexmb.kernel.kernel(weighted)
+    assert fresh(np.arange(4), 2.0) == 12.0
+    assert fresh(np.array([0.5, 0.25]), 2.0) == 1.5
+    return sum(fresh.stats.cache_hits.values())
 
 
 @pytest.mark.parametrize("damage", DAMAGES)
-def test_damaged_files_are_compiled_anew_with_one_warning(damage, tmp_path):
-    assert run(tmp_path, "tiny").stdout.strip() == "0"
-    assert run(tmp_path, "tiny").stdout.strip() == "1"
+def test_damaged_files_are_compiled_anew_with_one_warning(damage, tmp_path, monkeypatch):
+    assert [hits(tmp_path, monkeypatch) for _ in range(2)] == [0, 2]
     for file in kernels(tmp_path):
         damage(file)
-    repaired = run(tmp_path, "tiny")
-    assert repaired.stdout.strip() == "0"
-    assert repaired.stderr.count("damaged files in") == 1
-    again = run(tmp_path, "tiny")
-    assert (again.stdout.strip(), again.stderr) == ("1", "")
+    with pytest.warns(RuntimeWarning, match="damaged files in") as warned:
+        assert hits(tmp_path, monkeypatch) == 0
+    assert len(warned) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert hits(tmp_path, monkeypatch) == 2
+
+
+def test_files_that_changed_names_are_not_taken_for_each_other(tmp_path, monkeypatch):
+    """Two processes that compile for different types at once could do that to an index."""
+    hits(tmp_path, monkeypatch)
+    one, other = kernels(tmp_path)
+    swapped = other.read_bytes(), one.read_bytes()
+    one.write_bytes(swapped[0])
+    other.write_bytes(swapped[1])
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 0
+
+
+def test_one_damaged_file_costs_one_kernel(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
+    cut(kernels(tmp_path)[0])
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 1
 
 
 def test_a_real_kernel_is_repaired_too(tmp_path):
@@ -97,42 +128,49 @@ def test_a_real_kernel_is_repaired_too(tmp_path):
         damage(file)
     repaired = run(tmp_path, "real")
     assert repaired.stdout.strip() == "0"
-    assert repaired.stderr.count("damaged files in") == 1
+    assert repaired.stderr.count("RuntimeWarning: damaged files in") == 1
     assert run(tmp_path, "real").stdout.strip() == "1"
 
 
 @pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="who may do everything is locked out of nothing")
-def test_a_file_without_permission_is_replaced(tmp_path):
-    run(tmp_path, "tiny")
+def test_a_file_without_permission_is_replaced(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
     for file in kernels(tmp_path):
-        locked(file)
-    assert "damaged files in" in run(tmp_path, "tiny").stderr
+        file.chmod(0)
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 0
 
 
-def test_a_file_in_place_of_the_folder_is_replaced(tmp_path):
-    run(tmp_path, "tiny")
-    for each in list(tmp_path.iterdir()):
-        for file in each.iterdir():
-            file.unlink()
-        each.rmdir()
-        each.write_text("not a folder")
-    run(tmp_path, "tiny")
-    assert run(tmp_path, "tiny").stdout.strip() == "1"
+def test_a_kernel_that_cannot_be_kept_runs_with_one_warning(tmp_path, monkeypatch):
+    (tmp_path / "sources").write_text("no folder")
+    with pytest.warns(RuntimeWarning, match="cannot be kept .* NUMBA_CACHE_DIR") as warned:
+        assert hits(tmp_path, monkeypatch) == 0
+    assert len(warned) == 1
+
+
+def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(flexmb.kernel.config, "CACHE_DIR", str(tmp_path))
+    source = Path(flexmb.kernel.__file__)
+    folder = flexmb.kernel.cache_directory.__wrapped__(source)
+    Path(folder).rmdir()
+    Path(folder).write_text("no folder")
+    assert flexmb.kernel.cache_directory.__wrapped__(source) == folder
+    assert Path(folder).is_dir()
 
 
 def test_where_nothing_can_be_written_a_warning_says_so_and_kernels_run(tmp_path):
     place = tmp_path / "file"
     place.write_text("")
     done = run(place, "tiny")
-    assert done.stderr.count("cannot be kept") == 1
+    assert done.stderr.count("RuntimeWarning: compiled kernels cannot be kept") == 1
     assert "NUMBA_CACHE_DIR" in done.stderr
 
 
 def test_processes_that_compile_at_once_share_one_sound_cache(tmp_path):
     environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
     command = [sys.executable, "-W", "error", "-c", PROBES["tiny"]]
-    started = [subprocess.Popen(command, env=environment, cwd=ROOT, stdout=subprocess.DEVNULL) for _ in range(4)]
-    assert [each.wait() for each in started] == [0] * 4
+    started = [subprocess.Popen(command, env=environment, cwd=ROOT, stdout=subprocess.DEVNULL) for _ in range(3)]
+    assert [each.wait() for each in started] == [0] * 3
     assert run(tmp_path, "tiny", "-W", "error").stdout.strip() == "1"
     assert all(file.suffix == ".kernel" for file in tmp_path.rglob("*") if file.is_file())
 
