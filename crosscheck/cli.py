@@ -26,7 +26,7 @@ from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
 from crosscheck.verify_table import channels_table
 from flexmb.scene.problems import closest
-from flexmb.writing import folder, in_words
+from flexmb.writing import in_words
 
 EXIT_USAGE = 2
 
