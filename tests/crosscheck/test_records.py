@@ -83,6 +83,7 @@ CONTRADICTIONS = {
     "a negative shape": changed(channels={"a": Packed(shape=(-1, -1), data=pack(np.ones((1, 1))).data)}),
     "three dimensions": changed(channels={"a": packed((7, 1, 1), bytes(56))}),
     "other times": changed(channels={"a": pack(np.ones((6, 3)))}),
+    "a vector of four": changed(channels={"marker:tip.position": pack(np.ones((7, 4)))}),
     "no times": changed(times=None),
     "text that is no base64": changed(channels={"a": Packed(shape=(7, 3), data="!" + SEVEN.data)}),
     "base64 that is not deflated": changed(channels={"a": Packed(shape=(7, 3), data="AAAA")}),
