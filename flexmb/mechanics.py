@@ -2,18 +2,43 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import warnings
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from flexmb import composite, dynamics, unsplit
-from flexmb.arrays import Constants, Real, Workspace
+from flexmb.arrays import Constants, Index, Real, Workspace
 from flexmb.consistent import consistent_accelerations, held_hinges
 from flexmb.factors import MassMatrixFactors
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
-from flexmb.state import DynamicsError, State, pack
+from flexmb.state import DynamicsError, PrecisionWarning, State, pack
 from flexmb.status import OK, Status
+from flexmb.workspaces import workspace
+
+
+FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
+
+
+class _Doubting(Protocol):
+    """A workspace whose evaluations note small pivots."""
+
+    @property
+    def doubt(self) -> Index: ...
+
+
+class Precision(NamedTuple):
+    """status: OK, or that the inertia of a body, `fault`, is not positive definite; decimal digits left, 0 to 16."""
+
+    status: int
+    fault: int
+    digits: float
+
+    @property
+    def is_low(self) -> bool:
+        """Whether the accelerations exist, with few digits."""
+        return self.status == OK and self.digits < FEW_DIGITS
 
 
 class ConsistentMotion(NamedTuple):
@@ -62,7 +87,25 @@ class Mechanics:
         """
         factors = MassMatrixFactors(self.constants, self.workspace(), state.t, pack(state))
         self._check(factors.status, factors.fault)
+        if factors.is_doubtful:
+            self._judge(self._precision(factors))
         return factors
+
+    def digits_left(self, state: State) -> float:
+        """Significant decimal digits, 0 to 16, of the accelerations of the free speeds that rounding leaves: estimated.
+
+        From the largest magnification of a rounding of the inertias by M^-1 over all loads, in units that do not
+        matter (`flexmb.jain.precision`), in O(N). Single accelerations may be better. Of closed chains: those of the
+        tree. Raises DynamicsError where M is not positive definite, or cannot be told from a singular matrix.
+        """
+        precision = self.precision(state)
+        self._check(precision.status, precision.fault)
+        return precision.digits
+
+    def precision(self, state: State, held: Constants | None = None) -> Precision:
+        """The same without raising. `held` (default: the scene's constants): those whose prescribed speeds are held."""
+        held = self.constants if held is None else held
+        return self._precision(MassMatrixFactors(self.constants, workspace(held, self.nq, self.nu), state.t, pack(state), held))
 
     def bias(self, state: State) -> Real:
         """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
@@ -95,6 +138,7 @@ class Mechanics:
         self._check(
             consistent_accelerations(state.t, pack(state), rates, self.constants, held, w), int(w.fault[0])
         )
+        self._trust(state, w, held)
         rates = w.speed["acceleration"].copy()
         return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
 
@@ -110,6 +154,7 @@ class Mechanics:
     def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
         """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
         self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
+        self._trust(self._unpacked(t, y), self._w)
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
     def _unsplit(self, t: float, y: Real) -> tuple[Real, Real]:
@@ -117,6 +162,7 @@ class Mechanics:
         if self._joint is None:
             self._joint = unsplit.joint(self.constants)
         self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
+        self._trust(self._unpacked(t, y), self._w)
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
     def _inverse(self, state: State, accelerations: Real) -> tuple[Real, Real]:
@@ -136,8 +182,47 @@ class Mechanics:
         body = self.constants.body[k]
         return slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
 
+    def _trust(self, state: State, w: _Doubting, held: Constants | None = None) -> None:
+        """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""
+        if w.doubt[0]:
+            self._judge(self.precision(state, held))
+
+    def _judge(self, precision: Precision) -> None:
+        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits are left."""
+        self._check(precision.status, precision.fault)
+        if precision.is_low:
+            warnings.warn(self.few_digits(precision), PrecisionWarning, stacklevel=4)
+
+    def few_digits(self, precision: Precision) -> str:
+        """What `PrecisionWarning` says."""
+        return (
+            f"about {precision.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
+            f'"{self.body_names[precision.fault]}" moves nearly vanishes beside what it is summed from; bring masses, '
+            "inertias and lengths closer together, or leave out the freedom"
+        )
+
+    def _precision(self, factors: MassMatrixFactors) -> Precision:
+        if factors.status != OK:
+            return Precision(factors.status, factors.fault, 0.0)
+        condition = factors.condition
+        status = Status.NOT_POSITIVE_DEFINITE if condition.is_singular else Status.OK
+        return Precision(int(status), _owner(self.constants, condition.speed), condition.digits)
+
+    def _unpacked(self, t: float, y: Real) -> State:
+        return State(y[: self.nq], y[self.nq : -1], t)
+
     def _check(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
             place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
             raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+
+
+def _owner(c: Constants, speed: int) -> int:
+    """Body whose hinge, mode or wheel has a speed."""
+    for k, body in enumerate(c.body):
+        wheels = c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]]
+        first, modes = body["u_index"], body["etad_index"]
+        if first <= speed < first + body["nv"] or modes <= speed < modes + body["modes"] or speed in wheels:
+            return k
+    return 0

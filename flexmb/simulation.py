@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import TYPE_CHECKING, NamedTuple, cast, get_args
 
@@ -21,7 +23,7 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError
+from flexmb.state import DynamicsError, PrecisionWarning
 from flexmb.status import Status
 from flexmb.system import ENERGIES, ERRATA, Algorithm, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
@@ -88,8 +90,15 @@ def simulate(
     system = scene if isinstance(scene, System) else assembled(scene)
     if method in LINEARISING:
         _refuse_without_jacobian(system, algorithm, method)
-    raw = _integrate(system, _route(system, algorithm, stabilise), times, settings)
-    return _observed(system, times, raw, algorithm)
+    route, start = _route(system, algorithm, stabilise), system.precision(system.initial_state)
+    if start.status != Status.OK:
+        raw = _Raw(np.empty((0, system.nq + system.nu + 1)), Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0)
+        return _observed(system, times, raw, algorithm)
+    trajectory = _observed(system, times, _integrate(system, route, times, settings), algorithm)
+    if start.is_low:
+        warnings.warn(system.few_digits(start), PrecisionWarning, stacklevel=2)
+        trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {system.few_digits(start)}")
+    return trajectory
 
 
 def switch_times(scene: Scene, t_end: float) -> list[float]:

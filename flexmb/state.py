@@ -22,6 +22,10 @@ class DynamicsError(ArithmeticError):
     """The accelerations do not exist at this state; the message names the body and the remedy."""
 
 
+class PrecisionWarning(UserWarning):
+    """Rounding leaves few digits of the accelerations at this state; the message says how many, and where they go."""
+
+
 def pack(state: State) -> Real:
     """y = [q, u, work]."""
     return np.concatenate([state.q, state.u, [0.0]])

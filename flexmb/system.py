@@ -181,6 +181,7 @@ class System(Mechanics):
             nested = self.nested(algorithm)
             status, rates = nested.accelerations(state.t, pack(state))
             self._check(status, nested.fault)
+            self._trust(state, nested)
             return rates
         if algorithm == "composite":
             return self._composite(state.t, pack(state))[0]
@@ -188,6 +189,7 @@ class System(Mechanics):
             return self._unsplit(state.t, pack(state))[0]
         c, w = self.recursion_constants, self._recursion_w
         self._check(dynamics.accelerations(state.t, pack(state), c, w), int(w.fault[0]))
+        self._trust(state, w)
         return w.speed["acceleration"].copy()
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
@@ -232,6 +234,7 @@ class System(Mechanics):
             t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
         )
         self._check(status, int(w.fault[0]))
+        self._trust(State(q, u, t), w)
         return self._evaluation(
             w.speed["acceleration"].copy(), w.speed["drive"], markers, loads, wheel_loads, energy, momentum
         )
@@ -239,6 +242,7 @@ class System(Mechanics):
     def _evaluate_nested(self, t: float, y: Real, nested: NestedSystem) -> Evaluation:
         status, motion = nested.motion(t, y)
         self._check(status, nested.fault)
+        self._trust(self._unpacked(t, y), nested)
         rates = motion.accelerations
         markers, loads, wheel_loads, energy, momentum = self._observed(t, y, rates, motion.loads)
         wheel_loads[:, :3] = motion.wheel_torques

@@ -78,6 +78,11 @@ class Closures:
         return self._chain.cw
 
     @property
+    def doubt(self) -> Index:
+        """(1,) whether the last evaluation met a pivot of the tree that may be rounding."""
+        return self._chain.w.doubt
+
+    @property
     def fault(self) -> int:
         """Body or closure at which the last evaluation failed."""
         return int(self._chain.fault[0])
