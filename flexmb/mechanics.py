@@ -17,7 +17,6 @@ from flexmb.state import DynamicsError, PrecisionWarning, State, pack
 from flexmb.status import OK, Status
 from flexmb.workspaces import workspace
 
-
 FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
 
 
@@ -103,9 +102,10 @@ class Mechanics:
         return precision.digits
 
     def precision(self, state: State, held: Constants | None = None) -> Precision:
-        """The same without raising. `held` (default: the scene's constants): those whose prescribed speeds are held."""
+        """The same without raising. `held`: the constants whose prescribed speeds are held, by default the scene's."""
         held = self.constants if held is None else held
-        return self._precision(MassMatrixFactors(self.constants, workspace(held, self.nq, self.nu), state.t, pack(state), held))
+        w = workspace(held, self.nq, self.nu)
+        return self._precision(MassMatrixFactors(self.constants, w, state.t, pack(state), held))
 
     def bias(self, state: State) -> Real:
         """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
@@ -188,7 +188,7 @@ class Mechanics:
             self._judge(self.precision(state, held))
 
     def _judge(self, precision: Precision) -> None:
-        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits are left."""
+        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
         self._check(precision.status, precision.fault)
         if precision.is_low:
             warnings.warn(self.few_digits(precision), PrecisionWarning, stacklevel=4)

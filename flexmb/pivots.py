@@ -13,7 +13,7 @@ SMALL = 2.0**-20  # of the diagonal: rounding must have been magnified as many t
 
 @helper
 def is_small(c, w, j, pivot, diagonal):
-    """Whether a pivot of speed j is small beside its diagonal before elimination, or beside all that the speed moves."""
+    """Whether a pivot of speed j is small beside its diagonal before elimination, or all that the speed moves."""
     if pivot.real > c.speed[j].doubtful and pivot.real > SMALL * diagonal.real:
         return False
     w.doubt[0] = 1

@@ -92,8 +92,8 @@ def simulate(
         _refuse_without_jacobian(system, algorithm, method)
     route, start = _route(system, algorithm, stabilise), system.precision(system.initial_state)
     if start.status != Status.OK:
-        raw = _Raw(np.empty((0, system.nq + system.nu + 1)), Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0)
-        return _observed(system, times, raw, algorithm)
+        none = np.empty((0, system.nq + system.nu + 1))
+        return _observed(system, times, _Raw(none, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0, 0), algorithm)
     trajectory = _observed(system, times, _integrate(system, route, times, settings), algorithm)
     if start.is_low:
         warnings.warn(system.few_digits(start), PrecisionWarning, stacklevel=2)

@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.arrays import RUTHLESS, Constants, Real, Workspace
+from flexmb.arrays import RUTHLESS, Constants, Index, Real, Workspace
 from flexmb.closure import dynamics
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices

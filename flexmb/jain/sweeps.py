@@ -17,7 +17,7 @@ from flexmb.jain.kinematics import (
     store_body_acceleration,
     velocity_sweep,
 )
-from flexmb.jain.pivots import are_rounding, trace
+from flexmb.jain.pivots import note_hinge
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations, to_parent
 from flexmb.kernel import helper
 from flexmb.levels.range import is_out_of_range
@@ -69,7 +69,8 @@ def bodies(c, w):
 def inward(c, w):
     """The inward half of (63), (64); False where a D is not positive definite, w.fault names the body.
 
-    w.doubt says whether pivots were so small that rounding may have a large share in them. What it leaves of M_m are the factors that `flexmb.jain.innovations` solves with.
+    w.doubt says whether a pivot was so small that it may be rounding. What is left of M_m are the factors that
+    `flexmb.jain.innovations` solves with.
     """
     w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
@@ -96,7 +97,7 @@ def _eliminate_hinge(c, w, k):
         u_angular, u_linear = inertia_column(p, row)
         d = u_angular[2] if kind == REVOLUTE else u_linear[2]
         before = w.body[k].inertia[2 if kind == REVOLUTE else 17]
-        if is_small(c, w, j, d, before) and is_rounding(d, trace(w, k, kind == REVOLUTE)):
+        if is_small(c, w, j, d, before) and is_rounding(d, before):
             return False
         epsilon = w.speed[j].applied - (tau[2] if kind == REVOLUTE else f[2])
         s = 1.0 / d
@@ -155,8 +156,9 @@ def _eliminate_several(c, w, k, p, tau, f):
         for b in range(a + 1):
             angular_b, linear_b = motion_column(c, w, k, w.body[k].free_speed[b])
             D[a, b] = dot(u_angular, angular_b) + dot(u_linear, linear_b)
-    if not cholesky(D, free) or are_rounding(c, w, k, D, 0):
+    if not cholesky(D, free):
         return False
+    note_hinge(c, w, k, D, 0)
     for a in range(free):
         for b in range(a):
             w.body[k].hinge_residual[a] -= D[a, b] * w.body[k].hinge_residual[b]

@@ -8,7 +8,7 @@ from flexmb.arrays import Real
 from flexmb.bundle import bundle
 from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
 from flexmb.jain.kinematics import inboard_acceleration, motion_column, store_body_acceleration
-from flexmb.jain.pivots import are_rounding, note_modes
+from flexmb.jain.pivots import note_hinge, note_modes
 from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
@@ -76,9 +76,10 @@ def _eliminate(c, w, x, k):
         for i in range(nm, n + 1):
             other = motion_column(c, w, k, w.body[k].free_speed[i - nm])
             D[n, i] = dot(momentum[0], other[0]) + dot(momentum[1], other[1])
-    if not cholesky(D, rows) or are_rounding(c, w, k, D, nm):
+    if not cholesky(D, rows):
         return False
     note_modes(c, w, k, D)
+    note_hinge(c, w, k, D, nm)
     store_inertia(w.body[k].hinge_inertia, 0, p)
     for n in range(rows):
         for i in range(n):

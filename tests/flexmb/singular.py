@@ -13,6 +13,7 @@ import numpy as np
 from numpy.random import Generator
 from scipy.spatial.transform import Rotation
 
+from flexmb import State, System
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.modal_data import inertia_points
@@ -23,7 +24,8 @@ def _builder(name: str, rng: Generator) -> SceneBuilder:
     """With a massive body "base" that a ball holds to the ground."""
     scene = SceneBuilder(name, gravity=vector(rng, 5.0))
     _massive(scene, rng, "base")
-    return scene.spherical("mount", "ground", "base", child_position=vector(rng, 0.5), angular_velocity=vector(rng, 1.0))
+    place, spin = vector(rng, 0.5), vector(rng, 1.0)
+    return scene.spherical("mount", "ground", "base", child_position=place, angular_velocity=spin)
 
 
 def _massive(scene: SceneBuilder, rng: Generator, name: str) -> None:
@@ -70,13 +72,14 @@ def coincident_axes(seed: int, share: float) -> s.Scene:
 
 
 def locked_gimbal(seed: int, share: float) -> s.Scene:
-    """A gimbal whose first and last axis are aligned but for the root of `share`, with a revolute beyond."""
+    """A gimbal whose first and last axis `state` aligns but for the root of `share`, with a revolute beyond."""
     rng = np.random.default_rng(seed)
     scene = _builder(f"locked gimbal {seed}", rng)
     _massive(scene, rng, "inner")
     _massive(scene, rng, "outer")
-    middle = angular(angle=0.5 * np.pi + np.sqrt(share), rate=rng.uniform(-0.1, 0.1))
-    scene.gimbal("gimbal", "base", "inner", sequence="xyz", rotations=(angular(**_angle(rng)), middle, angular(**_angle(rng))),
+    middle = angular(angle=0.5 * np.pi - np.sqrt(max(share, 0.1)), rate=rng.uniform(-0.1, 0.1))
+    rotations = (angular(**_angle(rng)), middle, angular(**_angle(rng)))
+    scene.gimbal("gimbal", "base", "inner", sequence="xyz", rotations=rotations,
                  parent_quaternion=quaternion(rng), child_position=vector(rng, 0.5))  # fmt: skip
     return scene.revolute(
         "pin", "inner", "outer", axis=direction(rng), parent_position=vector(rng, 0.5), child_position=vector(rng, 0.5),
@@ -107,7 +110,8 @@ def in_all_directions(seed: int, share: float) -> s.Scene:
                     parent_quaternion=quaternion(rng), **_displacement(rng))  # fmt: skip
     return scene.point_mass(
         "bead", "slider", mass=rng.uniform(0.5, 2.0), offset=vector(rng, 0.5),
-        directions=matrix(Rotation.random(random_state=rng).as_matrix()), coordinates=[linear(**_displacement(rng))] * 3,
+        directions=matrix(Rotation.random(random_state=rng).as_matrix()),
+        coordinates=[linear(**_displacement(rng))] * 3,
     ).scene()  # fmt: skip
 
 
@@ -117,6 +121,14 @@ def _angle(rng: Generator) -> dict[str, Any]:
 
 def _displacement(rng: Generator) -> dict[str, Any]:
     return {"position": rng.uniform(-0.3, 0.3), "rate": rng.uniform(-1.0, 1.0), "stiffness": rng.uniform(20.0, 90.0)}
+
+
+def state(system: System, share: float) -> State:
+    """The system's start; a gimbal is turned to its lock, where no scene may start."""
+    q = system.initial_state.q
+    if system.scene.hinges[1].name == "gimbal":
+        q[system.coordinate("gimbal")][1] = 0.5 * np.pi - np.sqrt(share)
+    return system.state(q, system.initial_state.u)
 
 
 FAMILIES: dict[str, Callable[[int, float], s.Scene]] = {
