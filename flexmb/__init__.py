@@ -58,7 +58,8 @@ _LATER = {
 __all__ = [
     "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "LinearModel",
     "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise",
-    "campbell", "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "steady_spin",
+    "campbell", "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 

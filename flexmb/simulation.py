@@ -92,8 +92,9 @@ def simulate(
         _refuse_without_jacobian(system, algorithm, method)
     route, start = _route(system, algorithm, stabilise), system.precision(system.initial_state)
     if start.status != Status.OK:
-        none = np.empty((0, system.nq + system.nu + 1))
-        return _observed(system, times, _Raw(none, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0, 0), algorithm)
+        nothing = np.empty((0, system.nq + system.nu + 1))
+        raw = _Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0)
+        return _observed(system, times, raw, algorithm)
     trajectory = _observed(system, times, _integrate(system, route, times, settings), algorithm)
     if start.is_low:
         warnings.warn(system.few_digits(start), PrecisionWarning, stacklevel=2)
