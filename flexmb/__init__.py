@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from flexmb.linear.model import LinearModel
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.simulation import simulate
-    from flexmb.state import DynamicsError, State
+    from flexmb.state import DynamicsError, PrecisionWarning, State
     from flexmb.status import Status
     from flexmb.system import Evaluation, System, compile
     from flexmb.trajectory import Trajectory
@@ -50,6 +50,7 @@ _LATER = {
     "Status": "flexmb.status",
     "DynamicsError": "flexmb.state",
     "Evaluation": "flexmb.system",
+    "PrecisionWarning": "flexmb.state",
     "State": "flexmb.state",
     "System": "flexmb.system",
     "compile": "flexmb.system",
@@ -58,7 +59,8 @@ _LATER = {
 
 __all__ = [
     "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "Interrupted",
-    "LinearModel", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise",
+    "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System",
+    "Trajectory", "advise",
     "campbell", "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
     "steady_spin",
     *schema.__all__,

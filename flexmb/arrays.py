@@ -122,6 +122,7 @@ SPEED = _record(
     ("stiffness", _F),
     ("damping", _F),
     ("rest", _F),
+    ("doubtful", _F),  # a pivot below is so small against all that the speed moves that it may be rounding
 )
 FUNCTION = _record(
     ("kind", _I),
@@ -238,6 +239,7 @@ class Workspace:
     speed: Record  # (nu,) SPEED_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body where an evaluation failed
+    doubt: Index  # (1,) whether an evaluation met a pivot that may be rounding
     displaced: Index  # (1,) whether modes and ports of ruthless bodies may not be at rest
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb import arrays as a
+from flexmb.carried import moved_inertia
 from flexmb.functions import pack
 from flexmb.hinges import catalogue
 from flexmb.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
@@ -13,6 +14,8 @@ from flexmb.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
+
+DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
 
 
 class Functions:
@@ -127,6 +130,7 @@ def assemble(
         **inertia,
         **points,
     )
+    constants.speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides]
 
@@ -187,7 +191,7 @@ def _speeds(
                 )
             else:
                 spring, motor, prescribed = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
-            out[u + n] = (q + n, functions.number(motor), functions.number(prescribed), *spring)
+            out[u + n] = (q + n, functions.number(motor), functions.number(prescribed), *spring, 0.0)
     for wheel in wheels:
         out[numbering.u[wheel.name].start] = (
             numbering.q[wheel.name].start,
@@ -195,6 +199,7 @@ def _speeds(
             functions.number(wheel.prescribed_rad),
             0.0,
             wheel.friction_Nms_rad,
+            0.0,
             0.0,
         )
     return out

@@ -55,7 +55,9 @@ class ClosedSystem(System):
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         _refuse_others(self.scene, algorithm)
         motion = self.closures.composite_motion if algorithm == "composite" else self.closures.motion
-        return motion(t, y)
+        found = motion(t, y)
+        self._trust(t, y, self.closures)
+        return found
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""

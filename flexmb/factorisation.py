@@ -1,7 +1,7 @@
 """Entry points of the innovations factorisation of a mass matrix, M = F F': Jain & Rodriguez (54)-(56)."""
 
 from flexmb.coordinates import load_state
-from flexmb.jain import innovations
+from flexmb.jain import innovations, precision
 from flexmb.kernel import helper, kernel
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
 
@@ -57,6 +57,16 @@ def multiply(c, w, x, b):
         innovations.synthesise(c, w, x)
         for j in range(b.shape[1]):
             b[row, j] = x.speed[j].applied
+
+
+@kernel
+def weigh(c, w, x, y):
+    """y (nu,) replaced by F^-1 S'S F'^-1 y, for S of `flexmb.jain.precision`."""
+    for j in range(y.shape[0]):
+        x.speed[j].innovation = y[j]
+    precision.weigh(c, w, x)
+    for j in range(y.shape[0]):
+        y[j] = x.speed[j].innovation
 
 
 @kernel

@@ -3,8 +3,7 @@
 from math import sqrt
 
 from flexmb.kernel import helper
-
-SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
+from flexmb.pivots import SINGULAR
 
 
 @helper

@@ -241,8 +241,6 @@ def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> Link:
     elif free > 1:
         x, y = np.asarray(mass.directions[:2], float)
         turn = np.column_stack([x, y, np.cross(x, y)])
-        if free == 3 and turn[:, 2] @ np.asarray(mass.directions[2], float) < 0.0:
-            raise ValueError(f'point mass "{mass.name}": its three directions must be right-handed; swap two of them')
     point = _rigid_model(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (np.zeros(3), np.eye(3))})
     return Link(
         name=mass.name,

@@ -2,18 +2,42 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import warnings
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
 from flexmb import composite, dynamics, unsplit
-from flexmb.arrays import Constants, Real, Workspace
+from flexmb.arrays import Constants, Index, Real, Workspace
 from flexmb.consistent import consistent_accelerations, held_hinges
 from flexmb.factors import MassMatrixFactors
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
-from flexmb.state import DynamicsError, Layout, State, finite_result
+from flexmb.state import DynamicsError, Layout, PrecisionWarning, State, finite_result
 from flexmb.status import OK, Status
+from flexmb.workspaces import workspace
+
+FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
+
+
+class _Doubting(Protocol):
+    """A workspace whose evaluations note small pivots."""
+
+    @property
+    def doubt(self) -> Index: ...
+
+
+class Precision(NamedTuple):
+    """status: OK, or that the inertia of a body, `fault`, is not positive definite; decimal digits left, 0 to 16."""
+
+    status: int
+    fault: int
+    digits: float
+
+    @property
+    def is_low(self) -> bool:
+        """Whether the accelerations exist, with few digits."""
+        return self.status == OK and self.digits < FEW_DIGITS
 
 
 class ConsistentMotion(NamedTuple):
@@ -64,7 +88,24 @@ class Mechanics:
         """
         factors = MassMatrixFactors(self.constants, self.workspace(), *self.layout.entering(state))
         self._check(factors.status, factors.fault)
+        if factors.is_doubtful:
+            self._judge(self._precision(factors))
         return factors
+
+    def digits_left(self, state: State) -> float:
+        """Significant decimal digits, 0 to 16, of the accelerations of the free speeds that rounding leaves: estimated.
+
+        From the largest magnification of a rounding of the inertias by M^-1 over all loads, in units that do not
+        matter (`flexmb.jain.precision`), in O(N). Single accelerations may be better. Of closed chains: those of the
+        tree. Raises DynamicsError where M is not positive definite, or cannot be told from a singular matrix.
+        """
+        precision = self.precision(state)
+        self._check(precision.status, precision.fault)
+        return precision.digits
+
+    def precision(self, state: State) -> Precision:
+        """The same without raising where M is not positive definite."""
+        return self._precision_at(*self.layout.entering(state))
 
     def bias(self, state: State) -> Real:
         """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
@@ -97,6 +138,7 @@ class Mechanics:
             self._held = held_hinges(self.constants, self.workspace())
         held, w = self._held
         self._check(consistent_accelerations(t, y, rates, self.constants, held, w), int(w.fault[0]))
+        self._trust(t, y, w, held)
         rates = w.speed["acceleration"].copy()
         return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
 
@@ -113,6 +155,7 @@ class Mechanics:
     def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
         """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
         self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
+        self._trust(t, y, self._w)
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
     def _unsplit(self, t: float, y: Real) -> tuple[Real, Real]:
@@ -120,6 +163,7 @@ class Mechanics:
         if self._joint is None:
             self._joint = unsplit.joint(self.constants)
         self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
+        self._trust(t, y, self._w)
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
     def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
@@ -138,8 +182,49 @@ class Mechanics:
         body = self.constants.body[k]
         return slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
 
+    def _precision_at(self, t: float, y: Real, held: Constants | None = None) -> Precision:
+        """`held`: the constants whose prescribed speeds are held, by default the scene's."""
+        held = self.constants if held is None else held
+        return self._precision(MassMatrixFactors(self.constants, workspace(held, self.nq, self.nu), t, y, held))
+
+    def _trust(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
+        """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""
+        if w.doubt[0]:
+            self._judge(self._precision_at(t, y, held))
+
+    def _judge(self, precision: Precision) -> None:
+        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
+        self._check(precision.status, precision.fault)
+        if precision.is_low:
+            warnings.warn(self.few_digits(precision), PrecisionWarning, stacklevel=4)
+
+    def few_digits(self, precision: Precision) -> str:
+        """What `PrecisionWarning` says."""
+        return (
+            f"about {precision.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
+            f'"{self.body_names[precision.fault]}" moves nearly vanishes beside what it is summed from; bring masses, '
+            "inertias and lengths closer together, or leave out the freedom"
+        )
+
+    def _precision(self, factors: MassMatrixFactors) -> Precision:
+        if factors.status != OK:
+            return Precision(factors.status, factors.fault, 0.0)
+        condition = factors.condition
+        status = Status.NOT_POSITIVE_DEFINITE if condition.is_singular else Status.OK
+        return Precision(int(status), _owner(self.constants, condition.speed), condition.digits)
+
     def _check(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
             place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
             raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+
+
+def _owner(c: Constants, speed: int) -> int:
+    """Body whose hinge, mode or wheel has a speed."""
+    for k, body in enumerate(c.body):
+        wheels = c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]]
+        first, modes = body["u_index"], body["etad_index"]
+        if first <= speed < first + body["nv"] or modes <= speed < modes + body["modes"] or speed in wheels:
+            return k
+    return 0

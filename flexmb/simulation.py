@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from time import perf_counter
 from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
@@ -22,7 +24,7 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError, NotFiniteError
+from flexmb.state import DynamicsError, NotFiniteError, PrecisionWarning
 from flexmb.status import Status
 from flexmb.system import ENERGIES, ERRATA, Algorithm, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
@@ -100,8 +102,16 @@ def simulate(
     _refuse_too_many(len(times), system)
     if method in LINEARISING:
         _refuse_without_jacobian(system, algorithm, method)
-    raw = _integrate(system, _route(system, algorithm, stabilise), times, settings)
+    route, start = _route(system, algorithm, stabilise), system.precision(system.initial_state)
+    if start.status != Status.OK:
+        nothing = np.empty((0, system.nq + system.nu + 1))
+        raw = _Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
+        return _observed(system, times, raw, algorithm)
+    raw = _integrate(system, route, times, settings)
     trajectory = _observed(system, times, raw, algorithm)
+    if start.is_low:
+        warnings.warn(system.few_digits(start), PrecisionWarning, stacklevel=2)
+        trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {system.few_digits(start)}")
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory

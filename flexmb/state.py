@@ -25,6 +25,10 @@ class NotFiniteError(DynamicsError):
     """A state is finite, and what follows from it is not: numbers overflow."""
 
 
+class PrecisionWarning(UserWarning):
+    """Rounding leaves few digits of the accelerations at this state; the message says how many, and where they go."""
+
+
 @dataclass(frozen=True, eq=False)
 class State:
     """Coordinates q (nq,), speeds u (nu,) and time t (s).

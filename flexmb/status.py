@@ -28,9 +28,9 @@ class Status(IntEnum):
 _ADVICE = {
     Status.OK: "finished",
     Status.NOT_POSITIVE_DEFINITE: (
-        "the inertia of body {body} with all it carries is not positive definite: it moves without mass, its gimbal is "
-        "at its singular angle, or its first-order mass matrix left its range of validity; give it mass, use a "
-        'spherical hinge, or use level "full"'
+        "the inertia of body {body} with all it carries is not positive definite: it moves without mass, hinges and "
+        "modes move the same mass twice, its gimbal is at its singular angle, or its first-order mass matrix left its "
+        'range of validity; give it mass, leave out a freedom, use a spherical hinge, or use level "full"'
     ),
     Status.NONFINITE: (
         "the state is no longer finite: the motion diverged; look for an instability (level, negative stiffness or "

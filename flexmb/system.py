@@ -200,11 +200,13 @@ class System(Mechanics):
         if algorithm == "articulated":
             c, w = self.recursion_constants, self._recursion_w
             self._check(dynamics.accelerations(t, y, c, w), int(w.fault[0]))
+            self._trust(t, y, w)
             return w.speed["acceleration"].copy()
         if algorithm in ERRATA:
             nested = self.nested(algorithm)
             status, rates = nested.accelerations(t, y)
             self._check(status, nested.fault)
+            self._trust(t, y, nested)
             return rates
         if algorithm == "composite":
             return self._composite(t, y)[0]
@@ -254,11 +256,13 @@ class System(Mechanics):
                 out.markers, out.loads, out.wheel_loads, out.energy, out.momentum,
             )  # fmt: skip
             self._check(status, int(w.fault[0]))
+            self._trust(t, y, w)
             return self._evaluation(t, w.speed["acceleration"].copy(), w.speed["drive"], out)
         if algorithm in ERRATA:
             nested = self.nested(algorithm)
             status, motion = nested.motion(t, y)
             self._check(status, nested.fault)
+            self._trust(t, y, nested)
             out.loads[:] = motion.loads
             self._observe_motion(t, y, motion.accelerations, out)
             out.wheel_loads[:, :3] = motion.wheel_torques

@@ -28,6 +28,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "speed": np.zeros(nu, a.SPEED_STATE),
         "function": np.zeros((len(c.function), 3)),
         "fault": np.zeros(1, np.int64),
+        "doubt": np.zeros(1, np.int64),
         "displaced": np.ones(1, np.int64),
     }
     w = _reduced(c, fields) if isinstance(c, a.ReducedConstants) else a.Workspace(**fields)

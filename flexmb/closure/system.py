@@ -10,7 +10,7 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.arrays import RUTHLESS, Constants, Real, Workspace
+from flexmb.arrays import RUTHLESS, Constants, Index, Real, Workspace
 from flexmb.closure import dynamics
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
@@ -76,6 +76,11 @@ class Closures:
     @property
     def _own(self) -> ClosureWorkspace:
         return self._chain.cw
+
+    @property
+    def doubt(self) -> Index:
+        """(1,) whether the last evaluation met a pivot of the tree that may be rounding."""
+        return self._chain.w.doubt
 
     @property
     def fault(self) -> int:

@@ -9,6 +9,7 @@ symmetric matrix, and the constraint loads, which do no work in any motion S des
 from flexmb.frisch.tables import ONE_SIDED
 from flexmb.kernel import helper
 from flexmb.linear_algebra import cholesky_rows, cholesky_solve
+from flexmb.pivots import is_small
 from flexmb.spatial.vector import store3, vec3
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK
 
@@ -94,7 +95,11 @@ def solve(c, w):
     if failed >= 0:
         w.fault[0] = c.column[w.free[failed]].body
         return NOT_POSITIVE_DEFINITE
+    w.doubt[0] = 0
     if not one_sided:
+        for a in range(free):
+            i = w.free[a]
+            is_small(c, w, i, w.factor[a, a] * w.factor[a, a], w.M[i, i])
         cholesky_solve(w.factor, w.solution, free)
     for a in range(free):
         w.speed[w.free[a]].acceleration = w.solution[a]

@@ -132,6 +132,11 @@ class NestedSystem:
         return status, Motion(w.speed["acceleration"].copy(), drives, w.nest["load"].copy(), w.wheel["torque"].copy())
 
     @property
+    def doubt(self) -> Index:
+        """(1,) whether the last evaluation met a pivot that may be rounding."""
+        return self._w.doubt
+
+    @property
     def fault(self) -> int:
         """Body at which the last evaluation failed."""
         return int(self._w.fault[0])

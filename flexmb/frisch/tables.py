@@ -133,6 +133,7 @@ class NestedWorkspace:
     factor: Real  # (nu,nu) partition Z*_11 of (143) and its factor
     solution: Real  # (nu,)
     fault: Index  # (1,)
+    doubt: Index  # (1,)
 
 
 def workspace(c: NestedConstants, nq: int) -> NestedWorkspace:
@@ -166,4 +167,5 @@ def workspace(c: NestedConstants, nq: int) -> NestedWorkspace:
         factor=np.zeros((nu, nu)),
         solution=np.zeros(nu),
         fault=np.zeros(1, np.int64),
+        doubt=np.zeros(1, np.int64),
     )

@@ -16,6 +16,7 @@ from flexmb.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
 from flexmb.linear_algebra import cholesky_rows, cholesky_solve
+from flexmb.pivots import is_small
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.vector import dot, mat3, scale, times, vec3
 from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
@@ -50,11 +51,11 @@ def forward_dynamics(c, w, m):
             w.fault[0] = k
             return OUT_OF_RANGE
     composite_bodies(c, w, m)
-    return _solve(w, m)
+    return _solve(c, w, m)
 
 
 @helper
-def _solve(w, m):
+def _solve(c, w, m):
     """M x = T - C for the free speeds, tips first: pivots as in articulated bodies, and no fill between branches."""
     free = m.x.shape[0]
     _reverse(m, free)
@@ -65,6 +66,10 @@ def _solve(w, m):
     if failed >= 0:
         w.fault[0] = m.body[m.order[failed]]
         return NOT_POSITIVE_DEFINITE
+    w.doubt[0] = 0
+    for a in range(free):
+        i = m.order[a]
+        is_small(c, w, m.speed[i], m.U[a, a] * m.U[a, a], m.M[i, i])
     cholesky_solve(m.U, m.x, free)
     for a in range(free):
         w.speed[m.speed[m.order[a]]].acceleration = m.x[a]

@@ -3,7 +3,9 @@
 After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
 """
 
+from flexmb.jain.pivots import note_modes
 from flexmb.kernel import helper
+from flexmb.pivots import SINGULAR
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
@@ -18,8 +20,6 @@ from flexmb.spatial.inertia import (
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, sub, times, vec3
 
-SINGULAR = 2.0**-46  # a pivot this far below its diagonal is what rounding left of a zero: 64 roundings of the diagonal
-
 
 @helper
 def eliminate_modes(c, w, k):
@@ -29,6 +29,7 @@ def eliminate_modes(c, w, k):
         refer_to_hinge(c, w, k)
     if nm > 0 and not cholesky(w.pff[k], nm):
         return False
+    note_modes(c, w, k, w.pff[k])
     p = load_inertia(w.body[k].inertia, 0)
     tau, f = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
     for n in range(nm):

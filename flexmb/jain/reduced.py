@@ -6,8 +6,8 @@ there, A the node's acceleration, F its load on the body, modes included: F = Ga
 
 from math import sqrt
 
-from flexmb.jain.explicit import SINGULAR
 from flexmb.kernel import helper
+from flexmb.pivots import SINGULAR
 from flexmb.spatial.inertia import (
     inertia_times,
     load_inertia,

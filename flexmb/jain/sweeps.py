@@ -17,16 +17,16 @@ from flexmb.jain.kinematics import (
     store_body_acceleration,
     velocity_sweep,
 )
+from flexmb.jain.pivots import note_hinge
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations, to_parent
 from flexmb.kernel import helper
 from flexmb.levels.range import is_out_of_range
+from flexmb.pivots import is_rounding, is_small
 from flexmb.spatial.inertia import (
-    add_inertia,
     inertia_column,
     inertia_times,
     load_inertia,
     outer_inertia,
-    store_inertia,
     sum_inertia,
 )
 from flexmb.spatial.vector import add, add3, dot, mat3, scale, store3, times, vec3
@@ -69,8 +69,10 @@ def bodies(c, w):
 def inward(c, w):
     """The inward half of (63), (64); False where a D is not positive definite, w.fault names the body.
 
-    What it leaves of M_m are the factors that `flexmb.jain.innovations` solves with.
+    w.doubt says whether a pivot was so small that it may be rounding. What is left of M_m are the factors that
+    `flexmb.jain.innovations` solves with.
     """
+    w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
         if not (eliminate_modes(c, w, k) and _eliminate_hinge(c, w, k)):
             w.fault[0] = k
@@ -94,7 +96,8 @@ def _eliminate_hinge(c, w, k):
         row = 2 if kind == REVOLUTE else 5
         u_angular, u_linear = inertia_column(p, row)
         d = u_angular[2] if kind == REVOLUTE else u_linear[2]
-        if not d.real > 0.0:
+        before = w.body[k].inertia[2 if kind == REVOLUTE else 17]
+        if is_small(c, w, j, d, before) and is_rounding(d, before):
             return False
         epsilon = w.speed[j].applied - (tau[2] if kind == REVOLUTE else f[2])
         s = 1.0 / d
@@ -141,7 +144,6 @@ def _eliminate_several(c, w, k, p, tau, f):
     """The general hinge: D_R = L L' over its free speeds; gains are kept as L^-1 (P_R H)'."""
     j = c.body[k].u_index
     free = find_free(c, w, k)
-    store_inertia(w.body[k].inertia, 0, p)
     D = w.body[k].hinge_factor
     G = w.body[k].hinge_gain
     for a in range(free):
@@ -156,6 +158,7 @@ def _eliminate_several(c, w, k, p, tau, f):
             D[a, b] = dot(u_angular, angular_b) + dot(u_linear, linear_b)
     if not cholesky(D, free):
         return False
+    note_hinge(c, w, k, D, 0)
     for a in range(free):
         for b in range(a):
             w.body[k].hinge_residual[a] -= D[a, b] * w.body[k].hinge_residual[b]
@@ -166,11 +169,11 @@ def _eliminate_several(c, w, k, p, tau, f):
         for i in range(6):
             G[a, i] *= s
         u_angular, u_linear = vec3(G[a], 0), vec3(G[a], 3)
-        add_inertia(w.body[k].inertia, 0, outer_inertia(u_angular, u_linear, -1.0))
+        p = sum_inertia(p, outer_inertia(u_angular, u_linear, -1.0))
         tau = add(tau, scale(w.body[k].hinge_residual[a], u_angular))
         f = add(f, scale(w.body[k].hinge_residual[a], u_linear))
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, load_inertia(w.body[k].inertia, 0), tau, f)
+        to_parent(c, w, k, p, tau, f)
     return True
 
 

@@ -8,6 +8,7 @@ from flexmb.arrays import Real
 from flexmb.bundle import bundle
 from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
 from flexmb.jain.kinematics import inboard_acceleration, motion_column, store_body_acceleration
+from flexmb.jain.pivots import note_hinge, note_modes
 from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
 from flexmb.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
@@ -33,6 +34,7 @@ def forward_dynamics(c, w, x):
     status = bodies(c, w)
     if status != OK:
         return status
+    w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
         if not _eliminate(c, w, x, k):
             w.fault[0] = k
@@ -76,6 +78,8 @@ def _eliminate(c, w, x, k):
             D[n, i] = dot(momentum[0], other[0]) + dot(momentum[1], other[1])
     if not cholesky(D, rows):
         return False
+    note_modes(c, w, k, D)
+    note_hinge(c, w, k, D, nm)
     store_inertia(w.body[k].hinge_inertia, 0, p)
     for n in range(rows):
         for i in range(n):

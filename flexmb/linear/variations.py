@@ -106,6 +106,8 @@ class Equations:
         nq, y = self.system.nq, pack(state)
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
         self._check(jacobian(state.t, y, J, self.constants, self._w), self._w.fault[0])
+        if self._w.doubt[0]:
+            self.system.digits_left(state)  # raises if pivots are nothing but rounding
         rates = self._w.slope.real[nq + self.free]
         self._check(time_derivative(state.t, y, drift, self.constants, self._w), self._w.fault[0])
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]

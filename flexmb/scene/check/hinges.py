@@ -57,6 +57,9 @@ def point_masses(scene: Scene) -> Iterator[Problem]:
         for i, j in np.argwhere(skew):
             what = f"directions {i} and {j} are not orthogonal: their product is {product[i, j]:.3g}"
             yield Problem(str(place.key("directions")), what, "give orthonormal directions")
+        if count == 3 and np.linalg.det(item.directions) < 0.0:
+            remedy = "swap two of them, and their coordinates"
+            yield Problem(str(place.key("directions")), "the three directions are left-handed", remedy)
         if item.coordinates and len(item.coordinates) != count:
             what = f"{len(item.coordinates)} coordinates for {count} directions"
             yield Problem(str(place.key("coordinates")), what, "give one coordinate for each direction, or none")

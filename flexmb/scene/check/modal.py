@@ -147,7 +147,23 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Prob
         remedy = "the body frame carries the rigid-body motion: remove it from the modes"
         yield Problem(str(place), "a combination of the free-free modes is a rigid-body motion", remedy)
         return
+    if body.boundary == "clamped-free" and _is_loose(arrays, floating, scale, slack):
+        what = "a combination of the clamped modes is a rigid-body motion without strain energy"
+        yield Problem(str(place), what, "the hinge carries the rigid-body motion: remove it from the modes")
+        return
     yield from _frequency(place, arrays, M)
+
+
+def _is_loose(arrays: ModalArrays, floating: Array, scale: Array, slack: float) -> bool:
+    """Whether the clamp does not hold a rigid-body motion of the points that is among the modes.
+
+    That they are moved as a rigid body is no fault by itself: a lump at the tip of a beam, say.
+    """
+    stiffness = arrays.stiffness * scale
+    values, vectors = np.linalg.eigh(floating * scale)
+    rigid = vectors[:, values < slack]
+    held = np.linalg.eigvalsh(rigid.T @ stiffness @ rigid)
+    return bool(np.any(held <= slack * float(np.max(np.abs(stiffness), initial=0.0))))
 
 
 def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:

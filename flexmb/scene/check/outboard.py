@@ -1,7 +1,7 @@
 """Inertia beyond hinges: a freedom that moves nothing has no acceleration.
 
-Checked where it can be told without kinematics: for the child and everything welded to it, unless more mass hangs from
-these by moving hinges.
+Aligned axes of a gimbal move nothing, whatever it carries. All else is checked where it can be told without kinematics:
+for the child and everything welded to it, unless more mass hangs from these by moving hinges.
 """
 
 from __future__ import annotations
@@ -60,8 +60,14 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
     clusters = _clusters(scene)
     for place, hinge in entries(scene, "hinges"):
         H = _free_directions(hinge)
+        if H.shape[1] == 0:
+            continue
+        if np.linalg.svd(H, compute_uv=False)[-1] <= NEGLIGIBLE:
+            what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
+            yield Problem(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
+            continue
         cluster, beyond = clusters[hinge.child]
-        if H.shape[1] == 0 or cluster is None or beyond:
+        if cluster is None or beyond:
             continue
         end = _end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
         X = np.linalg.inv(_motion(end))
@@ -70,10 +76,7 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
         mass, moment = float(inertia[5, 5]), float(np.trace(inertia[:3, :3]))
         reference = np.where(np.any(H[:3] != 0.0, axis=0), moment, mass)
         still = np.diag(D) <= NEGLIGIBLE * reference
-        if np.linalg.svd(H, compute_uv=False)[-1] <= NEGLIGIBLE:
-            what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
-            yield Problem(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
-        elif np.any(still) or np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
+        if np.any(still) or np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
             noun = "mass along" if np.any(still) and not np.any(H[:3, still]) else "inertia about"
             what = f'body "{hinge.child}" and what is welded to it have no {noun} a free direction of this hinge'
             remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"

@@ -242,6 +242,11 @@ BAD = {
              lambda data: [p["translation_modes"].__setitem__(0,
              [0.0, 1.0, 0.0]) for p in data["bodies"][3]["points"]]),
         ["$.bodies[3]"], ["rigid-body motion"], ["remove"]),
+    "rigid-body motion that no clamp holds": (
+        both(put("bodies", 3, "stiffness", [[0.0, 0.0], [0.0, 80.0]]),
+             lambda data: [p["translation_modes"].__setitem__(0, [0.0, p["position_m"][0], 0.0])
+                           for p in data["bodies"][3]["points"]]),
+        ["$.bodies[3]"], ["clamped modes", "without strain energy"], ["remove"]),
     "modal stiffness off by 1e12": (put("bodies", 3, "stiffness", [[50e12, 0.0], [0.0, 80e12]]),
                                     ["$.bodies[3].stiffness"], ["Hz"], ["units"]),
     "modal state of a rigid body": (put("modal_states", 0, "body", "hub"), ["$.modal_states[0].body"], ["rigid"],
@@ -280,6 +285,10 @@ BAD = {
     "directions not orthogonal": (put("point_masses", 0, "directions", 1, [0.6, 0.8, 0.0]),
                                   ["$.point_masses[0].directions"],
                                   ["not orthogonal"], ["orthonormal"]),
+    "left-handed directions": (
+        both(put("point_masses", 0, "directions", [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]]),
+             put("point_masses", 0, "coordinates", [])),
+        ["$.point_masses[0].directions"], ["left-handed"], ["swap"]),
     "coordinates do not match": (put("point_masses", 0, "coordinates", [{}]), ["$.point_masses[0].coordinates"],
                                  ["1 coordinates for 2"], ["each direction"]),
     # functions of time
@@ -311,6 +320,10 @@ BAD = {
     "gimbal lock at the start": (
         hang(POINT | {"inertia_kg_m2": BALL}, "gimbal", sequence="zxz", rotations=[{}, {}, {}]),
         ['hinge "extra"'], ["gimbal lock"], ["another sequence"]),
+    "gimbal lock at the start, a hinge beyond": (
+        both(put("hinges", 2, "sequence", "zxz"), put("hinges", 2, "rotations", [{}, {}, {}]),
+             hang(POINT | {"inertia_kg_m2": BALL}, "revolute", parent="bob")),
+        ['hinge "cardan"'], ["gimbal lock"], ["spherical"]),
 }  # fmt: skip
 
 # A body that lost its hinge to a wrong name is itself reported too.
