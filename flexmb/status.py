@@ -17,6 +17,7 @@ class Status(IntEnum):
     CLOSURE_SINGULAR = 6
     CLOSURE_OPEN = 7
     NOT_CONVERGED = 8
+    BRANCH_UNKNOWN = 10
 
     @property
     def advice(self) -> str:
@@ -51,6 +52,10 @@ _ADVICE = {
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
+    Status.BRANCH_UNKNOWN: (
+        "closure {body} passed through a singular position: there the mechanism can go on along more than one branch, "
+        "and which one it takes is not known; stop before it, move it off that position, or give a body flexibility"
+    ),
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
         'adapts its step, "radau5"'
@@ -67,3 +72,4 @@ OUT_OF_RANGE = int(Status.OUT_OF_RANGE)
 CLOSURE_SINGULAR = int(Status.CLOSURE_SINGULAR)
 CLOSURE_OPEN = int(Status.CLOSURE_OPEN)
 NOT_CONVERGED = int(Status.NOT_CONVERGED)
+BRANCH_UNKNOWN = int(Status.BRANCH_UNKNOWN)

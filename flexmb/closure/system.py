@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flexmb.arrays import RUTHLESS, Constants, Real, Workspace
 from flexmb.closure import dynamics
+from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
@@ -53,6 +54,7 @@ class Closures:
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self.constants = constants, own
         self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
+        self._size = np.zeros(len(own.row))  # of the rows' ports there
         self._chain = self.chain("articulated")
         self._composite: Closed | None = None
 
@@ -61,7 +63,7 @@ class Closures:
         c, cc = self.constants
         bodies, modes = c.mode.shape
         own = workspace(cc, bodies, modes, len(c.speed))
-        own.rank[0], own.gain[:] = self.rank, (2.0 * rate, rate * rate)
+        own.rank[0], own.size[:], own.gain[:] = self.rank, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
@@ -126,8 +128,10 @@ class Closures:
         return replace(c, pair=pair)
 
     def responses(self) -> Real:
-        """B' (G,nu) of the rows in the size of their closures: Lambda^-1 = B'B."""
-        return self._scale("size")[:, None] * self._own.half
+        """B' (G,nu) of the rows in the size of their closures, those that suppress nothing zero: Lambda^-1 = B'B."""
+        own, weight = self._own, self.constants[1].weight
+        felt = weight * np.linalg.norm(own.half, axis=1) > DEPENDENT * own.size
+        return (self._scale("size") * felt)[:, None] * own.half
 
     def errors(self) -> Real:
         """Values of the rows in the size of their closures (G,)."""
@@ -169,7 +173,7 @@ class Closures:
     def count_rows(self) -> None:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
-        self.rank = int(self._own.rank[0])
+        self.rank, self._size = int(self._own.rank[0]), self._own.size.copy()
 
     @property
     def independent(self) -> int:
