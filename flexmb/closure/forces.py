@@ -6,7 +6,7 @@ By unit loads that pass through the articulated quantities, `Recursion`; all oth
 from math import sqrt
 
 from flexmb.closure import generalised
-from flexmb.closure.branch import lost
+from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
@@ -107,11 +107,15 @@ def factorised(w, cc, cw):
 @helper
 def on_branch(t, w, cc, cw):
     """Whether the chosen rows, factorised, still belong to the branch on which the step started; a status code."""
-    row = lost(t, cc, cw)
-    if row >= 0:
-        w.fault[0] = cc.row[row].closure
-        return BRANCH_UNKNOWN
-    return OK
+    if not (has_started(cw) and is_further(t, cw)):
+        return OK
+    row, status = at_crossing(t, cc, cw), CLOSURE_SINGULAR
+    if row < 0:
+        row, status = turned_over(cw), BRANCH_UNKNOWN
+    if row < 0:
+        return OK
+    w.fault[0] = cc.row[row].closure
+    return status
 
 
 @helper

@@ -61,13 +61,14 @@ def _project(t, y, s):
 @helper
 def _choose_further(t, s):
     """Choose the independent rows for the next step, once the last one is seen to have stayed on its branch."""
+    status = OK
     if has_started(s.cw):
         status = factorised(s.w, s.cc, s.cw)
-        if status == OK:
-            status = on_branch(t, s.w, s.cc, s.cw)
-        if status != OK:
-            return status
-    return choose(s.w, s.cc, s.cw)
+    if status == OK:
+        status = on_branch(t, s.w, s.cc, s.cw)
+    if status == OK:
+        status = choose(s.w, s.cc, s.cw)
+    return status
 
 
 @helper

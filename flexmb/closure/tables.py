@@ -90,6 +90,7 @@ class ClosureWorkspace:
     step: Real  # (nu,) a displacement or a change of speeds
     accel: Real  # (N,6) of the bodies, per `step`
     former: Real  # (G,nu) `basis` of the last state that a run has accepted, `flexmb.closure.branch`
+    former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
     time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
@@ -143,6 +144,7 @@ def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureW
         step=np.zeros(nu),
         accel=np.zeros((bodies, 6)),
         former=np.zeros((rows, nu)),
+        former_pivot=np.zeros(rows),
         former_rows=np.arange(rows),
         time=np.full(2, -np.inf),
         gain=np.zeros(2),
