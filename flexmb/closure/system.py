@@ -17,6 +17,7 @@ from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWor
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
 from flexmb.scene.schema import Closure
+from flexmb.status import OUT_OF_RANGE
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
 SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
@@ -116,8 +117,14 @@ class Closures:
         self._check(dynamics.linearise(t, y, self._chain), self.fault)
 
     def linearise_stiff(self, t: float, y: Real) -> int:
-        """The same with the metric that hardly bends bodies; returns the status code."""
-        return int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
+        """The same with the metric that hardly bends bodies; returns the status code.
+
+        Of bodies that are bent already the heavy modes may pass for out of range: then with their own masses.
+        """
+        status = int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
+        if status == OUT_OF_RANGE:
+            status = int(dynamics.linearise(t, y, self._chain))
+        return status
 
     @cached_property
     def _stiff(self) -> Constants:

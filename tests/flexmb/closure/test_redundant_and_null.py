@@ -3,6 +3,7 @@ dense system of equations, whose rank is read from a gap in its singular values.
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
@@ -16,7 +17,7 @@ from tests.bounds import algebra
 from tests.flexmb.closure import chains, loops
 
 ZERO, MOVING = 1e-10, 1e-6  # singular values of J, of entries of size 1: none lies between
-FEW, ALL = 40, 500
+FEW, ALL = 25, 500
 
 
 def check(seed: int) -> None:
@@ -39,7 +40,7 @@ def check(seed: int) -> None:
     for algorithm in ("articulated", "composite"):
         found = system.evaluate(0.0, state.q, state.u, algorithm)
         rates = found.accelerations[dense.free]
-        size = np.max(np.abs(dense.J)) * np.sum(np.abs(rates)) + np.max(np.abs(dense.gamma))
+        size = np.sum(np.abs(found.accelerations)) + np.sum(np.abs(state.u)) ** 2  # of ports, times lengths of 1 m
         assert np.max(np.abs(dense.J @ rates + dense.gamma)) <= bound * size
         # what is left of the tree's equations is a load of closures, and the least of these is what they report
         missing = dense.M @ rates - dense.right
@@ -71,17 +72,17 @@ def test_random_loops(seed):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("start", range(FEW, ALL, 20))
+@pytest.mark.parametrize("start", range(FEW, ALL, 25))
 def test_many_random_loops(start):
-    for seed in range(start, start + 20):
+    for seed in range(start, start + 25):
         check(seed)
 
 
 def test_every_kind_and_every_situation_is_among_them():
     scenes = [loops.random_loops(seed) for seed in range(FEW)]
     assert {closure.type for scene in scenes for closure in scene.closures} == set(loops.KINDS)
-    pairs = {(closure.body_a, closure.body_b) for scene in scenes for closure in scene.closures}
-    assert {("r0", "r1"), ("r1", "r0"), ("ground", "r1"), ("r1", "r2")} <= pairs
+    pairs = {tuple(sorted((closure.body_a, closure.body_b))) for scene in scenes for closure in scene.closures}
+    assert {("r0", "r1"), ("ground", "r1"), ("r1", "r2")} <= pairs
 
 
 @pytest.mark.parametrize("seed", range(8))
@@ -103,8 +104,7 @@ def test_rows_that_are_compared_with_noise_are_noticed(monkeypatch):
         return status
 
     monkeypatch.setattr(closure_system.dynamics, "linearise", by_own_rows)
-    ranks = [flexmb.compile(pendulum(kind)).initial_state and _rank(pendulum(kind)) for kind in loops.KINDS]
-    assert any(rank > 0 for rank in ranks)
+    assert any(_rank(pendulum(kind)) > 0 for kind in loops.KINDS)
 
 
 def _rank(scene: s.Scene) -> int:
@@ -170,15 +170,11 @@ def test_a_node_at_which_a_flexible_body_is_held_does_not_move():
     tree = flexmb.compile(scene.scene())
     for kind in loops.KINDS:
         closure = loops.parallel("null", kind, scene.scene().hinges[0], scene.scene())
-        system = flexmb.compile(flexmb_with(scene.scene(), closure))
+        system = flexmb.compile(msgspec.structs.replace(scene.scene(), closures=(closure,)))
         state = system.initial_state
         assert (system.closures.rank, system.closures.mobility) == (0, 4)
         for algorithm in ("articulated", "composite"):
             assert np.array_equal(system.accelerations(state, algorithm), tree.accelerations(state, algorithm))
-
-
-def flexmb_with(scene: s.Scene, closure: s.Closure) -> s.Scene:
-    return chains.msgspec.structs.replace(scene, closures=(closure,))
 
 
 def test_a_tree_without_freedom_is_not_locked_by_a_null_closure():
