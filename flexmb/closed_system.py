@@ -105,7 +105,8 @@ class ClosedSystem(System):
 
     def _refuse_locked(self) -> None:
         start = self.initial_state  # counts the independent rows
-        if self.closures.mobility == 0 and not np.any(self.constants.speed["prescribed"] >= 0):
+        locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
+        if locked and not np.any(self.constants.speed["prescribed"] >= 0):
             names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
             raise ClosureError(
                 f"closures {names} leave none of the {len(start.u)} free speeds: the mechanism is locked. Free a "
@@ -114,7 +115,7 @@ class ClosedSystem(System):
 
     def fault_name(self, status: int, fault: int) -> str:
         """What a failure's number stands for: a closure or a body."""
-        if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN):
+        if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)
 

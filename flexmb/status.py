@@ -18,6 +18,7 @@ class Status(IntEnum):
     CLOSURE_OPEN = 7
     NOT_CONVERGED = 8
     INTERRUPTED = 9
+    BRANCH_UNKNOWN = 10
 
     @property
     def advice(self) -> str:
@@ -52,6 +53,10 @@ _ADVICE = {
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
+    Status.BRANCH_UNKNOWN: (
+        "closure {body} passed through a singular position: there the mechanism can go on along more than one branch, "
+        "and which one it takes is not known; stop before it, move it off that position, or give a body flexibility"
+    ),
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
         'adapts its step, "radau5"'
@@ -70,3 +75,4 @@ CLOSURE_SINGULAR = int(Status.CLOSURE_SINGULAR)
 CLOSURE_OPEN = int(Status.CLOSURE_OPEN)
 NOT_CONVERGED = int(Status.NOT_CONVERGED)
 INTERRUPTED = int(Status.INTERRUPTED)
+BRANCH_UNKNOWN = int(Status.BRANCH_UNKNOWN)

@@ -2,9 +2,10 @@
 
 from flexmb.balance import power
 from flexmb.closure.factor import choose_rows
-from flexmb.closure.forces import accelerate, choose, free_tree, locate, respond, row_loads, transmit
+from flexmb.closure.forces import accelerate, choose, free_tree, locate, on_branch, respond, row_loads, transmit
 from flexmb.closure.projection import displace, project_closed
 from flexmb.closure.rows import load_on_b
+from flexmb.closure.sizes import measure_ports
 from flexmb.coordinates import configuration_rate, load_state
 from flexmb.dynamics import world_loads
 from flexmb.kernel import kernel
@@ -21,13 +22,15 @@ def rhs(t, y, dy, s, _):
     A closed chain is constants and workspace in one: it is passed as both.
     """
     c, w, cw = s.c, s.w, s.cw
-    if cw.failure[0] != OK:
+    if cw.failure[0] != OK and t >= cw.time[1]:  # earlier: a step is tried again, shorter
         w.fault[0] = cw.failure[1]
         return cw.failure[0]
     load_state(t, y, c, w)
     status = free_tree(s.route, s)
     if status == OK:
         status = row_loads(w, s.cc, cw)
+    if status == OK:
+        status = on_branch(t, w, s.cc, cw)
     if status != OK:
         return status
     accelerate(s.route, s)
@@ -49,9 +52,12 @@ def project(t, y, s):
 
 @kernel
 def linearise(t, y, s):
-    """The tree without closure loads at y: rows with accelerations, their half-solved unit loads; returns a status."""
+    """The tree without closure loads at y: rows with accelerations, half-solved unit loads, sizes; returns a status."""
     load_state(t, y, s.c, s.w)
-    return free_tree(s.route, s)
+    status = free_tree(s.route, s)
+    if status == OK:
+        measure_ports(s)
+    return status
 
 
 @kernel

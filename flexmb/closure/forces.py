@@ -6,6 +6,7 @@ By unit loads that pass through the articulated quantities, `Recursion`; all oth
 from math import sqrt
 
 from flexmb.closure import generalised
+from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
@@ -15,7 +16,7 @@ from flexmb.jain.sweeps import SINGLE, forward_dynamics, outward
 from flexmb.kernel import by_bundle, helper
 from flexmb.loads import drive_loads, hinge_loads
 from flexmb.spatial.vector import add3, scale, vec3
-from flexmb.status import CLOSURE_SINGULAR, OK
+from flexmb.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 
 
 @helper
@@ -27,6 +28,12 @@ def _tree_and_rows(route, s):
     evaluate_rows(s.c, s.w, s.cc, s.cw, True)
     half_solve(s.c, s.w, s.cc, s.cw)
     return OK
+
+
+@helper
+def _pass_load(route, s, i, x):
+    for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
+        pass_inward(s.c, s.w, s.cw, s.cc.path[j], 0, x)
 
 
 @helper
@@ -75,6 +82,8 @@ def _locate(route, t, y, s):
 # A route with an array "speed" is one of generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
 free_tree = by_bundle("speed", generalised.tree_and_rows, _tree_and_rows)
+# (s, i, x): x, zero before, of the load in slot 0 of the bodies on the path of closure i.
+pass_load = by_bundle("speed", generalised.pass_load, _pass_load)
 # (s, x, v): v = M^-1 J'f, the change of all speeds, where x is that of the rows' loads f.
 respond = by_bundle("speed", generalised.respond, _pass_outward)
 # (s): let cw.row.load act beside everything else: accelerations and drive loads.
@@ -86,15 +95,38 @@ locate = by_bundle("speed", generalised.locate, _locate)
 
 
 @helper
+def factorised(w, cc, cw):
+    """R of the chosen rows; a status code."""
+    dependent = factorise(cc, cw)
+    if dependent >= 0:
+        w.fault[0] = cc.row[dependent].closure
+        return CLOSURE_SINGULAR
+    return OK
+
+
+@helper
+def on_branch(t, w, cc, cw):
+    """Whether the chosen rows, factorised, still belong to the branch on which the step started; a status code."""
+    if not (has_started(cw) and is_further(t, cw)):
+        return OK
+    row, status = at_crossing(t, cc, cw), CLOSURE_SINGULAR
+    if row < 0:
+        row, status = turned_over(cw), BRANCH_UNKNOWN
+    if row < 0:
+        return OK
+    w.fault[0] = cc.row[row].closure
+    return status
+
+
+@helper
 def row_loads(w, cc, cw):
     """Loads of the chosen rows into cw.row.load: Lambda^-1 f = -(J udot_0 + gamma).
 
     With stabilisation g'' + gain[0] g' + gain[1] g = 0 instead of g'' = 0. Returns a status code.
     """
-    dependent = factorise(cc, cw)
-    if dependent >= 0:
-        w.fault[0] = cc.row[dependent].closure
-        return CLOSURE_SINGULAR
+    status = factorised(w, cc, cw)
+    if status != OK:
+        return status
     for a in range(cw.rank[0]):
         r = cw.chosen[a]
         damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value

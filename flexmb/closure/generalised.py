@@ -125,6 +125,14 @@ def _half_solve(s):
 
 
 @helper
+def pass_load(route, s, i, T):
+    """F^-1 of the generalised forces T of the load in slot 0 of the bodies on the path of closure i, in its place."""
+    for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
+        project_inward(s.c, s.seen, s.cw, s.cc.path[j], 0, T)
+    _half(s.route, s.c, s.w, T)
+
+
+@helper
 def respond(route, s, y, v):
     """v = F'^-1 y: the change of all speeds; prescribed ones do not change."""
     _rest(s.route, s.c, s.w, y, v)

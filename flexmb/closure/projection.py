@@ -4,16 +4,20 @@ Positions: dq = -M^-1 J' (J M^-1 J')^-1 g, repeated with the same matrices until
 likewise with J u. Prescribed coordinates stay. It only uses the independent rows; the others must follow.
 """
 
-from flexmb.closure.factor import factorise, solve
-from flexmb.closure.forces import choose, free_tree, locate, respond
+import numpy as np
+
+from flexmb.closure.branch import has_started, is_further, recall, remember
+from flexmb.closure.factor import solve
+from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import largest_gap
 from flexmb.coordinates import configuration_rate, load_state, normalise_quaternions
 from flexmb.coordinates import project as project_tree
 from flexmb.kernel import helper
-from flexmb.status import CLOSURE_OPEN, CLOSURE_SINGULAR, OK
+from flexmb.status import CLOSURE_OPEN, OK
 
 CLOSED = 2.0**-44  # a closed row's value in the size of its closure: 5.7e-14, two hundred roundings
 OPEN = 1e-10  # beyond this a closure is open
+ADRIFT = 1e-2  # beyond this a stabilised closure is open: what its rows are corrected by has no effect
 MOVING_APART = 1e-8  # beyond this, in the speed of its ports, a closure opens
 REPEATS = 6
 
@@ -27,6 +31,10 @@ def project_closed(t, y, s):
     if status != OK:
         s.cw.failure[0] = status
         s.cw.failure[1] = s.w.fault[0]
+        s.cw.time[1] = np.nextafter(t, -np.inf)  # the last stage of a segment is evaluated that much earlier
+        recall(s.cw)
+    elif is_further(t, s.cw):
+        remember(t, s.cw)
 
 
 @helper
@@ -34,27 +42,39 @@ def _project(t, y, s):
     cc, cw = s.cc, s.cw
     load_state(t, y, s.c, s.w)
     status = free_tree(s.route, s)
+    if status == OK and is_further(t, cw):
+        status = _choose_further(t, s)
+    if status == OK:
+        status = factorised(s.w, cc, cw)
     if status != OK:
         return status
-    status = choose(s.w, cc, cw)
-    if status != OK:
-        return status
-    dependent = factorise(cc, cw)
-    if dependent >= 0:
-        s.w.fault[0] = cc.row[dependent].closure
-        return CLOSURE_SINGULAR
     if cw.gain[1] > 0.0:  # stabilised: errors decay by themselves
-        return OK
+        return OK if largest_gap(cc, cw, False)[0] <= ADRIFT else _open(s, False)
     _close(t, y, s)
-    gap, at = largest_gap(cc, cw, False)
-    if not gap <= OPEN:
-        s.w.fault[0] = at
-        return CLOSURE_OPEN
-    gap, at = largest_gap(cc, cw, True)
-    if not gap <= MOVING_APART:
-        s.w.fault[0] = at
-        return CLOSURE_OPEN
+    if not largest_gap(cc, cw, False)[0] <= OPEN:
+        return _open(s, False)
+    if not largest_gap(cc, cw, True)[0] <= MOVING_APART:
+        return _open(s, True)
     return OK
+
+
+@helper
+def _choose_further(t, s):
+    """Choose the independent rows for the next step, once the last one is seen to have stayed on its branch."""
+    status = OK
+    if has_started(s.cw):
+        status = factorised(s.w, s.cc, s.cw)
+    if status == OK:
+        status = on_branch(t, s.w, s.cc, s.cw)
+    if status == OK:
+        status = choose(s.w, s.cc, s.cw)
+    return status
+
+
+@helper
+def _open(s, rates):
+    s.w.fault[0] = largest_gap(s.cc, s.cw, rates)[1]
+    return CLOSURE_OPEN
 
 
 @helper

@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from flexmb.arrays import RUTHLESS, Constants, Index, Real, Workspace
 from flexmb.closure import dynamics
+from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
 from flexmb.scene.schema import Closure
+from flexmb.status import OUT_OF_RANGE
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
 SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
@@ -53,6 +55,7 @@ class Closures:
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self.constants = constants, own
         self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
+        self._size = np.zeros(len(own.row))  # of the rows' ports there
         self._chain = self.chain("articulated")
         self._composite: Closed | None = None
 
@@ -61,7 +64,7 @@ class Closures:
         c, cc = self.constants
         bodies, modes = c.mode.shape
         own = workspace(cc, bodies, modes, len(c.speed))
-        own.rank[0], own.gain[:] = self.rank, (2.0 * rate, rate * rate)
+        own.rank[0], own.size[:], own.gain[:] = self.rank, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
@@ -119,8 +122,14 @@ class Closures:
         self._check(dynamics.linearise(t, y, self._chain), self.fault)
 
     def linearise_stiff(self, t: float, y: Real) -> int:
-        """The same with the metric that hardly bends bodies; returns the status code."""
-        return int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
+        """The same with the metric that hardly bends bodies; returns the status code.
+
+        Of bodies that are bent already the heavy modes may pass for out of range: then with their own masses.
+        """
+        status = int(dynamics.linearise(t, y, replace(self._chain, c=self._stiff)))
+        if status == OUT_OF_RANGE:
+            status = int(dynamics.linearise(t, y, self._chain))
+        return status
 
     @cached_property
     def _stiff(self) -> Constants:
@@ -131,8 +140,10 @@ class Closures:
         return replace(c, pair=pair)
 
     def responses(self) -> Real:
-        """B' (G,nu) of the rows in the size of their closures: Lambda^-1 = B'B."""
-        return self._scale("size")[:, None] * self._own.half
+        """B' (G,nu) of the rows in the size of their closures, those that suppress nothing zero: Lambda^-1 = B'B."""
+        own, weight = self._own, self.constants[1].weight
+        felt = weight * np.linalg.norm(own.half, axis=1) > DEPENDENT * own.size
+        return (self._scale("size") * felt)[:, None] * own.half
 
     def errors(self) -> Real:
         """Values of the rows in the size of their closures (G,)."""
@@ -174,7 +185,7 @@ class Closures:
     def count_rows(self) -> None:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
-        self.rank = int(self._own.rank[0])
+        self.rank, self._size = int(self._own.rank[0]), self._own.size.copy()
 
     @property
     def independent(self) -> int:

@@ -83,11 +83,16 @@ class ClosureWorkspace:
     chosen: Index  # (G,) rows by pivot; the first `rank` are independent
     rank: Index  # (1,) independent rows; -1 until they are counted
     scratch: Real  # (G,)
+    size: Real  # (G,) response of the ports of a row's closure by themselves, `flexmb.closure.sizes`
     force: Real  # (N,ROWS,6) loads on their way inward, body axes
     modal: Real  # (N,ROWS,m)
     coefficient: Real  # (nu,)
     step: Real  # (nu,) a displacement or a change of speeds
     accel: Real  # (N,6) of the bodies, per `step`
+    former: Real  # (G,nu) `basis` of the last state that a run has accepted, `flexmb.closure.branch`
+    former_pivot: Real  # (G,) diagonal of `factor` there
+    former_rows: Index  # (G,) `chosen` there
+    time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
     failure: Index  # (2,) status of the last projection, and where
 
@@ -132,11 +137,16 @@ def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureW
         chosen=np.arange(rows),
         rank=np.array([-1]),
         scratch=np.zeros(rows),
+        size=np.zeros(rows),
         force=np.zeros((bodies, ROWS, 6)),
         modal=np.zeros((bodies, ROWS, modes)),
         coefficient=np.zeros(nu),
         step=np.zeros(nu),
         accel=np.zeros((bodies, 6)),
+        former=np.zeros((rows, nu)),
+        former_pivot=np.zeros(rows),
+        former_rows=np.arange(rows),
+        time=np.full(2, -np.inf),
         gain=np.zeros(2),
         failure=np.zeros(2, np.int64),
     )

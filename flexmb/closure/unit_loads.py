@@ -63,12 +63,12 @@ def apply_load(c, w, cc, cw, i, s, tau, f):
     """[tau; f] about B, A axes, of closure i: added to B, taken from A as the same wrench, in slot s."""
     p = vec3(cw.closure[i].position, 0)
     R = mat3(cw.closure[i].rotation, 0)
-    _at_port(c, w, cw, cc.side[i, 1], s, times_t(R, tau), times_t(R, f))
-    _at_port(c, w, cw, cc.side[i, 0], s, scale(-1.0, add(tau, cross(p, f))), scale(-1.0, f))
+    at_port(c, w, cw, cc.side[i, 1], s, times_t(R, tau), times_t(R, f))
+    at_port(c, w, cw, cc.side[i, 0], s, scale(-1.0, add(tau, cross(p, f))), scale(-1.0, f))
 
 
 @helper
-def _at_port(c, w, cw, side, s, tau, f):
+def at_port(c, w, cw, side, s, tau, f):
     """A load about a port in port axes, as a force on its body and modes."""
     k = side.body
     if k == ON_GROUND:

@@ -13,6 +13,7 @@ import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.jets import Frame
 from flexmb.dense.kinematics import Motion, member_frames, seat_frame
+from flexmb.dense.profiles import profile
 from flexmb.dense.tree import Seat
 from flexmb.modal.model import ModalNode
 from flexmb.scene import schema as s
@@ -39,9 +40,8 @@ def relative_frame(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Fr
     return inboard.inverse().carry(outboard)
 
 
-def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
-    """(3,B,G) values, rates, accelerations of what a closure keeps zero: products of axes, components of position."""
-    B = relative_frame(dense, closure, motion)
+def suppressed(closure: s.Closure) -> tuple[list[tuple[Array, Array]], list[Array]]:
+    """Pairs of axes (of A, of B) that a closure keeps at right angles, and directions along which B stays at A."""
     z = np.array(closure.axis)
     x = np.cross(z, np.eye(3)[np.argmin(np.abs(z))])
     x /= np.linalg.norm(x)
@@ -52,7 +52,13 @@ def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
         "revolute": [(x, z), (y, z)], "cylindrical": [(x, z), (y, z)], "planar": [(ex, ez), (ey, ez)],
         "universal": [(ex, ey)], "spherical": [],
     }[closure.type]  # fmt: skip
-    steps = {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez]}.get(closure.type, [ex, ey, ez])
+    return turns, {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez]}.get(closure.type, [ex, ey, ez])
+
+
+def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
+    """(3,B,G) values, rates, accelerations of what a closure keeps zero: products of axes, components of position."""
+    B = relative_frame(dense, closure, motion)
+    turns, steps = suppressed(closure)
     found = [
         [np.einsum("i,bnij,j->b", a, part, b) for part in (B.rotation.value, B.rotation.rate, B.rotation.acceleration)]
         for a, b in turns
@@ -62,6 +68,28 @@ def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
     ]
     count = len(motion.u)
     return np.array([[np.broadcast_to(v, count) for v in row] for row in found]).transpose(1, 2, 0)
+
+
+def wrenches(scene: s.Scene, q: Array) -> dict[str, Array]:
+    """(6,G) by closure: [torque about B; force] on its body_b, World axes, of unit loads of all rows."""
+    dense = DenseSystem(scene)
+    still = Motion(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
+    frames = member_frames(dense.tree, still)
+    found, start = {}, 0
+    count = sum(sum(map(len, suppressed(closure))) for closure in scene.closures)
+    for closure in scene.closures:
+        side = seat(dense, closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a)
+        world = seat_frame(dense.tree, frames, *side, still).rotation.value[0, 0]
+        R = relative_frame(dense, closure, still).rotation.value[0, 0]
+        turns, steps = suppressed(closure)
+        found[closure.name] = np.zeros((6, count))
+        for i, (a, b) in enumerate(turns):
+            found[closure.name][:3, start + i] = world @ np.cross(R @ b, a)
+        start += len(turns)
+        for i, axis in enumerate(steps):
+            found[closure.name][3:, start + i] = world @ axis
+        start += len(steps)
+    return found
 
 
 @dataclass(frozen=True)
@@ -97,8 +125,10 @@ def constrained(scene: s.Scene, q: Array, u: Array, t: float = 0.0) -> Constrain
     value, rate, gamma = np.concatenate([rows(dense, c, moving)[:, 0] for c in scene.closures], axis=1)
     free = np.ones(dense.nu, dtype=bool)
     free[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = False
-    rates = dense.accelerations(t, q, u)
-    rates[free] = 0.0
+    rates = np.zeros(dense.nu)
+    for x in dense.tree.scalars:
+        if x.prescribed is not None:
+            rates[x.u] = profile(x.prescribed, t).acceleration
     M = dense.mass_matrix(q)
     right = dense.applied(q, u, t) - dense.bias(q, u, t) - M @ rates
     return Constrained(
@@ -119,30 +149,37 @@ def consistent_speeds(scene: s.Scene, q: Array, u: Array) -> Array:
 def with_closures(scene: s.Scene, rng: Generator, types: list[str]) -> s.Scene:
     """The scene with closures of these types between random nodes, closed at its initial coordinates."""
     dense = DenseSystem(scene)
-    state = flexmb.compile(scene).initial_state
-    still = Motion(state.q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
     closures = []
     for i, kind in enumerate(types):
         names = ["ground", *(member.name for member in dense.tree.members if member.name.startswith("b"))]
         body_a, body_b = rng.permutation(names[1:] if i else names)[:2]
-        bodies = {body.name: list(rest_frames(body)) for body in scene.bodies} | {"ground": ["origin"]}
-        node = {name: str(rng.choice(bodies[name])) for name in (body_a, body_b)}
-        axis = trees.direction(rng) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0)
-        guess = s.Closure(
-            name=f"c{i}", type=kind, body_a=str(body_a), node_a=node[body_a], body_b=str(body_b), node_b=node[body_b],
-            position_a_m=tuple(trees.vector(rng, 0.3)), quaternion_a=tuple(trees.quaternion(rng)),
-            axis=tuple(axis),
-        )  # fmt: skip
-        B = relative_frame(dense, guess, still)
-        R, p = B.rotation.value[0, 0], B.position.value[0, 0]
-        R_hinge, p_hinge = _pose(rng, kind, np.array(guess.axis))
-        # frame B is where the hinge puts it: R R_b = R_hinge, p + R p_b = p_hinge
-        turn = Rotation.from_matrix(R.T @ R_hinge).as_quat(scalar_first=True)
-        closures.append(
-            msgspec.structs.replace(guess, quaternion_b=tuple(turn / np.linalg.norm(turn)),
-                                    position_b_m=tuple(R.T @ (p_hinge - p)))
-        )
+        closures.append(random_closure(scene, dense, rng, f"c{i}", kind, str(body_a), str(body_b)))
     return msgspec.structs.replace(scene, closures=tuple(closures))
+
+
+def random_closure(
+    scene: s.Scene, dense: DenseSystem, rng: Generator, name: str, kind: str, body_a: str, body_b: str
+) -> s.Closure:
+    """A closure between random nodes of two bodies, closed at the scene's initial coordinates."""
+    bodies = {body.name: list(rest_frames(body)) for body in scene.bodies} | {"ground": ["origin"]}
+    node = {body: str(rng.choice(bodies[body])) for body in (body_a, body_b)}
+    axis = trees.direction(rng) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0)
+    guess = s.Closure(
+        name=name, type=kind, body_a=body_a, node_a=node[body_a], body_b=body_b, node_b=node[body_b],
+        position_a_m=tuple(trees.vector(rng, 0.3)), quaternion_a=tuple(trees.quaternion(rng)), axis=tuple(axis),
+    )  # fmt: skip
+    return closed(scene, dense, guess, *_pose(rng, kind, np.array(guess.axis)))
+
+
+def closed(scene: s.Scene, dense: DenseSystem, guess: s.Closure, R_hinge: Array, p_hinge: Array) -> s.Closure:
+    """The closure with its frame B where its hinge puts it: R R_b = R_hinge, p + R p_b = p_hinge."""
+    state = flexmb.System(scene).initial_state
+    B = relative_frame(dense, guess, Motion(state.q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu))))
+    R, p = B.rotation.value[0, 0], B.position.value[0, 0]
+    turn = Rotation.from_matrix(R.T @ R_hinge).as_quat(scalar_first=True)
+    return msgspec.structs.replace(
+        guess, quaternion_b=tuple(turn / np.linalg.norm(turn)), position_b_m=tuple(R.T @ (p_hinge - p))
+    )
 
 
 def _pose(rng: Generator, kind: str, axis: Array) -> tuple[Array, Array]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from scipy.integrate import solve_ivp
 
 from flexmb.scene.build import SceneBuilder, s
 from flexmb.scene.shapes import beam_section
@@ -140,3 +141,35 @@ def tilted_four_bar(*, flexible: bool, drive: s.Function | None, tilt: float = n
     )  # fmt: skip
     scene.marker("pin", "two", node="tip")
     return scene.scene()
+
+
+def windows(count: int, speed: float, gravity: float = -9.81) -> s.Scene:
+    """`count` four-bars in a row that share their uprights: A02 of the IFToMM library of benchmark problems.
+
+    Uniform bars of 1 m and 1 kg, upright at the start, the upper ones moving at `speed` (m/s) along x. All uprights stay
+    parallel: T = 1/2 ((count + 1)/3 + count) turn'^2. Twice a turn all bars lie on one line.
+    """
+    scene = SceneBuilder("windows", gravity=(0.0, gravity, 0.0))
+    inertia, nodes = (1e-6, 1.0 / 12.0, 1.0 / 12.0), {"tip": (1.0, 0.0, 0.0)}
+    for i in range(count + 1):
+        scene.rigid_body(f"upright {i}", mass=1.0, com=(0.5, 0, 0), inertia=inertia, nodes=nodes)
+        scene.revolute(
+            f"foot {i}", "ground", f"upright {i}", parent_position=(i, 0, 0), angle=0.5 * np.pi, rate=-speed
+        )  # fmt: skip
+    for i in range(count):
+        scene.rigid_body(f"sill {i}", mass=1.0, com=(0.5, 0, 0), inertia=inertia, nodes=nodes)
+        scene.revolute(
+            f"corner {i}", f"upright {i}", f"sill {i}", parent_node="tip", angle=-0.5 * np.pi, rate=speed
+        )  # fmt: skip
+        scene.closure(f"window {i}", "revolute", f"sill {i}", f"upright {i + 1}", node_a="tip", node_b="tip")
+    return scene.scene()
+
+
+def windows_turn(count: int, speed: float, times: np.ndarray, gravity: float = -9.81) -> np.ndarray:
+    """Angle of the uprights of `windows` while they stay parallel."""
+    inertia, weight = (count + 1) / 3.0 + count, gravity * (0.5 * (count + 1) + count)
+    found = solve_ivp(
+        lambda t, y: [y[1], weight / inertia * np.cos(y[0])], (0.0, times[-1] or 1e-9), [0.5 * np.pi, -speed],
+        "DOP853", times, rtol=1e-13, atol=1e-13,
+    )  # fmt: skip
+    return found.y[0]

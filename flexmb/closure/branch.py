@@ -1,0 +1,79 @@
+"""Whether a run goes through a singular position, where a mechanism can go on along more than one branch.
+
+The basis Q of the chosen rows, B P = Q R by Gram-Schmidt in a fixed order with positive pivots, turns as smoothly as
+the mechanism moves. At a singular position a pivot passes zero, and beyond it what was left of that row points the
+other way: the row of Q is turned over, in however short a step. Looking at pivots alone would miss it, since steps
+jump over the place where they vanish.
+
+So every evaluation of a step compares its Q with that of the state from which the step starts, row by row. A row that
+has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
+their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
+branches apart. A part d of the mechanism away from it they differ by d^2 in the gap of the closure, which is closed to
+2^-44: a run ends where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+"""
+
+from math import inf
+
+from flexmb.kernel import helper
+
+TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
+AT_CROSSING = 2.0**-20
+ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
+
+
+@helper
+def has_started(cw):
+    """Whether there is a state from which the step starts."""
+    return cw.time[0] > -inf
+
+
+@helper
+def is_further(t, cw):
+    """Whether time t is beyond the last state of the run: not a sample within its last step."""
+    return t > cw.time[0]
+
+
+@helper
+def at_crossing(t, cc, cw):
+    """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
+
+    By the time that is left at the rate of the step, in the time in which ports pass through the whole mechanism.
+    """
+    for a in range(cw.rank[0]):
+        i = cc.row[cw.chosen[a]].closure
+        left, fallen = cw.factor[a, a], cw.former_pivot[a] - (1.0 + ROUND_OFF) * cw.factor[a, a]
+        if left * (t - cw.time[0]) * cw.closure[i].speed < AT_CROSSING * fallen * cw.closure[i].size:
+            return cw.chosen[a]
+    return -1
+
+
+@helper
+def turned_over(cw):
+    """The first chosen row whose direction is another than where the step started, or -1. Needs what the above does."""
+    for a in range(cw.rank[0]):
+        total = 0.0
+        for j in range(cw.basis.shape[1]):
+            total += cw.basis[a, j] * cw.former[a, j]
+        if not total >= TURNED:
+            return cw.chosen[a]
+    return -1
+
+
+@helper
+def remember(t, cw):
+    """Take the state that was factorised last for the one from which the next step starts."""
+    cw.time[0] = t
+    for r in range(cw.chosen.shape[0]):
+        cw.former_rows[r] = cw.chosen[r]
+    for a in range(cw.rank[0]):
+        cw.former_pivot[a] = cw.factor[a, a]
+        for j in range(cw.basis.shape[1]):
+            cw.former[a, j] = cw.basis[a, j]
+
+
+@helper
+def recall(cw):
+    """Rows as they were chosen where the step starts, to try it again."""
+    if has_started(cw):
+        for r in range(cw.chosen.shape[0]):
+            cw.chosen[r] = cw.former_rows[r]

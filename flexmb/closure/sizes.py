@@ -1,0 +1,73 @@
+"""What a row is compared with to see whether it suppresses any motion: how far its closure's ports move by themselves.
+
+A row of `half` is the response of port B less that of port A. Where both move as one, on bodies that are welded
+together or to the ground, the two cancel and the row is what rounding leaves of them. A load that passes `depth`
+bodies on its way is rounded some 72 times on each, which leaves no more than 72 depth 2^-53 of either response: below
+1e-12 in any scene, whatever the masses. So the scale of a row is the response of its ports before they are subtracted,
+to all six unit loads on each, since a load along one axis that moves nothing is rounded into the others. Torques are
+weighed with the length of the scene, as rows are.
+
+Loads cancel in one more place. Where a body's hinge sits on a node that deforms, its modes feel a load less the
+reaction of the hinge: what they feel of a unit load at the hinge counts too, so that the node at which a flexible body
+is held does not pass for one that moves.
+
+Responses hardly change in the course of a motion, compared with the seven decades between rounding and what counts as
+independent (`flexmb.closure.factor.DEPENDENT`): they are measured where rows are counted and kept for a run.
+"""
+
+from math import sqrt
+
+from flexmb.closure.factor import norm
+from flexmb.closure.forces import pass_load
+from flexmb.closure.unit_loads import at_port, clear_body
+from flexmb.kernel import helper
+from flexmb.spatial.vector import dot, vec3
+
+_ZERO = (0.0, 0.0, 0.0)
+_AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+
+@helper
+def measure_ports(s):
+    """cw.size of every row, at the state that was linearised last."""
+    cc, cw = s.cc, s.cw
+    for i in range(cc.closure.shape[0]):
+        total = 0.0
+        for axis in _AXES:
+            for side in range(2):
+                total += (cc.length[0] * _response(s, i, cc.side[i, side], axis, _ZERO)) ** 2
+                total += _response(s, i, cc.side[i, side], _ZERO, axis) ** 2
+            for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+                if s.c.body[cc.path[j]].outboard_port >= 0:
+                    total += (cc.length[0] * _reaction(s, i, cc.path[j], axis, _ZERO)) ** 2
+                    total += _reaction(s, i, cc.path[j], _ZERO, axis) ** 2
+        for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
+            cw.size[r] = sqrt(total)
+
+
+@helper
+def _response(s, i, side, tau, f):
+    """|x| of a load about a port of closure i, port axes."""
+    _clear(s, i)
+    at_port(s.c, s.seen, s.cw, side, 0, tau, f)
+    pass_load(s.route, s, i, s.cw.coefficient)
+    return norm(s.cw.coefficient)
+
+
+@helper
+def _reaction(s, i, k, tau, f):
+    """|x| of what the modes of body k feel of a load at the node that its hinge sits on, body axes."""
+    _clear(s, i)
+    for n in range(s.c.body[k].modes):
+        column = s.seen.port_mode[s.c.body[k].outboard_port, n]
+        s.cw.modal[k, 0, n] = dot(vec3(column.W, 0), tau) + dot(vec3(column.L, 0), f)
+    pass_load(s.route, s, i, s.cw.coefficient)
+    return norm(s.cw.coefficient)
+
+
+@helper
+def _clear(s, i):
+    for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
+        clear_body(s.c, s.cw, s.cc.path[j])
+    for j in range(s.cw.coefficient.shape[0]):
+        s.cw.coefficient[j] = 0.0

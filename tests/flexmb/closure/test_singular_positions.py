@@ -1,0 +1,91 @@
+"""Runs through singular positions, where a mechanism has more than one way to go on, and runs that pass near one."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb
+from flexmb.status import Status
+from tests.flexmb.closure import mechanisms as m
+
+LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR)
+SETTINGS = {
+    "dop853": {}, "loose": {"rtol": 1e-6, "atol": 1e-8}, "looser": {"rtol": 1e-3, "atol": 1e-4},
+    "stabilised": {"stabilise": 20.0}, "composite": {"algorithm": "composite"}, "rk4": {"method": "rk4", "step": 1e-3},
+    "coarse rk4": {"method": "rk4", "step": 1e-2},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize("count", [1, 2, 5, 10])
+@pytest.mark.parametrize("speed", [30.0, 1.0])
+def test_windows_stop_where_all_bars_lie_on_one_line(count, speed, settings):
+    """And are right until then: one four-bar, many, even numbers of rows turned over at once."""
+    tolerance = {"loose": 1e-5, "looser": 1e-1, "coarse rk4": 1e-5}.get(settings, 1e-8)
+    _stops_when_flat(count, speed, settings, tolerance)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("settings", ["dop853", "rk4"])
+def test_forty_windows(settings):
+    _stops_when_flat(40, 30.0, settings, 1e-8)
+
+
+def _stops_when_flat(count: int, speed: float, settings: str, tolerance: float) -> None:
+    system = flexmb.compile(m.windows(count, speed))
+    run = flexmb.simulate(system, 2.0, samples=201, **SETTINGS[settings])
+    assert run.status in LOST and "window" in run.message, run.message
+    stopped = m.windows_turn(count, speed, np.array([0.0, run.stopped_at]))[-1]
+    fastest = 30.0 if speed == 30.0 else 8.0
+    assert -tolerance < stopped < 1e-5 + fastest * SETTINGS[settings].get("step", 0.0)
+    found = run.q[:, system.coordinate("foot 0").start]
+    assert np.max(np.abs(found - m.windows_turn(count, speed, run.t))) < tolerance
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_a_step_over_many_turns_is_not_taken(settings):
+    """Without gravity the windows turn evenly: any step is accurate, and would jump over several flat positions."""
+    run = flexmb.simulate(m.windows(1, 30.0, gravity=0.0), 10.0, **SETTINGS[settings])
+    assert run.status in LOST and 0.04 < run.stopped_at < np.pi / 60.0 + 1e-6
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize("longer", [1e-2, 1e-3, 1e-5, 1e-8, 0.0])
+def test_passing_near_a_singular_position_is_right_or_stops(longer, settings):
+    """A rod hardly longer than the crank: the slider turns back close to the crankshaft, on one side of it."""
+    crank, rod = 0.2, 0.2 * (1.0 + longer)
+    system = flexmb.compile(m.slider_crank(crank, rod, angle=0.4, rate=12.0))
+    run = flexmb.simulate(system, 5.0, **SETTINGS[settings])
+    turn = run.q[:, system.coordinate("drive").start]
+    expected = crank * np.cos(turn) + np.sqrt(rod**2 - (crank * np.sin(turn)) ** 2)
+    assert np.max(np.abs(run.markers["piston"].position[:, 0] - expected)) < 1e-9
+    fixed = "rk4" in settings
+    assert run.finished or longer == 0.0 or (fixed and longer < 1e-2), run.message
+    if longer == 0.0:
+        assert run.status in LOST and run.stopped_at < 2.36
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+@pytest.mark.parametrize(
+    "scene", [m.four_bar(), m.four_bar(closure="spherical"), m.slider_crank(0.2, 0.7, angle=0.4), m.bennett()],
+    ids=["four-bar", "spherical", "slider-crank", "Bennett"],
+)  # fmt: skip
+def test_regular_motion_goes_on(scene, settings):
+    """Ten seconds, with steps as long as tolerances allow."""
+    assert flexmb.simulate(scene, 10.0, **SETTINGS[settings]).finished
+
+
+def test_samples_between_steps_do_not_disturb():
+    """Output inside steps is projected too, at times before the state that the next step starts from."""
+    runs = [flexmb.simulate(m.four_bar(), 5.0, samples=count) for count in (2, 5001)]
+    assert all(run.finished for run in runs)
+    assert runs[0].statistics.accepted_steps == runs[1].statistics.accepted_steps
+    assert np.max(np.abs(runs[0].q[-1] - runs[1].q[-1])) < 1e-12
+
+
+def test_as_many_modes_across_the_plane_as_rows_make_a_loop_singular():
+    """Three bars with one mode each across the plane, three rows across it: at some angles they are dependent."""
+    run = flexmb.simulate(m.four_bar(modes=2), 0.5)
+    assert run.status in LOST and run.stopped_at == pytest.approx(0.1318, abs=1e-3)
+    assert flexmb.simulate(m.four_bar(modes=2, closure="spherical"), 0.5).finished
