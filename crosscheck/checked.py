@@ -69,7 +69,7 @@ def checked_ladder(found: Any) -> tuple[Effort, ...]:
 def checked_model(found: Any) -> Model:
     """What `compile` returned."""
     _require(isinstance(found, Model), f"compile() returned {_named(found)}, which is no model")
-    return found  # type: ignore[no-any-return]
+    return found
 
 
 def checked_run(found: Any, times: Array, scene: Scene) -> Trajectory:
@@ -194,10 +194,10 @@ def _cut(run: Trajectory, count: int) -> Trajectory:
             name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
             for name, path in run.markers.items()
         },
-        **{
-            group: {name: values[:count] for name, values in getattr(run, group).items()}
-            for group in ("loads", "wheel_loads", "drives", "energy")
-        },
+        loads={name: values[:count] for name, values in run.loads.items()},
+        wheel_loads={name: values[:count] for name, values in run.wheel_loads.items()},
+        drives={name: values[:count] for name, values in run.drives.items()},
+        energy={kind: values[:count] for kind, values in run.energy.items()},
         momentum=None if run.momentum is None else run.momentum[:count],
         work=None if run.work is None else run.work[:count],
     )

@@ -1,8 +1,8 @@
 """A gallery of bad engines: each breaks the contract, or its process, in one way, and has the one status it must get.
 
-`ANSWERS` break the contract, `CRASHES` their process, `ENDLESS` do not end; `MODULES` are texts of plug-in modules that
-do not load. `TIDY` and `UNTIDY` behave strangely but rightly, in what they answer and with their process. Every engine
-is a sound pendulum (`fake_engines`) but for its one fault.
+`ANSWERS` break the contract, `CRASHES` their process, `ENDLESS` and `HUNGRY` do not end; `MODULES` are texts of plug-in
+modules that do not load. `TIDY` and `UNTIDY` behave strangely but rightly, in what they answer and with their process.
+Every engine is a sound pendulum (`fake_engines`) but for its one fault.
 """
 
 from __future__ import annotations
@@ -308,6 +308,8 @@ ENDLESS = {
     "hangs_when_repeated": Bad(
         "did not finish", "while at dop853 rtol=1e-06", made("hangs_when_repeated", Second(ignore_and_wait), {})
     ),
+}
+HUNGRY = {
     "eats_memory": Bad("did not finish", "GB of memory", made("eats_memory", does(eat), {})),
     "its_child_eats": Bad("did not finish", "GB of memory", made("its_child_eats", does(let_a_child_eat), {})),
 }
@@ -429,7 +431,7 @@ GALLERY = ANSWERS | CRASHES
 
 def __getattr__(name: str) -> Callable[[], Any]:
     """The factory of an engine, as entry points name it."""
-    bad, odd = GALLERY | ENDLESS, TIDY | UNTIDY
+    bad, odd = GALLERY | ENDLESS | HUNGRY, TIDY | UNTIDY
     if name in bad:
         return bad[name].make
     if name in odd:
