@@ -247,3 +247,37 @@ def test_what_has_a_figure(given: Verdict, yes: bool) -> None:
 def test_a_drift_is_written_without_uncertainty_and_names_as_they_are() -> None:
     text = dumps(figures([verdict("conservation", b="law", U=None)], ("one",)))
     assert text.splitlines()[2:] == ['["é"]', f'"{TIP} | one (v) | law (v)" = {{ E = 1.0e-09 }}']
+
+
+def test_channels_that_one_side_lacks() -> None:
+    """A kind of energy that one engine alone knows is left out; of anything else the other refuses."""
+    text = ONE_PAIR.replace(
+        '"marker:tip.position" = 1e-3', 'energy = 1e-3, "energy.strain" = 1e-3, momentum = 1e-3, load = 0.1'
+    )
+    flat = way()[:, :1]
+    one = {"energy.kinetic": flat, "energy.gravity": flat, "energy.strain": flat, "momentum.linear": way()}
+    runs = [*ladder("one", one), *ladder("two", {"energy.kinetic": flat})]
+    found = [(each.channel, each.status, each.goal, each.reason) for each in judged(text, runs).all]
+    assert [each[:3] for each in found] == [
+        ("energy.kinetic", "agree", 1e-3),
+        ("energy.strain", "refused", 1e-3),
+        ("momentum.linear", "refused", 1e-3),
+        ("load", "did not run", 0.1),
+    ]
+    assert found[1][3] == "two does not offer energy.strain"
+    assert found[3][3] == 'neither one nor two has a channel "load"'
+
+
+def test_an_unused_pattern_says_all_of_itself() -> None:
+    text = ONE_PAIR + 'scales = { "marker:top.position" = 2.0 }\nreason = "why"\n'
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    unused = judged(text, runs).all[-1]
+    said = 'a scale is given for "marker:top.position", which is no channel judged here'
+    assert plain(unused) == {
+        "case": "made/made", "comparison": "both", "kind": "comparison", "channel": "marker:top.position",
+        "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
+        "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
+        "expected_reason": "why",
+    }  # fmt: skip
+    assert unused.reason == said
+    assert single(judged(text, runs[:3])).status == "did not run"
