@@ -1,0 +1,283 @@
+"""Judging down to its words and edges: what mutants of it survived until they were looked at."""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+import pytest
+
+from crosscheck.accepted import Figure, dumps, figures, recordable
+from crosscheck.report.outcome import Outcome
+from crosscheck.results import CaseResults, Result, collect
+from crosscheck.uncertainty import Uncertainty, spatial
+from crosscheck.verdict import Finding, Signal, Verdict, compare, conserve
+from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, judged, ladder, run_file, single, way
+
+FORCE = "load:pivot.force"
+CONTROL = """
+[[variant]]
+name = "rigid"
+engines = ["one", "two"]
+
+[[control]]
+name = "fault"
+mutation = "mass"
+target = "rod"
+a = { variant = "rigid", engine = "one" }
+b = { variant = "rigid", engine = "two" }
+goals = { "marker:tip.position" = 1e-3 }
+scales = { "marker:tip.position" = 4.0 }
+
+[[conservation]]
+variant = "rigid"
+quantity = "linear_momentum"
+limit = 1e-3
+engines = ["two"]
+expect = "differ"
+band = [0.1, 1.0]
+reason = "a thruster"
+"""
+
+
+def signal(level: float, doubt: float, sizes: tuple[float, ...] = (1.0,)) -> Signal:
+    return Signal(np.full((3, 1), level), Uncertainty(np.full(3, doubt), doubt, "given"), sizes)
+
+
+def everything() -> Outcome:
+    """A control that is noticed, and a momentum that changes by a half as expected."""
+    momentum = np.ones((len(TIMES), 3))
+    momentum[4] = 0.5
+    two = {TIP: way(), "momentum.linear": momentum}
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", two)]
+    runs += ladder("one", {TIP: way(1.5)}, role="control:fault")[-1:]
+    return judged(CONTROL, runs)
+
+
+def plain(verdict: Verdict) -> dict:
+    """A verdict without its figures, which have tests of their own."""
+    return {k: v for k, v in msgspec.to_builtins(verdict).items() if k not in ("E", "U", "scale", "reason")}
+
+
+def test_a_control_says_all_of_itself() -> None:
+    control, _ = everything().all
+    assert plain(control) == {
+        "case": "made/made", "comparison": "fault", "kind": "control", "channel": TIP, "variant_a": "rigid",
+        "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "differ",
+        "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "",
+        "expected_reason": "negative control (mass of rod): the fault must be noticed",
+    }  # fmt: skip
+    assert (control.ok, control.scale) == (True, 4.0)
+    assert np.isclose(control.E, 0.5 / 4.0, rtol=1e-4)
+    assert np.isclose(control.U, 2 * 9e-6 / 4.0, rtol=1e-3)
+
+
+def test_a_control_of_the_whole_scene_says_so_and_needs_its_runs() -> None:
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    text = CONTROL.split("[[conservation]]")[0].replace('target = "rod"\n', "")
+    verdict = single(judged(text, runs))
+    assert (verdict.status, verdict.expected_reason[:35]) == ("did not run", "negative control (mass of the scene")
+    faulty = ladder("one", {TIP: way(1.5)}, role="control:fault")[-1:]
+    assert single(judged(text, [*ladder("two", {TIP: way()}), *faulty])).status == "did not run"
+
+
+def test_a_conserved_quantity_says_all_of_itself() -> None:
+    _, conserved = everything().all
+    assert plain(conserved) == {
+        "case": "made/made", "comparison": "linear momentum conserved", "kind": "conservation",
+        "channel": "momentum.linear", "variant_a": "rigid", "engine_a": "two", "variant_b": "rigid",
+        "engine_b": "conservation law", "level": "rigid", "status": "differ", "expected": "differ", "goal": 1e-3,
+        "outside": "", "accepted": None, "worse": "", "expected_reason": "a thruster",
+    }  # fmt: skip
+    assert (conserved.U, conserved.ok) == (None, True)
+    assert np.isclose(conserved.E, 0.5) and np.isclose(conserved.scale, np.sqrt(3.0))
+    assert conserved.reason == "drifts by 0.5, more than the limit 0.001"
+
+
+def test_a_comparison_says_all_of_itself() -> None:
+    place = f"{TIP} | one (rigid) | two (rigid)"
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    verdict = single(judged(ONE_PAIR, runs, {"both": {place: Figure(0.0, 1.8e-5)}}))
+    assert plain(verdict) == {
+        "case": "made/made", "comparison": "both", "kind": "comparison", "channel": TIP, "variant_a": "rigid",
+        "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "agree",
+        "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5}, "worse": "",
+        "expected_reason": "",
+    }  # fmt: skip
+    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+    other = single(judged(ONE_PAIR + 'reason = "why"\n', [*runs[:3], *ladder("two", {TIP: way(2.0)})]))
+    assert (other.status, other.outside, other.expected_reason) == ("differ", "", "why")
+
+
+def test_edges_belong_to_agreement() -> None:
+    assert compare(FORCE, signal(1.0, 0.25), signal(1.5, 0.25), 0.5, 1.0).status == "agree"
+    assert compare(FORCE, signal(1.0, 0.5), signal(1.0, 0.5), 1.0, 1.0).status == "agree"
+    assert compare(FORCE, signal(1.0, 0.5), signal(1.0, 0.5), 1.0, 0.5).status == "unresolved"
+    assert conserve(np.array([0.0, 0.5]), 1.0, 0.5).status == "agree"
+    assert conserve(np.array([0.0, 1.0]), 1.0, 1.0).status == "agree"
+    assert conserve(np.zeros(2), 1.0, 1.5).status == "unresolved"
+
+
+def test_the_words_of_a_finding() -> None:
+    assert conserve(np.array([0.0, -0.5]), 2.0, 0.5) == Finding(
+        "agree", "drifts by 0.25, within the limit 0.5", 0.25, scale=2.0
+    )
+    text = "the quantity's size is 0: the case must state a scale to measure drift by"
+    assert conserve(np.zeros(2), 0.0, 0.5) == Finding("unresolved", text)
+    text = "the quantity holds values that are not numbers, or none at all"
+    assert conserve(np.zeros(0), 1.0, 0.5) == Finding("failed", text)
+    assert conserve(np.ones(1), 1.0, 2.0) == Finding(
+        "unresolved", "a limit of 2 is no limit: it must lie between 0 and 1"
+    )
+    text = "the drift is beyond measure in units of the scale 1e-300"
+    assert conserve(np.full(1, 1e300), 1e-300, 0.5) == Finding("unresolved", text)
+    text = "the results are 2 of the range apart, 10 x their uncertainty"
+    assert compare(FORCE, signal(1.0, 0.1), signal(2.0, 0.0), 0.3, 0.5) == Finding("differ", text, 2.0, 0.2, 0.5)
+    text = "the results are 1 of the range apart, with no uncertainty to excuse it"
+    assert compare(FORCE, signal(1.0, 0.0), signal(2.0, 0.0), 0.3, 1.0) == Finding("differ", text, 1.0, 0.0, 1.0)
+    text = "uncertainty 0.5 exceeds the goal 0.1; largest part: given"
+    assert compare(FORCE, signal(1.0, 0.5), signal(1.0, 0.0), 0.1, 1.0) == Finding("unresolved", text, 0.0, 0.5, 1.0)
+    assert compare(FORCE, signal(1.0, 0.0), signal(1.0, 0.0), 0.1, 3.0) == Finding(
+        "agree", "the results are equal to the last digit", 0.0, 0.0, 3.0
+    )
+
+
+def results(text: str, runs: list) -> CaseResults:
+    """The results of records, before they are judged."""
+    from crosscheck.records import CaseRecord
+
+    record = CaseRecord(case="made/made", run=run_file(text), provenance=None, readme="", variants={})
+    return collect([record, *runs]).cases[0]
+
+
+def result(text: str, runs: list, variant: str = "rigid", engine: str = "one") -> Result:
+    return results(text, runs).get(variant, engine)
+
+
+def test_a_torque_that_vanishes_is_measured_by_forces_at_distances() -> None:
+    """No torque anywhere, a force of 10 N, 2 m away: 20 Nm is the size; without a force there is none."""
+    none, force = np.zeros((len(TIMES), 3)), way(10.0)
+    signals = {"load:pivot.torque": none, "load:pivot.force": force, TIP: way(2.0)}
+    sizes = result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.torque", False).sizes
+    assert np.allclose(sizes, (0.0, 20.0), rtol=1e-5)
+    assert len(result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.force", False).sizes) == 1
+    alone = result(ONE_PAIR, ladder("one", {"load:pivot.torque": none}))
+    assert alone.signal("load:pivot.torque", False).sizes == (0.0, 0.0)
+
+
+def test_spatial_doubt_is_added_over_time() -> None:
+    text = """
+[[variant]]
+name = "rigid"
+transform = "segments"
+segments = 2
+refined = { segments = 6, order = 1.0 }
+engines = ["one"]
+"""
+    runs = [*ladder("one", {TIP: way()}), *ladder("one", {TIP: way(1.01)}, role="refined")[-1:]]
+    one = result(text, runs)
+    doubt, own = one.doubt(TIP, True), one.doubt(TIP, False)
+    extra = spatial(TIP, way(), way(1.01), 3.0, 1.0)
+    assert np.allclose(doubt.envelope, own.envelope + extra, rtol=1e-3)
+    assert (doubt.value, doubt.order) == (doubt.envelope[-1], own.order)
+    assert doubt.how == "difference of the two finest tolerances; spatial refinement"
+    assert np.isclose(extra[-1], 1.25 * 1.5 * 0.01, rtol=1e-3)
+
+
+def test_what_the_uncertainty_lacks_is_named() -> None:
+    runs = ladder("one", {TIP: way()})
+    assert result(ONE_PAIR, runs[1:]).doubt(TIP, False).how == "unknown: effort 1 of 3 is not recorded"
+    refused = msgspec.structs.replace(runs[1], status="refused", message="no")
+    how = result(ONE_PAIR, [runs[0], refused, runs[2]]).doubt(TIP, False).how
+    assert how == "unknown: effort rtol=1 was refused: no"
+    crashed = msgspec.structs.replace(runs[1], status="crashed", message="no")
+    how = result(ONE_PAIR, [runs[0], crashed, runs[2]]).doubt(TIP, False).how
+    assert how == "unknown: effort rtol=1 crashed: no"
+
+
+def test_efforts_that_did_the_same_work_with_the_same_result_are_one() -> None:
+    runs = ladder("one", {TIP: way()})
+    same = msgspec.structs.replace(runs[1], channels=runs[2].channels, evaluations=runs[2].evaluations)
+    how = result(ONE_PAIR, [runs[0], same, runs[2]]).doubt(TIP, False).how
+    assert how == "unknown: fewer than two efforts finished with different results"
+    worked = msgspec.structs.replace(same, evaluations=1)
+    assert result(ONE_PAIR, [runs[0], worked, runs[2]]).doubt(TIP, False).value < 1e-12
+
+
+def test_what_was_never_recorded_says_so() -> None:
+    missing = result(ONE_PAIR, [])
+    assert (missing.variant, missing.engine, missing.status, missing.runs) == ("rigid", "one", "did not run", ())
+    assert missing.message == "no run of it is recorded: the session was cut short"
+    assert missing.ending.reason == f"one on rigid: {missing.message}"
+    cut = result(ONE_PAIR, ladder("one", {TIP: way()})[:2])
+    assert (cut.status, cut.message) == ("did not run", "the finest effort is not recorded: the session was cut short")
+
+
+def test_spatial_edges() -> None:
+    one, other = np.zeros((1, 1)), np.ones((1, 1))
+    assert np.allclose(spatial(FORCE, one, other, 4.0, 0.5), 2.5)
+    assert np.all(np.isinf(spatial(FORCE, one, other, 1.0, 1.0)))
+
+
+def verdict(kind: str, a: str = "one", b: str = "two", E: float | None = 1e-9, U: float | None = 1e-8) -> Verdict:
+    return Verdict(
+        case="c", comparison="é", kind=kind, channel=TIP, variant_a="v", engine_a=a, variant_b="v", engine_b=b,
+        level="", status="agree", expected="agree", E=E, U=U, goal=1e-6, scale=1.0, reason="",
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("given", "yes"),
+    [
+        (verdict("comparison"), True),
+        (verdict("comparison", b="mine"), False),
+        (verdict("comparison", a="mine"), False),
+        (verdict("comparison", E=None), False),
+        (verdict("control"), False),
+        (verdict("control", E=None), False),
+        (verdict("conservation", b="conservation law", U=None), True),
+        (verdict("conservation", a="mine", b="conservation law", U=None), False),
+    ],
+)
+def test_what_has_a_figure(given: Verdict, yes: bool) -> None:
+    own = ("one", "two")
+    assert recordable(given, own) is yes
+    assert bool(figures([given], own)) is yes
+
+
+def test_a_drift_is_written_without_uncertainty_and_names_as_they_are() -> None:
+    text = dumps(figures([verdict("conservation", b="law", U=None)], ("one",)))
+    assert text.splitlines()[2:] == ['["é"]', f'"{TIP} | one (v) | law (v)" = {{ E = 1.0e-09 }}']
+
+
+def test_channels_that_one_side_lacks() -> None:
+    """A kind of energy that one engine alone knows is left out; of anything else the other refuses."""
+    text = ONE_PAIR.replace(
+        '"marker:tip.position" = 1e-3', 'energy = 1e-3, "energy.strain" = 1e-3, momentum = 1e-3, load = 0.1'
+    )
+    flat = way()[:, :1]
+    one = {"energy.kinetic": flat, "energy.gravity": flat, "energy.strain": flat, "momentum.linear": way()}
+    runs = [*ladder("one", one), *ladder("two", {"energy.kinetic": flat})]
+    found = [(each.channel, each.status, each.goal, each.reason) for each in judged(text, runs).all]
+    assert [each[:3] for each in found] == [
+        ("energy.kinetic", "agree", 1e-3),
+        ("energy.strain", "refused", 1e-3),
+        ("momentum.linear", "refused", 1e-3),
+        ("load", "did not run", 0.1),
+    ]
+    assert found[1][3] == "two does not offer energy.strain"
+    assert found[3][3] == 'neither one nor two has a channel "load"'
+
+
+def test_an_unused_pattern_says_all_of_itself() -> None:
+    text = ONE_PAIR + 'scales = { "marker:top.position" = 2.0 }\nreason = "why"\n'
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    unused = judged(text, runs).all[-1]
+    said = 'a scale is given for "marker:top.position", which is no channel judged here'
+    assert plain(unused) == {
+        "case": "made/made", "comparison": "both", "kind": "comparison", "channel": "marker:top.position",
+        "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
+        "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
+        "expected_reason": "why",
+    }  # fmt: skip
+    assert unused.reason == said
+    assert single(judged(text, runs[:3])).status == "did not run"
