@@ -263,7 +263,8 @@ def _checked(record: Any, limit: int) -> int:
             raise ValueError("its variants are not those of its run file")
     if not isinstance(record, RunRecord):
         return 0
-    if not (0 <= record.rung <= max(record.rungs - 1, 0) and 0.0 <= record.effort_value < math.inf):
+    sized = 0.0 < record.effort_value < math.inf or (record.effort_value == 0.0 and record.rungs < 2)
+    if not (0 <= record.rung <= max(record.rungs - 1, 0) and sized):
         raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
     arrays = [*record.channels.values(), *([] if record.times is None else [record.times])]
     size = sum(packed_bytes(packed) for packed in arrays)

@@ -89,6 +89,8 @@ CONTRADICTIONS = {
     "base64 that is not deflated": changed(channels={"a": Packed(shape=(7, 3), data="AAAA")}),
     "a cut text": changed(times=Packed(shape=(7,), data=SEVEN.data[:8])),
     "a rung above the ladder": changed(rung=4, rungs=4),
+    "a step of nothing": changed(rung=1, rungs=4, effort_value=0.0),
+    "a negative tolerance": changed(effort_value=-1e-6),
     "an unknown key": changed().replace(b'"engine"', b'"surprise":1,"engine"'),
 }
 
