@@ -73,7 +73,7 @@ class ClosedSystem(System):
         motion, out = self._motion(t, y, algorithm), self._outputs()
         out.loads[:] = motion.hinges
         self._observe_motion(t, y, motion.accelerations, out)
-        found = self._evaluation(t, motion.accelerations, motion.drives, out)
+        found = self._evaluation(t, motion.drives, out)
         closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
 

@@ -73,8 +73,12 @@ class Layout:
 
     def state(self, q: Any, u: Any, t: Any = 0.0) -> State:
         """A state that belongs here, finite; ValueError or TypeError for what does not fit."""
-        found = State(arguments.vector("q", q, self.nq), arguments.vector("u", u, self.nu), t, self)
-        self._examine(found.y)
+        return self.known(*self.packed(t, q, u))
+
+    def known(self, t: float, y: Real) -> State:
+        """A state of what is known to fit, without asking again."""
+        found = object.__new__(State)
+        found.__dict__.update(q=y[: self.nq], u=y[self.nq : -1], t=t, layout=self, y=y)
         return found
 
     def entering(self, state: State) -> tuple[float, Real]:
@@ -138,7 +142,7 @@ class Layout:
 
 def finite_result(result: Real, t: float) -> Real:
     """The result (any shape) itself; DynamicsError where an entry is not finite."""
-    if unsound(result.ravel(), _NONE):
+    if unsound(result if result.ndim == 1 else result.ravel(), _NONE):
         raise NotFiniteError(
             f"the result at t = {t:g} s is not finite: coordinates, speeds, accelerations or functions of time are so "
             "large that their products overflow"

@@ -72,8 +72,9 @@ class Evaluation:
 
 
 class _Outputs(NamedTuple):
-    """Arrays of an evaluation, parts of `every`: markers (K,24), loads (N,6), wheel loads (W,6), energy, momentum."""
+    """Arrays of an evaluation, parts of `every`: rates (nu,), markers (K,24), loads (N,6), wheel loads (W,6) ..."""
 
+    rates: Real
     markers: Real
     loads: Real
     wheel_loads: Real
@@ -140,7 +141,7 @@ class System(Mechanics):
                 u[self.speed(name)] = modal.rates or 0.0
         y = np.concatenate([q, u, [0.0]])
         self.project(0.0, y, self.constants)
-        return State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
+        return self.layout.known(0.0, y)
 
     def workspace(self) -> Workspace:
         """A fresh workspace for `rhs`; one per thread."""
@@ -257,7 +258,8 @@ class System(Mechanics):
             )  # fmt: skip
             self._check(status, int(w.fault[0]))
             self._trust(t, y, w)
-            return self._evaluation(t, w.speed["acceleration"].copy(), w.speed["drive"], out)
+            out.rates[:] = w.speed["acceleration"]
+            return self._evaluation(t, w.speed["drive"], out)
         if algorithm in ERRATA:
             nested = self.nested(algorithm)
             status, motion = nested.motion(t, y)
@@ -266,16 +268,17 @@ class System(Mechanics):
             out.loads[:] = motion.loads
             self._observe_motion(t, y, motion.accelerations, out)
             out.wheel_loads[:, :3] = motion.wheel_torques
-            return self._evaluation(t, motion.accelerations, motion.drives, out)
+            return self._evaluation(t, motion.drives, out)
         if algorithm not in ("composite", "unsplit"):
             raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
         rates, drives = self._composite(t, y) if algorithm == "composite" else self._unsplit(t, y)
         out.loads[:] = self._inverse(t, y, rates)[1]
         self._observe_motion(t, y, rates, out)
-        return self._evaluation(t, rates, drives, out)
+        return self._evaluation(t, drives, out)
 
     def _observe_motion(self, t: float, y: Real, rates: Real, out: _Outputs) -> None:
         """Markers, wheel loads, energy and momentum of accelerations found elsewhere."""
+        out.rates[:] = rates
         dynamics.observe_motion(
             t, y, rates, self._marker_body, self._marker_port, self.constants, self._w,
             out.markers, out.wheel_loads, out.energy, out.momentum,
@@ -284,18 +287,18 @@ class System(Mechanics):
     def _outputs(self) -> _Outputs:
         """To be filled."""
         markers, loads, wheels = len(self._markers), len(self._links), len(self.constants.wheel)
-        a, b = 24 * markers, 24 * markers + 6 * loads
-        c = b + 6 * wheels
+        a = self.nu + 24 * markers
+        b, c = a + 6 * loads, a + 6 * loads + 6 * wheels
         every = np.zeros(c + 10)
         return _Outputs(
-            markers=every[:a].reshape(markers, 24), loads=every[a:b].reshape(loads, 6),
-            wheel_loads=every[b:c].reshape(wheels, 6), energy=every[c : c + 4], momentum=every[c + 4 :], every=every,
+            every[: self.nu], every[self.nu : a].reshape(markers, 24), every[a:b].reshape(loads, 6),
+            every[b:c].reshape(wheels, 6), every[c : c + 4], every[c + 4 :], every,
         )  # fmt: skip
 
-    def _evaluation(self, t: float, rates: Real, drive: Real, out: _Outputs) -> Evaluation:
+    def _evaluation(self, t: float, drive: Real, out: _Outputs) -> Evaluation:
         finite_result(out.every, t)
         return Evaluation(
-            accelerations=finite_result(rates, t),
+            accelerations=out.rates,
             markers={
                 name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
                 for name, row in zip(self._markers, out.markers, strict=True)
