@@ -1,4 +1,4 @@
-"""Compilation of kernels: with `parts.py`, `bundle.py` and `pointer.py`, all that names numba.
+"""Compilation of kernels: with `kernel_cache.py`, `parts.py`, `bundle.py` and `pointer.py`, all that names numba.
 
 `kernel` marks an entry point: compiled for the argument types of its first call, callable from Python, cached on disk.
 `helper` marks a function that is called from kernels only: it is compiled into its callers, has no Python wrapper, no
@@ -23,7 +23,14 @@ from numba import config, njit, types
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
+from flexmb.kernel_cache import KernelCache, warn_once
 from flexmb.parts import PartCompiler
+
+if config.DISABLE_JIT:
+    raise ImportError(
+        "flexmb runs compiled kernels only, and NUMBA_DISABLE_JIT is set: unset it. To look into a kernel, call its "
+        "py_func, or see flexmb.counting, which interprets kernels"
+    )
 
 # "contract" fuses a*b + c. No "nnan" or "ninf": they would let the compiler delete the checks that catch a blow-up.
 _SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
@@ -84,24 +91,25 @@ def cache_directory(source: Path) -> str | None:
     root = Path(config.CACHE_DIR or AppDirs(appname="numba", appauthor=False).user_cache_dir)
     directory = root / f"{_PACKAGE.name}-{source_hash(source)}"
     try:
+        if directory.is_file():
+            directory.unlink()
         directory.mkdir(parents=True, exist_ok=True)
         tempfile.TemporaryFile(dir=directory).close()
-    except OSError:
+    except OSError as problem:
+        warn_once(
+            f"compiled kernels cannot be kept in {root} ({problem.strerror}), and every process compiles them again: "
+            "permit writing there, or set NUMBA_CACHE_DIR to a folder where it is"
+        )
         return None
     return str(directory)
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` as an entry point, cached on disk."""
-    directory = cache_directory(Path(function.__code__.co_filename))
-    if directory is None:
-        return njit(**_SEMANTICS)(function)
-    # Numba reads its cache directory while it decorates: set only here, other packages keep theirs.
-    others, config.CACHE_DIR = config.CACHE_DIR, directory
-    try:
-        return njit(cache=True, **_SEMANTICS)(function)
-    finally:
-        config.CACHE_DIR = others
+    compiled, directory = njit(**_SEMANTICS)(function), cache_directory(Path(function.__code__.co_filename))
+    if directory is not None:
+        compiled._cache = KernelCache(function, Path(directory))
+    return compiled
 
 
 def helper(function: Callable[..., Any]) -> Any:

@@ -159,7 +159,7 @@ def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached
     package = tmp_path / "flexmb"
     package.mkdir()
     (package / "__init__.py").write_text("")
-    for name in ("kernel.py", "parts.py"):
+    for name in ("kernel.py", "kernel_cache.py", "parts.py"):
         shutil.copy(Path(flexmb.kernel.__file__).with_name(name), package / name)
     (package / "entry.py").write_text(
         "from flexmb.kernel import kernel\nfrom flexmb.part import part\n@kernel\ndef entry(x):\n    return part(x)\n"
