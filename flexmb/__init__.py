@@ -21,6 +21,7 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.system import ClosureError
+    from flexmb.interruption import Interrupted
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linearize import linearize
@@ -41,6 +42,7 @@ _LATER = {
     "equilibrium": "flexmb.linear.equilibrium",
     "EquilibriumError": "flexmb.linear.equilibrium",
     "linearize": "flexmb.linear.linearize",
+    "Interrupted": "flexmb.interruption",
     "LinearModel": "flexmb.linear.model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
@@ -55,9 +57,10 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "LinearModel",
-    "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
-    "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "steady_spin",
+    "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "Interrupted",
+    "LinearModel", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise",
+    "campbell", "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 

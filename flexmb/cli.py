@@ -17,6 +17,7 @@ from flexmb.scene.reference import json_schema
 
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130  # as of shells: 128 and the number of the signal
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -80,23 +81,30 @@ def simulate(
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
 
     **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
-    wrong.
+    wrong, 130 interrupted by Ctrl-C (what was reached is written).
     """
+    interrupted = False
     with _no_traceback():
+        from flexmb.interruption import Interrupted
         from flexmb.simulation import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.summary import summary
 
         with console.status(f"simulating {scene} (the first run after an update compiles)"):
-            trajectory = run(
-                load_scene(scene), t_end, method,  # type: ignore[arg-type]
-                rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
-                spectral_radius=spectral_radius,
-            )  # fmt: skip
+            try:
+                trajectory = run(
+                    load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                    rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
+                    spectral_radius=spectral_radius,
+                )  # fmt: skip
+            except Interrupted as stopped:
+                trajectory, interrupted = stopped.trajectory, True
         out.mkdir(parents=True, exist_ok=True)
         trajectory.to_csv(out / "trajectory.csv")
         written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
     console.print(summary(trajectory))
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+    if interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
 
@@ -364,9 +372,12 @@ def _no_traceback() -> Iterator[None]:
     """What the user can put right is a message, not a traceback."""
     try:
         yield
-    except (SceneError, NotImplementedError, ValueError, OSError) as error:
+    except (SceneError, NotImplementedError, ValueError, ImportError, OSError) as error:
         errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None
+    except ArithmeticError as error:  # there are no accelerations, or they overflow
+        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+        raise typer.Exit(EXIT_STOPPED) from None
 
 
 def main() -> None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from time import perf_counter
-from typing import TYPE_CHECKING, NamedTuple, cast, get_args
+from typing import TYPE_CHECKING, Any, NamedTuple, cast, get_args
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb import composite
+from flexmb import arguments, composite
 from flexmb.frisch import evaluation as nested_evaluation
-from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES, STOP
 from flexmb.integrate.jacobians import COUNTS, FACTORISATIONS, JACOBIANS
+from flexmb.interruption import Interrupted, interruptible
 from flexmb.labels import state_names
 from flexmb.methods import LINEARISING, Method, Settings
 from flexmb.propagate import Route, Run
@@ -21,13 +22,19 @@ from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError
+from flexmb.state import DynamicsError, NotFiniteError
 from flexmb.status import Status
 from flexmb.system import ENERGIES, ERRATA, Algorithm, Evaluation, System, assembled
 from flexmb.trajectory import Array, MarkerPath, Statistics, Trajectory
 
 if TYPE_CHECKING:
     from flexmb.closed_system import ClosedSystem
+
+
+OUTPUT_BYTES = 2**32
+"""Memory that the outputs of one run may take."""
+_NUMBER_BYTES, _OBJECT_BYTES, _SAMPLE_BYTES = 16, 200, 2000  # evaluated, then gathered; of Python, measured
+_TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
 
 
 class _Raw(NamedTuple):
@@ -40,6 +47,7 @@ class _Raw(NamedTuple):
     counts: list[int]
     compile_s: float
     run_s: float
+    interrupted: bool
 
 
 def simulate(
@@ -74,22 +82,29 @@ def simulate(
     g'' + 2 k g' + k^2 g = 0 (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
 
     Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError for settings that make no sense, ClosureError where no initial state closes the
-    closures or they leave no motion. A run that fails raises nothing: `status` and `message` of the trajectory say why
-    it stopped, and what was reached is kept.
+    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
+    closes the closures or they leave no motion. A run that fails raises nothing: `status` and `message` of the
+    trajectory say why it stopped, and what was reached is kept. Ctrl-C ends a run at its next step and raises
+    `Interrupted`, a KeyboardInterrupt, whose `trajectory` is what was reached; a second one while the outputs of that
+    are evaluated keeps those that are.
     """
+    t_end = _end(t_end)
     if isinstance(scene, System):
         check_run(scene.scene, t_end)
     else:
         check_scene(scene, t_end)
-    settings = Settings(method, rtol, atol, step, max_steps, spectral_radius)
-    settings.check()
+    settings = Settings(method, rtol, atol, step, max_steps, spectral_radius).checked(t_end)
+    stabilise = arguments.number("stabilise", stabilise)
     times = _sample_times(samples, t_end)
     system = scene if isinstance(scene, System) else assembled(scene)
+    _refuse_too_many(len(times), system)
     if method in LINEARISING:
         _refuse_without_jacobian(system, algorithm, method)
     raw = _integrate(system, _route(system, algorithm, stabilise), times, settings)
-    return _observed(system, times, raw, algorithm)
+    trajectory = _observed(system, times, raw, algorithm)
+    if raw.interrupted or trajectory.status is Status.INTERRUPTED:
+        raise Interrupted(trajectory)
+    return trajectory
 
 
 def switch_times(scene: Scene, t_end: float) -> list[float]:
@@ -115,14 +130,44 @@ def _refuse_without_jacobian(system: System, algorithm: Algorithm, method: Metho
 
 
 def _sample_times(samples: int | Sequence[float] | Array, t_end: float) -> Array:
-    if isinstance(samples, int | np.integer):
-        if samples < 2:
-            raise ValueError(f"samples is {samples}: ask for at least 2 output times, the start and the end")
-        return np.linspace(0.0, t_end, int(samples))
-    times = np.array(samples, float)
-    if times.ndim != 1 or len(times) < 2 or times[0] != 0.0 or times[-1] != t_end or np.any(np.diff(times) <= 0.0):
+    if np.ndim(samples) == 0:
+        number = arguments.whole("samples", samples)
+        if number < 2:
+            raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
+        if number > OUTPUT_BYTES // _SAMPLE_BYTES:
+            raise ValueError(f"samples is {number}: {_TOO_MANY}")
+        times = np.linspace(0.0, t_end, number)
+        if np.all(np.diff(times) > 0.0):
+            return times
+        raise ValueError(f"samples is {number}: there are not so many numbers from 0 to t_end = {t_end:g} s")
+    times = arguments.array("samples", samples)
+    increasing = times.ndim == 1 and len(times) > 1 and bool(np.all(np.diff(times) > 0.0))
+    if not (increasing and times[0] == 0.0 and times[-1] == t_end):
         raise ValueError(f"the output times must increase from 0 to t_end = {t_end:g} s: sort them and add both ends")
-    return times
+    return times.copy()
+
+
+def _end(t_end: float) -> float:
+    """Plain; whether a run can end there is for the scene's check to say."""
+    try:
+        return arguments.number("t_end", t_end)
+    except ValueError:
+        return np.nan
+
+
+def _refuse_too_many(samples: int, system: System) -> None:
+    """ValueError where the outputs would not fit into OUTPUT_BYTES."""
+    most = OUTPUT_BYTES // sample_bytes(system)
+    if samples > most:
+        raise ValueError(f"samples is {samples}, and this scene allows {most}: {_TOO_MANY}")
+
+
+def sample_bytes(system: System) -> int:
+    """Memory that one output time of a run takes, at most."""
+    scene = system.scene
+    places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
+    numbers = system.nq + 2 * system.nu + 24 * len(scene.markers) + 6 * places + 11
+    return _NUMBER_BYTES * numbers + _OBJECT_BYTES * (4 * len(scene.markers) + places) + _SAMPLE_BYTES
 
 
 def _route(system: System, algorithm: Algorithm, stabilise: float) -> Route:
@@ -146,20 +191,21 @@ def _integrate(system: System, route: Route, times: Array, settings: Settings) -
     initial = system.initial_state
     ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
 
-    def run(times: Array, ends: Array) -> _Raw:
+    def run(times: Array, ends: Array, call: Callable[..., tuple[Any, bool]]) -> _Raw:
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
         counts = np.zeros(COUNTS, np.int64)
         begun = perf_counter()
         solve = Run(route, settings, system.constants, system.nq, system.nu)
         start = perf_counter()
-        status, t = solve(y, times, ends, out, counts)
+        (status, t), interrupted = call(solve, (y, times, ends, out, counts), counts[STOP : STOP + 1])
         end = perf_counter()
         return _Raw(
-            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start
-        )
+            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start,
+            interrupted,
+        )  # fmt: skip
 
-    compiled = run(times[:1], ends[:0])
-    return run(times, ends)._replace(compile_s=compiled.compile_s)
+    compiled = run(times[:1], ends[:0], lambda solve, arguments, _: (solve(*arguments), False))
+    return run(times, ends, interruptible)._replace(compile_s=compiled.compile_s)
 
 
 def _observed(system: System, times: Array, raw: _Raw, algorithm: Algorithm) -> Trajectory:
@@ -169,13 +215,18 @@ def _observed(system: System, times: Array, raw: _Raw, algorithm: Algorithm) -> 
     message = _message(system, raw)
     for t, y in zip(times, raw.states, strict=False):
         try:
-            evaluation = system.evaluate(t, y[: system.nq], y[system.nq : -1], algorithm)
+            seen.append(system.evaluate(t, y[: system.nq], y[system.nq : -1], algorithm))
+        except NotFiniteError as error:  # squares overflow before the state does
+            if status is Status.OK:
+                status, stopped_at, message = Status.NONFINITE, float(t), f"stopped at t = {t:g} s: {error}"
+            break
         except DynamicsError as error:  # fixed steps may have jumped over the place where the dynamics ends
             status, stopped_at, message = Status.NOT_POSITIVE_DEFINITE, float(t), f"stopped at t = {t:g} s: {error}"
             break
-        if not np.isfinite(sum(evaluation.energy.values())):  # squares overflow before the state does
+        except KeyboardInterrupt:
+            status, stopped_at = Status.INTERRUPTED, float(t)
+            message = f"stopped at t = {t:g} s, while outputs were evaluated: {status.advice}"
             break
-        seen.append(evaluation)
     states = raw.states[: len(seen)]
     first = seen[0] if seen else None
     q_names, u_names = state_names(system)

@@ -17,6 +17,7 @@ class Status(IntEnum):
     CLOSURE_SINGULAR = 6
     CLOSURE_OPEN = 7
     NOT_CONVERGED = 8
+    INTERRUPTED = 9
 
     @property
     def advice(self) -> str:
@@ -55,6 +56,7 @@ _ADVICE = {
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
         'adapts its step, "radau5"'
     ),
+    Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
 }
 
@@ -67,3 +69,4 @@ OUT_OF_RANGE = int(Status.OUT_OF_RANGE)
 CLOSURE_SINGULAR = int(Status.CLOSURE_SINGULAR)
 CLOSURE_OPEN = int(Status.CLOSURE_OPEN)
 NOT_CONVERGED = int(Status.NOT_CONVERGED)
+INTERRUPTED = int(Status.INTERRUPTED)

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
 from flexmb.propagate import recursion
 from flexmb.state import pack
@@ -36,7 +37,7 @@ class StoppedError(ArithmeticError):
 def flow(system: System, start: Array, time: float) -> Array:
     """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
-    counts, controlled = np.zeros(4, np.int64), system.nq + system.nu
+    counts, controlled = np.zeros(COUNTS, np.int64), system.nq + system.nu
     equations = recursion(system.recursion_constants, system.recursion_workspace())
     status, _ = dop853(equations, start.copy(), times, times[1:], RTOL, ATOL, controlled, MAX_STEPS, out, counts)
     if status != OK:

@@ -11,7 +11,7 @@ import math
 import numpy as np
 
 from flexmb.kernel import helper, written_out
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 SAFETY = 0.9
 SHRINK = 0.2  # strongest change of step after a rejection ...
@@ -22,7 +22,9 @@ HALVED = 0.5  # change of step where an iteration did not converge
 # to.
 _STEP_SLACK = 1e-9
 
-EVALUATIONS, ACCEPTED, REJECTED, SAMPLES = range(4)  # entries of `counts`
+# Entries of `counts`, and one that is no count: another thread sets STOP while a run goes on, which then ends.
+EVALUATIONS, ACCEPTED, REJECTED, SAMPLES, STOP = range(5)
+COUNTS = 5  # their number: length of `counts`
 
 
 @helper
@@ -113,16 +115,22 @@ def enter_segment(problem, t, y, dy, h, end, last, rtol, atol, controlled, expon
 
 
 @helper
+def permitted(max_steps, counts):
+    """OK where one more step may be made, or why not."""
+    if counts[STOP] != 0:
+        return INTERRUPTED
+    return MAX_STEPS if counts[ACCEPTED] + counts[REJECTED] >= max_steps else OK
+
+
+@helper
 def step_end(t, h, end, trouble, max_steps, counts):
     """Where a step of size h ends, after a status code: OK, or why there is no further step.
 
     There may have been too many, or it is too short to advance time. No sliver of a step is left before the end of the
     segment.
     """
-    status = OK
-    if counts[ACCEPTED] + counts[REJECTED] >= max_steps:
-        status = MAX_STEPS
-    elif h < 10.0 * (np.nextafter(t, math.inf) - t):
+    status = permitted(max_steps, counts)
+    if status == OK and h < 10.0 * (np.nextafter(t, math.inf) - t):
         status = trouble
     return status, end if t + 1.01 * h >= end else t + h
 

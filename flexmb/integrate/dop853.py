@@ -160,7 +160,7 @@ def dop853(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, o
     which nothing depends on; they have no scale of their own to compare `atol` with, and are as smooth as the state,
     hence integrated as accurately by the same steps.
     A step whose right-hand side fails is retried shorter: it may only have reached too far. When the step gets too
-    short to advance time, the failure's own status is returned. counts (4,): evaluations, accepted and rejected steps,
+    short to advance time, the failure's own status is returned. counts (5,): evaluations, accepted and rejected steps,
     samples stored. Returns (status code, time of the last good state).
     """
     n = y.shape[0]

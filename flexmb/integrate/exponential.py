@@ -213,7 +213,7 @@ def exponential(problem, y, times, segment_ends, rtol, atol, controlled, max_ste
     """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
 
     problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
-    `dop853`, counts (6,) those of `jacobians`. Where the iteration does not converge, the step is halved.
+    `dop853`, counts (7,) those of `jacobians`. Where the iteration does not converge, the step is halved.
     """
     flow, s = scratch(y.shape[0])
     f = np.empty(y.shape[0])

@@ -16,11 +16,21 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, scaled_norm, stretch
+from flexmb.integrate.control import (
+    ACCEPTED,
+    SAMPLES,
+    all_finite,
+    begin,
+    copy,
+    derivative,
+    permitted,
+    scaled_norm,
+    stretch,
+)
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.kernel import helper, kernel
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, OK
+from flexmb.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
 _ROUNDING = 2.0**-46  # a correction this far below accelerations is theirs: 64 roundings
@@ -161,7 +171,7 @@ def generalised_alpha(
 ):
     """Integrate y = [q (nq,), u, quadratures] from times[0] to times[-1] and store y at every time of `times` in `out`.
 
-    problem: a `StiffProblem`. Steps, samples and segments are those of `rk4`, counts (6,) those of `jacobians`.
+    problem: a `StiffProblem`. Steps, samples and segments are those of `rk4`, counts (7,) those of `jacobians`.
     Newton's method stops where its correction is below rtol |y| + atol over the first `controlled` components.
     Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end, where udot may
     jump. Returns (status code, time of the last good state).
@@ -180,8 +190,9 @@ def generalised_alpha(
             start = t
             end, steps, h, last = stretch(start, times[sample], segment_ends[segment], step)
             for k in range(steps):
-                if counts[ACCEPTED] >= max_steps:
-                    return MAX_STEPS, t
+                status = permitted(max_steps, counts)
+                if status != OK:
+                    return status, t
                 if at_start:
                     status = derivative(problem, t, y, s.f, counts)
                     if status != OK:

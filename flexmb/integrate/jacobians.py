@@ -7,8 +7,8 @@ from flexmb.kernel import helper
 from flexmb.status import NONFINITE, OK
 
 # Entries of `counts` behind those of `control`: Jacobians, and factorisations or exponentials of a matrix.
-JACOBIANS, FACTORISATIONS = 4, 5
-COUNTS = 6  # length of `counts`
+JACOBIANS, FACTORISATIONS = 5, 6
+COUNTS = 7  # length of `counts`
 
 
 @helper

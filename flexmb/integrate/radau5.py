@@ -257,7 +257,7 @@ def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, o
     """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
 
     problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
-    `dop853`, counts (6,) those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed,
+    `dop853`, counts (7,) those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed,
     then the step is halved.
     """
     s, f = scratch(y.shape[0]), np.empty(y.shape[0])

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, stretch
+from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, permitted, stretch
 from flexmb.kernel import kernel, written_out
-from flexmb.status import MAX_STEPS, NONFINITE, OK
+from flexmb.status import NONFINITE, OK
 
 
 @written_out
@@ -41,7 +41,7 @@ def rk4(problem, y, times, segment_ends, step, max_steps, out, counts):
     problem: a `Problem`. y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends:
     increasing, the last is times[-1]; no step crosses one, and the stages before one see the right-hand side's limit
     from the left. Every stretch between samples and segment ends is divided into equal steps not exceeding `step`, and
-    y is put back on its manifold after each. counts (4,): evaluations, accepted and rejected steps, samples stored.
+    y is put back on its manifold after each. counts (5,): evaluations, accepted and rejected steps, samples stored.
     Returns (status code, time of the last good state).
     """
     k, trial = np.empty((4, y.shape[0])), np.empty(y.shape[0])
@@ -53,8 +53,9 @@ def rk4(problem, y, times, segment_ends, step, max_steps, out, counts):
             start = t
             end, steps, h, last = stretch(start, times[sample], segment_ends[segment], step)
             for j in range(steps):
-                if counts[ACCEPTED] >= max_steps:
-                    return MAX_STEPS, t
+                status = permitted(max_steps, counts)
+                if status != OK:
+                    return status, t
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
                 if status != OK:
                     return status, t

@@ -68,11 +68,20 @@ def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
     assert "Traceback" not in result.output
 
 
-@pytest.mark.parametrize("words", [("-1",), ("1", "--method", "euler"), ("1", "--rtol", "1e-20")])
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("-1",), ("nan",), ("inf",), ("1", "--method", "euler"), ("1", "--rtol", "1e-20"), ("1", "--rtol", "0.2"),
+        ("1", "--samples", "1000000000"), ("1", "--samples", "1"), ("1", "--atol", "inf"),
+        ("1", "--method", "rk4", "--step", "1e-300"), ("1", "--method", "rk4", "--step", "nan"),
+        ("1", "--algorithm", "newton"),
+    ],
+)  # fmt: skip
 def test_wrong_options_exit_2_with_a_remedy(scene_file, words, tmp_path):
     result = invoke("simulate", scene_file, "--out", tmp_path / "out", "--t-end", *words)
     assert result.exit_code == 2
     assert "error:" in result.output
+    assert len(result.output.strip().splitlines()) <= 3  # of a scene: its name, what is wrong, the remedy
     assert "Traceback" not in result.output
     assert not (tmp_path / "out").exists()
 

@@ -2,13 +2,16 @@
 
 import csv
 import math
+import tracemalloc
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.simulation import switch_times
+from flexmb.simulation import sample_bytes, switch_times
 from flexmb.status import Status
+from tests.trees import random_scene
 
 EPS = np.finfo(float).eps
 GRAVITY = 9.81
@@ -181,6 +184,14 @@ def test_steps_stop_where_a_load_switches():
         ({"samples": [0.0, 2.0, 1.0]}, "must increase from 0 to t_end"),
         ({"samples": [0.0, 0.5]}, "must increase from 0 to t_end"),
         ({"max_steps": 0}, "at least one step"),
+        ({"max_steps": 10**30}, "at most"),
+        ({"rtol": 0.2}, "the error of a step is not known"),
+        ({"rtol": math.nan}, "give a finite number"),
+        ({"atol": math.inf}, "give a finite number"),
+        ({"samples": [0.0, math.nan, 1.0]}, "must increase from 0 to t_end"),
+        ({"samples": 10**9}, "outputs would take more than 4 GiB"),
+        ({"samples": 1_500_000}, "this scene allows"),
+        ({"method": "rk4", "step": 1e-300}, "does not advance a time of 1 s"),
         ({"t_end": -1.0}, "give a positive, finite time"),
         ({"t_end": math.nan}, "give a positive, finite time"),
     ],
@@ -188,6 +199,27 @@ def test_steps_stop_where_a_load_switches():
 def test_settings_that_make_no_sense_are_refused_with_a_remedy(options, remedy):
     with pytest.raises(ValueError, match=remedy):
         fm.simulate(pendulum(), **({"t_end": 1.0} | options))
+
+
+def test_the_memory_of_outputs_is_what_is_reckoned_with():
+    """Evaluations are kept until the run ends, then gathered: between a quarter of the bound and all of it."""
+    system = fm.compile(random_scene(3))
+    run = fm.simulate(system, 1e-3, samples=2, rtol=1e-3)
+    taken = []
+    for samples in (10, 210):
+        tracemalloc.start()
+        fm.simulate(system, 1e-3, samples=samples, rtol=1e-3)
+        taken.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert run.finished
+    assert 0.25 < (taken[1] - taken[0]) / (200 * sample_bytes(system)) <= 1.0
+
+
+def test_numbers_of_any_real_type_run_alike():
+    plain = fm.simulate(pendulum(angle=1.0), 0.5, rtol=2.0**-20, samples=5)
+    numbers = {"rtol": np.float32(2.0**-20), "samples": np.int8(5), "max_steps": np.int64(1000)}
+    other = fm.simulate(pendulum(angle=1.0), Fraction(1, 2), **numbers)
+    assert np.array_equal(plain.q, other.q)
 
 
 def test_a_profile_must_cover_the_run():

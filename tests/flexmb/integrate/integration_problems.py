@@ -12,7 +12,7 @@ import numpy as np
 from scipy.special import ellipj
 
 from flexmb.bundle import bundle
-from flexmb.integrate.control import ACCEPTED, copy, derivative
+from flexmb.integrate.control import ACCEPTED, COUNTS, copy, derivative
 from flexmb.integrate.dop853 import dop853, interpolant, interpolate, stages
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
 from flexmb.integrate.problem import Problem, problem
@@ -142,7 +142,7 @@ def solve(kind: int, times, *, rtol=None, step=None, ends=None, controlled=None,
     of_kind = problem(rhs, project, constants, workspace)
     times, y = np.asarray(times, float), exact(kind, times[0])
     ends = np.array([times[-1]] if ends is None else ends, float)
-    out, counts = np.full((len(times), len(y)), np.nan), np.zeros(4, np.int64)
+    out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     if step is None:
         status, t = dop853(of_kind, y, times, ends, rtol, rtol, controlled or len(y), max_steps, out, counts)
     else:

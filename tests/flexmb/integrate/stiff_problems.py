@@ -158,7 +158,7 @@ def solve(integrator, problem, y, times, *settings, ends=None, max_steps=100_000
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     status, t = integrator(equations, y, times, ends, *settings, max_steps, out, counts)
-    evaluations, accepted, rejected, samples, jacobians, factorisations = map(int, counts)
+    evaluations, accepted, rejected, samples, _, jacobians, factorisations = map(int, counts)
     return Result(
         status, t, y, out[:samples], evaluations, accepted, rejected, jacobians, factorisations, int(workspace.fault[0])
     )

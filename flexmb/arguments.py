@@ -1,0 +1,81 @@
+"""Arguments of public calls as the code behind them needs them: real numbers in arrays of the right shape, or an error.
+
+Integers and single precision are cast, sequences become arrays. What is not a real number, as complex ones, strings,
+booleans and None, is a TypeError; lengths that do not fit, NaN and infinity are a ValueError.
+"""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+Vector = NDArray[np.float64]
+_FLOAT = np.dtype(float)
+
+
+def array(name: str, values: Any) -> Vector:
+    """An array of floats of any shape, in C's order, aligned and writable; the array itself where it is that."""
+    if type(values) is np.ndarray and values.dtype is _FLOAT and values.flags.carray:
+        return values
+    try:
+        found = np.asarray(values)
+    except ValueError:
+        raise ValueError(f"{name}: rows of different lengths; give an array of numbers") from None
+    if found.size == 0 and not isinstance(values, np.ndarray):
+        found = found.astype(float)  # an empty list has no type of its own
+    if found.dtype.kind not in "iuf":
+        raise TypeError(f"{name}: real numbers are needed, not {_kind(values, found)}")
+    return np.array(found, float, order="C")
+
+
+def vector(name: str, values: Any, length: int) -> Vector:
+    """An array (length,) of floats; whether they are finite is for the caller to ask."""
+    found = array(name, values)
+    if found.shape != (length,):
+        raise ValueError(f"{name}: {length} numbers in a row are needed, got an array of shape {found.shape}")
+    return found
+
+
+def finite(name: str, values: Vector) -> Vector:
+    """The array itself; ValueError where an entry is NaN or infinite."""
+    if not np.isfinite(values).all():
+        place = np.unravel_index(int(np.argmin(np.isfinite(values))), values.shape)
+        where = ", ".join(map(str, place))
+        raise ValueError(f"{name}[{where}] is {values[place]}: give finite numbers")
+    return values
+
+
+def representable(result: Vector) -> Vector:
+    """The array itself; OverflowError where an entry is not finite: of arguments that are."""
+    if not np.isfinite(result).all():
+        raise OverflowError("the result is not finite: the numbers given are so large that their products overflow")
+    return result
+
+
+def number(name: str, value: Any) -> float:
+    """A finite float."""
+    if type(value) is not float:
+        if not isinstance(value, Real) or isinstance(value, bool):
+            raise TypeError(f"{name} is {value!r}: give a real number")
+        try:
+            value = float(value)
+        except OverflowError:
+            raise ValueError(f"{name} is beyond all floating-point numbers: give a finite number") from None
+    if not math.isfinite(value):
+        raise ValueError(f"{name} is {value}: give a finite number")
+    return float(value)
+
+
+def whole(name: str, value: Any) -> int:
+    """An integer."""
+    if not isinstance(value, Integral) or isinstance(value, bool):
+        raise TypeError(f"{name} is {value!r}: give a whole number")
+    return int(value)
+
+
+def _kind(values: Any, found: NDArray[Any]) -> str:
+    return "complex ones" if found.dtype.kind == "c" else f"{type(values).__name__} of {found.dtype}"

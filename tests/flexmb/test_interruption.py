@@ -1,0 +1,145 @@
+"""Ctrl-C ends compiled runs within a second and keeps what was reached: sent to processes of their own."""
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.interruption import interruptible
+from flexmb.status import Status
+from flexmb.warmup import pendulum
+
+ROOT = Path(__file__).parents[2]
+pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX does")
+
+# Presses Ctrl-C a while after the compiled loop began. Times are those of the processor: the machine may be busy.
+PRESSED = """
+import os, signal, sys, threading, time
+import flexmb as fm
+import flexmb.simulation as simulation
+from flexmb.warmup import pendulum
+
+def press():
+    global pressed
+    pressed = time.process_time()
+    os.kill(os.getpid(), signal.SIGINT)
+
+def watched(*given):
+    threading.Timer(0.3, press).start()
+    return whole(*given)
+
+whole, simulation.interruptible = simulation.interruptible, watched
+"""
+PROBE = """
+method, options = sys.argv[1], eval(sys.argv[2])
+try:
+    fm.simulate(pendulum(), 1e6, method, samples=10_001, max_steps=10**15, **options)
+except KeyboardInterrupt as stopped:
+    run = stopped.trajectory
+    print(time.process_time() - pressed, run.status.name, run.stopped_at, len(run.t), run.t[-1], stopped)
+"""
+METHODS = {
+    "rk4": {"step": 1e-6},
+    "dop853": {"rtol": 1e-12, "atol": 1e-14},
+    "radau5": {"rtol": 1e-12, "atol": 1e-14},
+    "exponential": {"rtol": 1e-12, "atol": 1e-14},
+    "generalised_alpha": {"step": 1e-6},
+}
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_compiled_run_ends_within_a_second_and_keeps_what_it_reached(method):
+    program = [sys.executable, "-c", PRESSED + PROBE, method, repr(METHODS[method])]
+    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    seconds, name, stopped_at, count, last, *message = done.stdout.split()
+    assert float(seconds) < 1.0
+    assert name == "INTERRUPTED"
+    assert 0.0 <= float(last) <= float(stopped_at) < 1e6
+    assert 1 <= int(count) < 10_001
+    assert "interrupted from the keyboard" in " ".join(message)
+
+
+def test_the_command_line_writes_what_was_reached_and_says_130(tmp_path):
+    scene = tmp_path / "scene.toml"
+    fm.save_scene(pendulum(), scene)
+    options = ["--t-end", "1e6", "--rtol", "1e-12", "--samples", "1001", "--no-plots", "--out", str(tmp_path)]
+    words = ["flexmb", "simulate", str(scene), *options]
+    program = f"{PRESSED}\nimport flexmb.cli\nsys.argv = {words!r}\nflexmb.cli.main()"
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 130, done.stderr
+    assert "interrupted from the keyboard" in done.stdout.replace("\n", " ")
+    assert (tmp_path / "trajectory.csv").read_text().count("\n") >= 2
+
+
+def test_outputs_that_are_evaluated_are_kept_too(monkeypatch):
+    system, seen = fm.compile(pendulum()), 0
+    whole = type(system).evaluate
+
+    def evaluate(self, *given):
+        nonlocal seen
+        seen += 1
+        if seen == 4:
+            raise KeyboardInterrupt
+        return whole(self, *given)
+
+    monkeypatch.setattr(type(system), "evaluate", evaluate)
+    with pytest.raises(fm.Interrupted) as stopped:
+        fm.simulate(system, 1.0, samples=11)
+    run = stopped.value.trajectory
+    assert run.status is Status.INTERRUPTED
+    assert len(run.t) == len(run.q) == 3
+    assert "outputs were evaluated" in str(stopped.value)
+
+
+def test_ctrl_c_at_the_very_end_is_not_swallowed():
+    """A loop over runs must end where one of them is interrupted, even if that one finished."""
+    stop = np.zeros(1, np.int64)
+
+    def last_moment() -> str:
+        os.kill(os.getpid(), signal.SIGINT)
+        time.sleep(0.05)
+        return "finished"
+
+    assert interruptible(last_moment, (), stop) == ("finished", True)
+    assert stop[0] == 1
+
+
+def test_errors_of_a_run_and_of_other_signals_come_through():
+    with pytest.raises(ZeroDivisionError):
+        interruptible(lambda: 1 / 0, (), np.zeros(1, np.int64))
+
+    def alarm(number, frame):
+        raise TimeoutError
+
+    before, stop = signal.signal(signal.SIGALRM, alarm), np.zeros(1, np.int64)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        with pytest.raises(TimeoutError):
+            interruptible(lambda: [time.sleep(0.01) for _ in range(100) if stop[0] == 0], (), stop)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert stop[0] == 1
+
+
+def test_in_another_thread_a_run_is_called_there():
+    found = []
+    thread = threading.Thread(
+        target=lambda: found.append(interruptible(threading.get_ident, (), np.zeros(1, np.int64)))
+    )
+    thread.start()
+    thread.join()
+    assert found == [(thread.ident, False)]
+
+
+def test_what_was_interrupted_survives_pickling():
+    run = fm.simulate(pendulum(), 0.1, samples=3)
+    assert pickle.loads(pickle.dumps(fm.Interrupted(run))).trajectory.stopped_at == run.stopped_at
