@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb import dynamics
+from flexmb import arguments
 from flexmb.arrays import Real
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
@@ -16,8 +16,9 @@ from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.system import ClosedMotion, ClosureError, Closures
 from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
+from flexmb.state import State, finite_result, pack
 from flexmb.status import Status
-from flexmb.system import Algorithm, Evaluation, State, System, pack
+from flexmb.system import Algorithm, Evaluation, System
 
 
 class ClosedSystem(System):
@@ -39,15 +40,17 @@ class ClosedSystem(System):
         """
         if self._start is None:
             y = consistent(self.closures, 0.0, pack(super().initial_state))
-            self._start = State(y[: self.nq], y[self.nq : -1])
-        return State(self._start.q.copy(), self._start.u.copy())
+            self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
+        return State(self._start.q, self._start.u, 0.0, self.layout)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.
 
-        Raises DynamicsError where an inertia is not positive definite, or the closures are singular.
+        Raises DynamicsError where an inertia is not positive definite, the closures are singular, or numbers are so
+        large that they overflow.
         """
-        return self._motion(state.t, pack(state), algorithm).accelerations
+        t, y = self.layout.entering(state)
+        return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         _refuse_others(self.scene, algorithm)
@@ -61,21 +64,15 @@ class ClosedSystem(System):
                 f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
                 "leave accelerations out, or prescribe coordinates"
             )
-        return self.evaluate(state.t, state.q, state.u).loads
+        return self._evaluate(*self.layout.entering(state), "articulated").loads
 
-    def evaluate(self, t: float, q: Real, u: Real, algorithm: Algorithm = "articulated") -> Evaluation:
-        """Everything observable at one state; `loads` has the closures' too."""
-        y = np.concatenate([q, u, [0.0]])
-        motion = self._motion(t, y, algorithm)
-        markers, wheel_loads, energy, momentum = self._outputs()
-        dynamics.observe_motion(
-            t, y, motion.accelerations, self._marker_body, self._marker_port, self.constants, self._w,
-            markers, wheel_loads, energy, momentum,
-        )  # fmt: skip
-        found = self._evaluation(
-            motion.accelerations, motion.drives, markers, motion.hinges, wheel_loads, energy, momentum
-        )
-        closures = zip(self.scene.closures, motion.closures, strict=True)
+    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        """With the closures' loads too."""
+        motion, out = self._motion(t, y, algorithm), self._outputs()
+        out.loads[:] = motion.hinges
+        self._observe_motion(t, y, motion.accelerations, out)
+        found = self._evaluation(t, motion.drives, out)
+        closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
@@ -83,18 +80,18 @@ class ClosedSystem(System):
 
         The others, in overconstrained mechanisms of rigid bodies, are those of the least closure loads (`evaluate`).
         """
-        hinges, closures = self.closures.determined(state.t, pack(state))
+        hinges, closures = self.closures.determined(*self.layout.entering(state))
         names = [link.hinge.name for link in self._links], [closure.name for closure in self.scene.closures]
         return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
         """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""
-        return self.closures.gaps(state.t, pack(state))
+        return self.closures.gaps(*self.layout.entering(state))
 
     def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
         """Fields of a `flexmb.propagate.Route`; ClosureError where there is no motion to run."""
         _refuse_others(self.scene, algorithm)
-        if not (np.isfinite(stabilise) and stabilise >= 0.0):
+        if arguments.number("stabilise", stabilise) < 0.0:
             raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
         self._refuse_locked()
 

@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from flexmb import factorisation
+from flexmb import arguments, factorisation
 from flexmb.arrays import Constants, Real, Workspace
 from flexmb.jain.response import Response, response
+from flexmb.state import finite_result
 
 
 class MassMatrixFactors:
@@ -24,6 +25,7 @@ class MassMatrixFactors:
         speed["prescribed"] = -1
         self._c, self._w = replace(constants, speed=speed), workspace
         self._x: Response = response(constants)
+        self._t = t
         self.status: int = factorisation.factorise(t, y, constants, self._c, workspace)
 
     @property
@@ -32,7 +34,7 @@ class MassMatrixFactors:
         return int(self._w.fault[0])
 
     def solve(self, b: Real) -> Real:
-        """M^-1 b for b (nu,) or (nu,m)."""
+        """M^-1 b for b (nu,) or (nu,m); as of its kin, ValueError or TypeError for an array that is not that."""
         return self._by_columns(factorisation.solve, b)
 
     def half_solve(self, b: Real) -> Real:
@@ -53,10 +55,11 @@ class MassMatrixFactors:
         return float(factorisation.log_determinant(self._c, self._w))
 
     def _by_columns(self, apply: Callable[..., None], b: Real) -> Real:
-        b = np.asarray(b, float)
+        b = arguments.finite("the array", arguments.array("the array", b))
         if b.ndim not in (1, 2) or len(b) != len(self._c.speed):
             raise ValueError(f"this mass matrix has {len(self._c.speed)} rows, got an array of shape {b.shape}")
         rows = np.array(np.atleast_2d(b.T), order="C")
         apply(self._c, self._w, self._x, rows)
+        finite_result(rows, self._t)
         found: Real = rows[0] if b.ndim == 1 else rows.T
         return found

@@ -12,7 +12,7 @@ from flexmb.consistent import consistent_accelerations, held_hinges
 from flexmb.factors import MassMatrixFactors
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
-from flexmb.state import DynamicsError, State, pack
+from flexmb.state import DynamicsError, Layout, State, finite_result
 from flexmb.status import OK, Status
 
 
@@ -27,6 +27,7 @@ class Mechanics:
     """What a `System` answers about its equations of motion. It writes into one workspace."""
 
     constants: Constants
+    layout: Layout
     nq: int
     nu: int
     _w: Workspace
@@ -51,16 +52,17 @@ class Mechanics:
 
     def mass_matrix(self, state: State) -> Real:
         """M (nu,nu), by composite bodies."""
+        t, y = self.layout.entering(state)
         M = np.empty((self.nu, self.nu))
-        composite.mass_matrix(state.t, pack(state), self.constants, self._w, self._places(), M)
-        return M
+        composite.mass_matrix(t, y, self.constants, self._w, self._places(), M)
+        return finite_result(M, t)
 
     def factorise(self, state: State) -> MassMatrixFactors:
         """M = F F' by recursion: `solve`, `multiply`, their halves and `log_determinant`, each in O(N).
 
         Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
         """
-        factors = MassMatrixFactors(self.constants, self.workspace(), state.t, pack(state))
+        factors = MassMatrixFactors(self.constants, self.workspace(), *self.layout.entering(state))
         self._check(factors.status, factors.fault)
         return factors
 
@@ -69,13 +71,14 @@ class Mechanics:
         return self.inverse_dynamics(state, np.zeros(self.nu))
 
     def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
-        """tau (nu,) = M udot + c, in O(N): Jain & Rodriguez (45).
+        """tau (nu,) = M udot + c of accelerations (nu,), in O(N): Jain & Rodriguez (45).
 
         Nothing drives a structure but its hinges and wheels: where the modal rows of tau (`modal_residual`) do not
         vanish, the accelerations are not consistent with each other, and tau is not what motors would have to do.
         `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
         """
-        return self._inverse(state, accelerations)[0]
+        t, y = self.layout.entering(state)
+        return finite_result(self._inverse(t, y, self.layout.rates("accelerations", accelerations))[0], t)
 
     def modal_residual(self, state: State, accelerations: Real) -> dict[str, Real]:
         """Modal rows T^f of inverse dynamics by body: the modal forces that these accelerations would need."""
@@ -88,20 +91,20 @@ class Mechanics:
 
         The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
         """
+        t, y = self.layout.entering(state)
+        rates = self.layout.rates("accelerations", accelerations)
         if self._held is None:
             self._held = held_hinges(self.constants, self.workspace())
         held, w = self._held
-        rates = np.asarray(accelerations, float)
-        self._check(
-            consistent_accelerations(state.t, pack(state), rates, self.constants, held, w), int(w.fault[0])
-        )
+        self._check(consistent_accelerations(t, y, rates, self.constants, held, w), int(w.fault[0]))
         rates = w.speed["acceleration"].copy()
         return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
 
     def applied(self, state: State) -> Real:
         """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
-        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._w))
-        return self._w.speed["applied"].copy()
+        t, y = self.layout.entering(state)
+        self._check(dynamics.accelerations(t, y, self.constants, self._w))
+        return finite_result(self._w.speed["applied"].copy(), t)
 
     def fault_name(self, status: int, fault: int) -> str:
         """What a failure's number stands for: a body."""
@@ -119,11 +122,10 @@ class Mechanics:
         self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
         return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
 
-    def _inverse(self, state: State, accelerations: Real) -> tuple[Real, Real]:
+    def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
-        rates = np.asarray(accelerations, float)
-        dynamics.inverse_dynamics(state.t, pack(state), rates, self.constants, self._w, tau, loads)
+        dynamics.inverse_dynamics(t, y, rates, self.constants, self._w, tau, loads)
         return tau, loads
 
     def _places(self) -> Matrices:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from flexmb.hinges import catalogue
 from flexmb.links import Link
 from flexmb.scene import schema as s
+from flexmb.state import Layout
+
+_QUATERNION = {catalogue.SPHERICAL: 0, catalogue.FREE: 3}  # where it starts: the helper `catalogue.quaternion_offset`
 
 
 class Numbering:
@@ -14,8 +19,11 @@ class Numbering:
         self.q: dict[str, slice] = {}
         self.u: dict[str, slice] = {}
         self.nq = self.nu = 0
+        quaternions = list[int]()
         for link in chain:
             kind = catalogue.KINDS[link.kind]
+            if link.kind in _QUATERNION:
+                quaternions.append(self.nq + _QUATERNION[link.kind])
             self._append(link.hinge.name, kind.NQ, kind.NV)
             self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
             for wheel in wheels.get(link.name, ()):
@@ -23,6 +31,7 @@ class Numbering:
         for link in chain:
             self.q[f"{link.name}.hinge"] = self.q[link.hinge.name]
             self.u[f"{link.name}.hinge"] = self.u[link.hinge.name]
+        self.layout = Layout(self.nq, self.nu, self.q, self.u, np.array(quaternions, np.int64))
 
     def _append(self, name: str, nq: int, nu: int) -> None:
         self.q[name] = slice(self.nq, self.nq + nq)

@@ -12,7 +12,7 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal, NamedTuple, get_args
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,7 +30,7 @@ from flexmb.mechanics import Mechanics
 from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
-from flexmb.state import State, pack
+from flexmb.state import State, finite_result
 from flexmb.workspaces import workspace
 
 Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
@@ -71,6 +71,18 @@ class Evaluation:
     momentum: Real
 
 
+class _Outputs(NamedTuple):
+    """Arrays of an evaluation, parts of `every`: rates (nu,), markers (K,24), loads (N,6), wheel loads (W,6) ..."""
+
+    rates: Real
+    markers: Real
+    loads: Real
+    wheel_loads: Real
+    energy: Real
+    momentum: Real
+    every: Real
+
+
 class System(Mechanics):
     """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
 
@@ -81,7 +93,8 @@ class System(Mechanics):
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
         self.constants, self._markers, self._closure_ports = assemble(scene, self._links, self._numbering)
-        self.nq, self.nu = self._numbering.nq, self._numbering.nu
+        self.layout = self._numbering.layout
+        self.nq, self.nu = self.layout.nq, self.layout.nu
         self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
         self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
         self._w = self.workspace()
@@ -106,11 +119,12 @@ class System(Mechanics):
         return _find(self._numbering.u, name)
 
     def state(self, q: Real, u: Real, t: float = 0.0) -> State:
-        """State from q (nq,) and u (nu,); ValueError where lengths do not fit."""
-        q, u = np.array(q, float), np.array(u, float)
-        if q.shape != (self.nq,) or u.shape != (self.nu,):
-            raise ValueError(f"this system has q of {self.nq} and u of {self.nu} entries, got {q.shape} and {u.shape}")
-        return State(q, u, t)
+        """State from q (nq,), u (nu,) and t (s), copies; quaternions need not have unit length, they are scaled.
+
+        ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, TypeError for what are no
+        real numbers.
+        """
+        return self.layout.state(q, u, t)
 
     @property
     def initial_state(self) -> State:
@@ -127,7 +141,7 @@ class System(Mechanics):
                 u[self.speed(name)] = modal.rates or 0.0
         y = np.concatenate([q, u, [0.0]])
         self.project(0.0, y, self.constants)
-        return State(y[: self.nq], y[self.nq : -1])
+        return self.layout.known(0.0, y)
 
     def workspace(self) -> Workspace:
         """A fresh workspace for `rhs`; one per thread."""
@@ -153,18 +167,23 @@ class System(Mechanics):
         if algorithm not in ERRATA:
             raise ValueError(f"algorithm must be one of {', '.join(ERRATA)}, not {algorithm!r}")
         if algorithm not in self._nested:
-            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.nq, ERRATA[algorithm])
+            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, ERRATA[algorithm])
         return self._nested[algorithm]
 
     def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
         """The partitioned equations of motion, Frisch (111), by the names of the paper."""
-        return self.nested(algorithm).partitions(state.t, pack(state))
+        t, y = self.layout.entering(state)
+        return self.nested(algorithm).partitions(t, y)
 
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
+        t, _ = self.layout.entering(state)
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
-        return self._operators.at(state.t, state.q, state.u)
+        found = self._operators.at(t, state.q, state.u)
+        for part in (found.M_m, found.a_m, found.b_m, found.V_m):
+            finite_result(part, t)
+        return found
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
@@ -173,104 +192,118 @@ class System(Mechanics):
         "composite": mass matrix by composite bodies, bias by inverse dynamics, Cholesky's factors, partitioned for
         prescribed speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter.
         Frisch's equations are of first order in the deformation: they take bodies of level `full` as `linear`.
-        Raises DynamicsError where an inertia is not positive definite.
+        Raises DynamicsError where an inertia is not positive definite, or numbers are so large that they overflow.
         """
-        if algorithm not in get_args(Algorithm):
-            raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
+        t, y = self.layout.entering(state)
+        return finite_result(self._accelerations(t, y, algorithm), t)
+
+    def _accelerations(self, t: float, y: Real, algorithm: Algorithm) -> Real:
+        if algorithm == "articulated":
+            c, w = self.recursion_constants, self._recursion_w
+            self._check(dynamics.accelerations(t, y, c, w), int(w.fault[0]))
+            return w.speed["acceleration"].copy()
         if algorithm in ERRATA:
             nested = self.nested(algorithm)
-            status, rates = nested.accelerations(state.t, pack(state))
+            status, rates = nested.accelerations(t, y)
             self._check(status, nested.fault)
             return rates
         if algorithm == "composite":
-            return self._composite(state.t, pack(state))[0]
+            return self._composite(t, y)[0]
         if algorithm == "unsplit":
-            return self._unsplit(state.t, pack(state))[0]
-        c, w = self.recursion_constants, self._recursion_w
-        self._check(dynamics.accelerations(state.t, pack(state), c, w), int(w.fault[0]))
-        return w.speed["acceleration"].copy()
+            return self._unsplit(t, y)[0]
+        raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
 
         Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced, Jain & Rodriguez (44).
         """
+        t, y = self.layout.entering(state)
         if accelerations is None:
-            return self.evaluate(state.t, state.q, state.u).loads
-        return self._by_hinge(self._inverse(state, accelerations)[1])
+            return self._evaluate(t, y, "articulated").loads
+        rates = self.layout.rates("accelerations", accelerations)
+        return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
 
     def energy(self, state: State) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
-        return self.evaluate(state.t, state.q, state.u).energy
+        return self._evaluate(*self.layout.entering(state), "articulated").energy
 
     def momentum(self, state: State) -> Real:
         """(6,) [angular about the World origin; linear], World axes."""
-        return self.evaluate(state.t, state.q, state.u).momentum
+        return self._evaluate(*self.layout.entering(state), "articulated").momentum
 
     def evaluate(self, t: float, q: Real, u: Real, algorithm: Algorithm = "articulated") -> Evaluation:
-        """Everything observable at one state; DynamicsError where the accelerations do not exist.
+        """Everything observable at time t (s) of q (nq,) and u (nu,).
 
+        Quaternions need not have unit length, they are scaled; prescribed coordinates and speeds are taken from their
+        functions. ValueError or TypeError for arrays that do not fit, as of `state`; DynamicsError where the
+        accelerations do not exist, or numbers are so large that they overflow.
         With "frisch" or "frisch_as_printed", accelerations, hinge loads, drive loads and wheel torques are those of
         these equations; a wheel's force follows from its acceleration (the paper counts its mass as the body's).
         """
-        y = np.concatenate([q, u, [0.0]])
+        return self._evaluate(*self.layout.packed(t, q, u), algorithm)
+
+    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        out = self._outputs()
+        if algorithm == "articulated":
+            c, w = self.recursion_constants, self._recursion_w
+            status = dynamics.observe(
+                t, y, self._marker_body, self._marker_port, c, w,
+                out.markers, out.loads, out.wheel_loads, out.energy, out.momentum,
+            )  # fmt: skip
+            self._check(status, int(w.fault[0]))
+            out.rates[:] = w.speed["acceleration"]
+            return self._evaluation(t, w.speed["drive"], out)
         if algorithm in ERRATA:
-            return self._evaluate_nested(t, y, self.nested(algorithm))
-        if algorithm in ("composite", "unsplit"):
-            rates, drives = self._composite(t, y) if algorithm == "composite" else self._unsplit(t, y)
-            loads = self._inverse(State(q, u, t), rates)[1]
-            return self._evaluation(rates, drives, *self._observed(t, y, rates, loads))
-        if algorithm != "articulated":
+            nested = self.nested(algorithm)
+            status, motion = nested.motion(t, y)
+            self._check(status, nested.fault)
+            out.loads[:] = motion.loads
+            self._observe_motion(t, y, motion.accelerations, out)
+            out.wheel_loads[:, :3] = motion.wheel_torques
+            return self._evaluation(t, motion.drives, out)
+        if algorithm not in ("composite", "unsplit"):
             raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
-        c, w = self.recursion_constants, self._recursion_w
-        markers, wheel_loads, energy, momentum = self._outputs()
-        loads = np.zeros((len(self._links), 6))
-        status = dynamics.observe(
-            t, y, self._marker_body, self._marker_port, c, w, markers, loads, wheel_loads, energy, momentum
-        )
-        self._check(status, int(w.fault[0]))
-        return self._evaluation(
-            w.speed["acceleration"].copy(), w.speed["drive"], markers, loads, wheel_loads, energy, momentum
-        )
+        rates, drives = self._composite(t, y) if algorithm == "composite" else self._unsplit(t, y)
+        out.loads[:] = self._inverse(t, y, rates)[1]
+        self._observe_motion(t, y, rates, out)
+        return self._evaluation(t, drives, out)
 
-    def _evaluate_nested(self, t: float, y: Real, nested: NestedSystem) -> Evaluation:
-        status, motion = nested.motion(t, y)
-        self._check(status, nested.fault)
-        rates = motion.accelerations
-        markers, loads, wheel_loads, energy, momentum = self._observed(t, y, rates, motion.loads)
-        wheel_loads[:, :3] = motion.wheel_torques
-        return self._evaluation(rates, motion.drives, markers, loads, wheel_loads, energy, momentum)
-
-    def _observed(self, t: float, y: Real, rates: Real, loads: Real) -> tuple[Real, Real, Real, Real, Real]:
-        """Markers, the hinge loads given, wheel loads, energy and momentum of accelerations found elsewhere."""
-        markers, wheel_loads, energy, momentum = self._outputs()
+    def _observe_motion(self, t: float, y: Real, rates: Real, out: _Outputs) -> None:
+        """Markers, wheel loads, energy and momentum of accelerations found elsewhere."""
+        out.rates[:] = rates
         dynamics.observe_motion(
             t, y, rates, self._marker_body, self._marker_port, self.constants, self._w,
-            markers, wheel_loads, energy, momentum,
+            out.markers, out.wheel_loads, out.energy, out.momentum,
         )  # fmt: skip
-        return markers, loads, wheel_loads, energy, momentum
 
-    def _outputs(self) -> tuple[Real, Real, Real, Real]:
-        """Markers, wheel loads, energy and momentum to be filled."""
-        return np.zeros((len(self._markers), 24)), np.zeros((len(self.constants.wheel), 6)), np.zeros(4), np.zeros(6)
+    def _outputs(self) -> _Outputs:
+        """To be filled."""
+        markers, loads, wheels = len(self._markers), len(self._links), len(self.constants.wheel)
+        a = self.nu + 24 * markers
+        b, c = a + 6 * loads, a + 6 * loads + 6 * wheels
+        every = np.zeros(c + 10)
+        return _Outputs(
+            every[: self.nu], every[self.nu : a].reshape(markers, 24), every[a:b].reshape(loads, 6),
+            every[b:c].reshape(wheels, 6), every[c : c + 4], every[c + 4 :], every,
+        )  # fmt: skip
 
-    def _evaluation(
-        self, rates: Real, drive: Real, markers: Real, loads: Real, wheel_loads: Real, energy: Real, momentum: Real
-    ) -> Evaluation:
+    def _evaluation(self, t: float, drive: Real, out: _Outputs) -> Evaluation:
+        finite_result(out.every, t)
         return Evaluation(
-            accelerations=rates,
+            accelerations=out.rates,
             markers={
                 name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
-                for name, row in zip(self._markers, markers, strict=True)
+                for name, row in zip(self._markers, out.markers, strict=True)
             },
-            loads=self._by_hinge(loads),
-            wheel_loads=dict(zip(self._wheel_names, wheel_loads, strict=True)),
+            loads=self._by_hinge(out.loads),
+            wheel_loads=dict(zip(self._wheel_names, out.wheel_loads, strict=True)),
             drives=self._drives(drive),
-            energy=dict(zip(ENERGIES, energy.tolist(), strict=True)),
-            momentum=momentum,
+            energy=dict(zip(ENERGIES, out.energy.tolist(), strict=True)),
+            momentum=out.momentum,
         )
 
     @property
@@ -296,10 +329,11 @@ def compile(scene: s.Scene, elimination: Elimination = "fastest") -> System:  # 
 
     elimination: how the recursion eliminates the modes of each body, (63) of Jain & Rodriguez: "explicit" factorises
     D_f, "woodbury" is their (B3), corrected, "condensed" costs O(n_m); where one does not apply, D_f is factorised.
-    All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen.
+    All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen. Scenes
+    with closures factorise D_f whatever is asked for.
 
-    Raises SceneError for a scene that is wrong, NotImplementedError for one that is right but needs what is not
-    supported yet (SID files).
+    Raises SceneError for a scene that is wrong, ValueError for an elimination that does not exist, NotImplementedError
+    for a scene that is right but needs what is not supported yet (SID files).
     """
     check_scene(scene)
     return assembled(scene, elimination)
@@ -307,6 +341,8 @@ def compile(scene: s.Scene, elimination: Elimination = "fastest") -> System:  # 
 
 def assembled(scene: s.Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that was checked before."""
+    if elimination not in get_args(Elimination):
+        raise ValueError(f"elimination is {elimination!r}: use one of {', '.join(map(repr, get_args(Elimination)))}")
     if scene.closures:
         from flexmb.closed_system import ClosedSystem  # a tree needs none of it
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexmb import arguments
 from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
@@ -154,6 +155,7 @@ def prepare(
     scene: Scene, tolerance: float, quantity: str | Quantity | Sequence[str | Quantity] | None, t_end: float
 ) -> Prepared:
     """Check the question, run the rigid scene, predict. Raises as `advise` does."""
+    t_end, tolerance = arguments.number("t_end", t_end), arguments.number("tolerance", tolerance)
     check_scene(scene, t_end)
     if not 0.0 < tolerance < 1.0:
         raise ValueError(f"the tolerance is {tolerance:g}: give a part of one, such as 1e-3")

@@ -17,6 +17,7 @@ from flexmb.frisch.tables import NestedWorkspace, workspace
 from flexmb.links import Link, links
 from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene.schema import Scene
+from flexmb.state import Layout, finite_result
 
 
 @dataclass(frozen=True)
@@ -92,38 +93,41 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     chain = links(scene)
     numbering = Numbering(chain, wheels_by_body(scene))
     constants, _, _ = assemble(scene, chain, numbering, null_partitions)
-    return NestedSystem(constants, chain, numbering.nq, errata, null_partitions)
+    return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
 
 class NestedSystem:
-    """The equations of one scene. It owns one workspace: threads must not share it."""
+    """The equations of one scene. It owns one workspace: threads must not share it.
+
+    y = [q, u, work]: ValueError or TypeError for what does not fit, DynamicsError where numbers overflow.
+    """
 
     def __init__(
         self,
         constants: Constants,
         chain: list[Link],
-        nq: int,
+        layout: Layout,
         errata: Set[Erratum] = CORRECTED,
         null_partitions: bool = False,
     ) -> None:
         """`errata` of the print are kept; `null_partitions`: see `flexmb.frisch.constants.nested_constants`."""
         self.constants = nested_constants(constants, chain, errata, null_partitions)
-        self._nq = nq
+        self._layout = layout
         self._w = self.workspace()
 
     def workspace(self) -> NestedWorkspace:
         """A fresh workspace for the right-hand side; one per thread."""
-        return workspace(self.constants, self._nq)
+        return workspace(self.constants, self._layout.nq)
 
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
         """Status code and udot (nu,) at y = [q, u, work]."""
-        status = evaluation.accelerations(t, y, self.constants, self._w)
+        status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self._w)
         return status, self._w.speed["acceleration"].copy()
 
     def motion(self, t: float, y: Real) -> tuple[int, Motion]:
         """Status code, and accelerations with everything the suppressed rows give."""
         w = self._w
-        status = evaluation.loads(t, y, self.constants, w)
+        status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
         return status, Motion(w.speed["acceleration"].copy(), drives, w.nest["load"].copy(), w.wheel["torque"].copy())
 
@@ -134,12 +138,14 @@ class NestedSystem:
 
     def reduced(self, t: float, y: Real) -> tuple[Real, Real]:
         """Matrix (nu,nu) and right side (nu,) of (136)."""
+        t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, self.constants, self._w)
-        return self._w.M.copy(), self._w.right.copy()
+        return finite_result(self._w.M.copy(), t), finite_result(self._w.right.copy(), t)
 
     def partitions(self, t: float, y: Real) -> Partitions:
         """The named blocks of (111) at y."""
         motion = self.relative_motion(t, y)
+        finite_result(self._w.Z, t), finite_result(self._w.eta, t)
         first, wheels, modes, last = self._rows()
         rows = np.concatenate([first, wheels, modes, last])
         Z, eta = self._w.Z, self._w.eta
@@ -160,7 +166,9 @@ class NestedSystem:
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
         """Motion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
         w, c = self._w, self.constants
+        t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, c, w)
+        finite_result(w.x, t)
         S = np.zeros((len(w.x), len(c.column)))
         for j, column in enumerate(c.column):
             entries = slice(column["start"], column["stop"])

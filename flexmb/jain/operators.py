@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
+from flexmb import arguments
 from flexmb.dense.profiles import profile
 from flexmb.dense.system import DenseSystem, Snapshot
 from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
@@ -69,15 +70,16 @@ class Operators:
 
     def alpha_m(self, chi_dot: Array) -> Array:
         """Modal spatial accelerations (nbar,) (26)."""
-        return self.Phi.T @ (self.H.T @ chi_dot + self.a_m)
+        return arguments.representable(self.Phi.T @ (self.H.T @ self._speeds("chi_dot", chi_dot) + self.a_m))
 
     def f_m(self, chi_dot: Array) -> Array:
         """Modal spatial forces (nbar,) between each body and its parent (40)."""
-        return self.Phi @ (self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation)
+        forces = self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation
+        return arguments.representable(self.Phi @ forces)
 
     def inverse_dynamics(self, chi_dot: Array) -> Array:
         """T (n,) (41)."""
-        return self.H @ self.f_m(chi_dot)
+        return arguments.representable(self.H @ self.f_m(chi_dot))
 
     @cached_property
     def M(self) -> Array:
@@ -180,16 +182,20 @@ class Operators:
 
     def accelerations(self, T: Array) -> Array:
         """chi_dot (n,) for generalised forces T (n,), all of them free: Lemma 5 (57)."""
+        T = self._speeds("T", T)
         forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
         innovation = T - self.H @ (self.Psi @ forces)
         chi_dot = self.innovations_inverse.T @ (self.D_inverse @ innovation)
-        return chi_dot - self.K.T @ (self.Psi.T @ self.a_m)
+        return arguments.representable(chi_dot - self.K.T @ (self.Psi.T @ self.a_m))
 
     def driven(self, prescribed: NDArray[np.bool_], rates: Array) -> Operators:
         """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.
 
         The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds; V_m stays.
         """
+        rates, prescribed = self._speeds("rates", rates), np.asarray(prescribed)
+        if prescribed.shape != rates.shape or prescribed.dtype != bool:
+            raise ValueError(f"prescribed: {len(rates)} booleans are needed, got {prescribed.dtype} {prescribed.shape}")
         place = np.cumsum(~prescribed) - 1
         return replace(
             self,
@@ -198,6 +204,10 @@ class Operators:
             chi=self.chi[~prescribed],
             a_m=self.a_m + self.H[prescribed].T @ rates[prescribed],
         )
+
+    def _speeds(self, name: str, values: Array) -> Array:
+        """(n,) finite numbers; ValueError or TypeError for others."""
+        return arguments.finite(name, arguments.vector(name, values, len(self.H)))
 
     def _resolvent(self, E: Array) -> Array:
         """(1 - E)^-1 = 1 + E + E^2 + ... of a nilpotent E with one block in each body's columns, that of its parent."""

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
+from flexmb import arguments
 from flexmb.arrays import Real
 from flexmb.linear.model import Complex, LinearModel, Stability
 from flexmb.linear.spin import steady_spin
@@ -71,7 +72,9 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     """
     if isinstance(system, Scene):
         system = compile(system)
-    rates = np.atleast_1d(np.asarray(rates, float))
+    rates = arguments.finite("rates", np.atleast_1d(arguments.array("rates", rates))).copy()
+    if rates.ndim != 1 or not len(rates):
+        raise ValueError(f"rates: give at least one, in a row, not an array of shape {rates.shape}")
     guess: State | None = None
     values: list[Complex] = []
     macs: list[Real] = []

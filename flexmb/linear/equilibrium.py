@@ -8,15 +8,17 @@ motion leads on.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.linalg import solve_triangular
 
 from flexmb.arrays import Index, Real
 from flexmb.linear.linearize import displacement_names
-from flexmb.linear.variations import Equations, Variations
+from flexmb.linear.variations import Equations, Variations, entering
 from flexmb.scene.schema import Scene
 from flexmb.state import DynamicsError, State
-from flexmb.system import System, compile
+from flexmb.system import System
 
 CONVERGED = 1e-12  # last correction, part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
 RESIDUAL = 1e-9  # acceleration left, part of that at the start
@@ -38,13 +40,11 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
 
     All speeds are zero; prescribed coordinates, motors and loads keep the values their functions have at the guess's
     time. Wheels without springs stay at their angles. Stable or not: `linearize(..., held=True)` tells.
-    Raises EquilibriumError where none is found, NotImplementedError for closed chains.
+    Raises EquilibriumError where none is found, NotImplementedError for closed chains, ValueError or TypeError for a
+    guess that is not a state of this system.
     """
-    if isinstance(system, Scene):
-        system = compile(system)
-    equations = Equations(system)  # before all else: it refuses closed chains
-    guess = system.initial_state if guess is None else guess
-    return balanced(equations.held(guess.t), State(guess.q, np.zeros(system.nu), guess.t))
+    equations, guess = entering(system, guess)
+    return balanced(equations.held(guess.t), replace(guess, u=np.zeros_like(guess.u)))
 
 
 def balanced(equations: Equations, guess: State) -> State:
@@ -172,8 +172,8 @@ def _damped(equations: Equations, now: _Linearised) -> State | None:
     """After the longest of the steps 1, 1/2, 1/4 ..., LONGEST at most, whose simplified correction is shorter."""
     factor = longest = min(1.0, LONGEST * now.scale / now.length)
     while factor >= SMALLEST * longest:
-        moved = equations.moved(now.at, factor * now.step)
         try:
+            moved = equations.moved(now.at, factor * now.step)
             if now.correction(equations.rates(moved))[1] <= (1.0 - 0.25 * factor) * now.length:
                 return moved
         except DynamicsError:

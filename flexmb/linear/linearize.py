@@ -8,10 +8,10 @@ from flexmb.arrays import Real
 from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.labels import state_names
 from flexmb.linear.model import LinearModel
-from flexmb.linear.variations import Equations
+from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
-from flexmb.state import State
-from flexmb.system import System, compile
+from flexmb.state import DynamicsError, State
+from flexmb.system import System
 
 _ROTATION = tuple((f"rotation.{axis}", "rad") for axis in "xyz")
 _POSITION = tuple((f"position.{axis}", "m") for axis in "xyz")
@@ -23,12 +23,10 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
     Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
     state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` is what is left.
-    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains.
+    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains, ValueError or
+    TypeError for what is not a state of this system.
     """
-    if isinstance(system, Scene):
-        system = compile(system)
-    equations = Equations(system)  # before all else: it refuses closed chains
-    state = system.initial_state if state is None else state
+    equations, state = entering(system, state)
     return linear_model(equations.held(state.t) if held else equations, state)
 
 
@@ -44,6 +42,8 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     B[n:] = np.linalg.solve(mass, np.eye(n)[:, driven])
     markers, C = _markers(equations, state)
     states = (*zip(names, units, strict=True), *speeds)
+    if not all(np.isfinite(part).all() for part in (at.A, at.drift, at.rates)):
+        raise DynamicsError("derivatives are not finite: coordinates or speeds are so large that products overflow")
     return LinearModel(
         scene=system.scene.name, state=state, states=states,
         inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven), outputs=(*states, *markers),

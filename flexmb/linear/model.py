@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, Literal
@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
+from flexmb import arguments
 from flexmb.arrays import Real
 from flexmb.state import State
 
@@ -129,28 +130,33 @@ class LinearModel:
         """Response (W, outputs) of all, or the named, outputs to a unit harmonic load at each omega (rad/s).
 
         (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names that do not exist,
-        ValueError at an undamped resonance.
+        ValueError at an undamped resonance and for frequencies that are not finite, TypeError for what is no number.
         """
         b = self.B[:, _place(self.inputs, input, "input")]
         rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
-        frequencies = np.atleast_1d(np.asarray(omega, float))
+        frequencies = arguments.finite("omega", np.atleast_1d(arguments.array("omega", omega)))
+        if frequencies.ndim != 1:
+            raise ValueError(f"omega: give frequencies in a row, not an array of shape {frequencies.shape}")
         out, unit = np.empty((len(frequencies), len(rows)), complex), np.eye(len(self.A))
         for i, frequency in enumerate(frequencies):
             try:
                 out[i] = self.C[rows] @ np.linalg.solve(1j * frequency * unit - self.A, b)
             except np.linalg.LinAlgError:
-                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite") from None
+                out[i] = np.inf
+            if not np.isfinite(out[i]).all():
+                raise ValueError(f"omega = {frequency:g} rad/s is an undamped resonance: nothing is finite")
         return out
 
     def marker_shape(self, mode: Mode, marker: str) -> Complex:
         """Displacement and rotation vector (6,) of a marker, World axes, in a mode as `Mode.shape` scales it."""
         first = _place(self.outputs, f"{marker}.x", "output")
-        return self.C[first : first + 6, : len(self.rates)] @ mode.shape
+        return self.C[first : first + 6, : len(self.rates)] @ self._shape(mode)
 
     def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
         """The state displaced along a mode, its largest displacement `size` (rad, m), for display; `phase` in rad."""
-        xi = np.real(mode.shape * size * np.exp(1j * phase))
-        return State(self.state.q + self.motion @ xi, self.state.u.copy(), self.state.t)
+        size, phase = arguments.number("size", size), arguments.number("phase", phase)
+        xi = np.real(self._shape(mode) * size * np.exp(1j * phase))
+        return replace(self.state, q=self.state.q + self.motion @ xi)
 
     def to_scipy(self) -> Any:
         """As `scipy.signal.StateSpace`."""
@@ -184,6 +190,13 @@ class LinearModel:
             cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
             savemat(path, data | cells)
         return path
+
+    def _shape(self, mode: Mode) -> Complex:
+        if not isinstance(mode, Mode):
+            raise TypeError(f"a Mode of this model is needed, not {type(mode).__name__}: see `modes`")
+        if mode.shape.shape != self.rates.shape:
+            raise ValueError(f"the mode has {len(mode.shape)} displacements, this model {len(self.rates)}")
+        return mode.shape
 
     @cached_property
     def _decomposition(self) -> tuple[Complex, Complex, Real]:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from flexmb import arguments
 from flexmb.linear.equilibrium import balanced
 from flexmb.linear.linearize import linear_model
 from flexmb.linear.model import LinearModel
-from flexmb.linear.variations import Equations
+from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Revolute, Scene
 from flexmb.state import State
-from flexmb.system import System, compile
+from flexmb.system import System
 
 DEPENDENT = 1e-9  # change of the accelerations with the angle, part of their derivatives' size
 
@@ -39,16 +40,14 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     the motion of what turns depends on the angle (gravity across the axis, loads in World axes): there is no steady
     spin. EquilibriumError where no deformation is found.
     """
-    if isinstance(system, Scene):
-        system = compile(system)
-    base = Equations(system)  # before all else: it refuses closed chains
-    guess = system.initial_state if guess is None else guess
+    base, guess = entering(system, guess)
+    system, rate = base.system, arguments.number("rate", rate)
     speed = _turning(system, hinge)
     equations = base.spinning(speed, rate, guess)
     u = np.zeros(system.nu)
     for wheel in system.scene.wheels:
         u[system.speed(wheel.name)] = guess.u[system.speed(wheel.name)]
-    state = balanced(equations, State(guess.q, u, guess.t))
+    state = balanced(equations, replace(guess, u=u))
     at = equations.variations(state)
     size = np.sum(np.abs(at.by_displacement), axis=1) + rate**2
     if np.any(np.abs(at.drift) > DEPENDENT * abs(rate) * size):

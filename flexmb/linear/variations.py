@@ -22,9 +22,10 @@ from flexmb.closed_system import ClosedSystem
 from flexmb.functions import pack as pack_functions
 from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.scene.functions import Constant, Function, Ramp
+from flexmb.scene.schema import Scene
 from flexmb.state import DynamicsError, State, pack
 from flexmb.status import OK, Status
-from flexmb.system import System
+from flexmb.system import System, compile
 from flexmb.tangent import jacobian, tangent_workspace, time_derivative
 
 
@@ -114,17 +115,19 @@ class Equations:
         )  # fmt: skip
 
     def moved(self, at: Variations, xi: Real) -> State:
-        """The state displaced by xi (n,) to first order, then put back where quaternions are unit."""
+        """The state displaced by xi (n,) to first order, then put back where quaternions are unit; DynamicsError."""
         y = pack(at.state)
         y[: self.system.nq] += at.motion @ xi
         self.system.project(at.state.t, y, self.constants)
-        return State(y[: self.system.nq], y[self.system.nq : -1], at.state.t)
+        if not np.isfinite(y).all():
+            raise DynamicsError("a displacement led beyond all numbers")
+        return State(y[: self.system.nq], y[self.system.nq : -1], at.state.t, self.system.layout)
 
     def on_functions(self, state: State) -> State:
         """The state with prescribed coordinates and speeds as their functions have them at its time."""
         y = pack(state)
         self.system.project(state.t, y, self.constants)
-        return State(y[: self.system.nq], y[self.system.nq : -1], state.t)
+        return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
 
     def _transport(self, u: Real) -> Real:
         """(nu,nu) of xi' = du + transport xi: carried axes turn with their own angular velocity."""
@@ -144,6 +147,20 @@ class Equations:
         if status != OK:
             place = self.system.fault_name(status, int(fault))
             raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+
+
+def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
+    """What a linear model is made of: the equations of a tree or its scene, and a state of it (default: initial).
+
+    NotImplementedError for closed chains, ValueError or TypeError for a state that is not one of this system.
+    """
+    if not isinstance(system, System | Scene):
+        raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
+    equations = Equations(system if isinstance(system, System) else compile(system))
+    if state is None:
+        return equations, equations.system.initial_state
+    equations.system.layout.entering(state)
+    return equations, state
 
 
 def _cross(v: Real) -> Real:

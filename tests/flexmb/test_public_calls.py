@@ -1,0 +1,68 @@
+"""Public calls with wrong arguments: no crash, no silent nonsense. In a process of their own, for they did crash."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.flexmb import public_calls
+from tests.flexmb.public_calls import Call, Variant, W, faults, rows
+
+
+def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
+    """All variants of all arguments of all public calls; a crash names its place by faulthandler."""
+    program = [sys.executable, "-m", "tests.flexmb.public_calls"]
+    done = subprocess.run(program, cwd=Path(__file__).parents[2], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr[-4000:]
+    *found, summary = done.stdout.splitlines()
+    assert not [line for line in found if line], "\n".join(found)
+    assert int(summary.split()[0]) > 2500
+
+
+def test_a_public_name_that_is_not_called_is_found(monkeypatch):
+    monkeypatch.setattr(public_calls.fm.System, "novel", lambda self, x: x, raising=False)
+    assert "System.novel" in public_calls.public()
+    monkeypatch.setattr(public_calls, "calls", dict)
+    assert {"System.novel", "System.accelerations", "NestedSystem.reduced"} <= public_calls.unlisted()
+
+
+@pytest.mark.parametrize(
+    ("function", "variant", "fault"),
+    [
+        (lambda q: 2.0, Variant("short", None), "no error"),
+        (lambda q: float("nan"), Variant("huge", 1e308, open=True), "not finite"),
+        (lambda q: float(q != 1), Variant("integer", 1, 1.5), "another result"),
+        (lambda q: q.nothing, Variant("None", None), "AttributeError"),
+    ],
+)
+def test_faults_are_seen(function, variant, fault):
+    """Negative controls: calls that swallow, overflow, mistake types, or end in an error of another kind."""
+    quiet = Call(lambda q: 1.0 if isinstance(q, str) else function(q), {"q": "sound"}, {"q": lambda _: [variant]})
+    found = list(faults("call", quiet))
+    assert len(found) == 1 and fault in found[0]
+
+
+def test_a_state_made_by_hand_shares_nothing_with_its_arrays():
+    q = W.state.q.copy()
+    state = public_calls.fm.State(q, W.state.u)
+    q[:] = 0.0
+    assert state.q[0] != 0.0
+    assert any(variant.name == "column" for variant in rows(q))
+
+
+def test_numbers_written_into_a_state_are_seen():
+    state = W.tree.initial_state
+    before = W.tree.accelerations(state)
+    state.u[:] = 0.5
+    assert not (before == W.tree.accelerations(state)).all()
+
+
+@pytest.mark.parametrize("t", [0, 1])
+def test_an_integer_time_compiles_nothing(t):
+    from flexmb import dynamics
+
+    W.tree.evaluate(0.0, W.state.q, W.state.u)
+    versions = len(dynamics.observe.signatures)
+    W.tree.evaluate(t, W.state.q, W.state.u)
+    assert len(dynamics.observe.signatures) == versions
