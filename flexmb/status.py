@@ -53,8 +53,8 @@ _ADVICE = {
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
     Status.BRANCH_UNKNOWN: (
-        "closure {body} went through a singular position, or close to one in too long a step: there the mechanism can go "
-        "on along more than one branch, and which one it takes is not known; use a shorter step, end the run before "
+        "closure {body} went through a singular position, or close to one in too long a step: there the mechanism can "
+        "go on along more than one branch, and which one it takes is not known; use a shorter step, end the run before "
         "that position, or give a body flexibility"
     ),
     Status.NOT_CONVERGED: (
