@@ -54,8 +54,9 @@ _ADVICE = {
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
     Status.BRANCH_UNKNOWN: (
-        "closure {body} passed through a singular position: there the mechanism can go on along more than one branch, "
-        "and which one it takes is not known; stop before it, move it off that position, or give a body flexibility"
+        "closure {body} went through a singular position, or close to one in too long a step: there the mechanism can "
+        "go on along more than one branch, and which one it takes is not known; use a shorter step, end the run before "
+        "that position, or give a body flexibility"
     ),
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "

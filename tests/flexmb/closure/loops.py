@@ -77,7 +77,8 @@ def _body(rng: Generator, name: str) -> s.RigidBody:
     mass = float(rng.uniform(0.5, 2.0))
     tensor = trees.matrix(trees.inertia(rng, mass, 0.6))
     corner = s.Node(name="corner", position_m=tuple(trees.vector(rng, 0.5)), quaternion=tuple(trees.quaternion(rng)))
-    return s.RigidBody(name=name, mass_kg=mass, com_m=tuple(trees.vector(rng, 0.2)), inertia_kg_m2=tensor, nodes=(corner,))
+    com = tuple(trees.vector(rng, 0.2))
+    return s.RigidBody(name=name, mass_kg=mass, com_m=com, inertia_kg_m2=tensor, nodes=(corner,))
 
 
 def _joint(rng: Generator, name: str, parent: str, child: str) -> dict:
@@ -118,9 +119,10 @@ def _closure(
 
 def parallel(name: str, kind: str, hinge: s.Hinge, scene: s.Scene) -> s.Closure:
     """A closure between the frames of a hinge."""
+    z = (0.0, 0.0, 1.0)
     return s.Closure(
         name=name, type=kind, body_a=hinge.parent, node_a=hinge.parent_node, position_a_m=hinge.parent_position_m,
         quaternion_a=hinge.parent_quaternion, body_b=hinge.child, node_b=hinge.child_node,
         position_b_m=hinge.child_position_m, quaternion_b=hinge.child_quaternion,
-        axis=getattr(hinge, "axis", (0.0, 0.0, 1.0)) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0),
+        axis=getattr(hinge, "axis", z) if kind in ("revolute", "prismatic", "cylindrical") else z,
     )  # fmt: skip

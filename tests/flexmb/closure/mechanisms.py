@@ -146,8 +146,8 @@ def tilted_four_bar(*, flexible: bool, drive: s.Function | None, tilt: float = n
 def windows(count: int, speed: float, gravity: float = -9.81) -> s.Scene:
     """`count` four-bars in a row that share their uprights: A02 of the IFToMM library of benchmark problems.
 
-    Uniform bars of 1 m and 1 kg, upright at the start, the upper ones moving at `speed` (m/s) along x. All uprights stay
-    parallel: T = 1/2 ((count + 1)/3 + count) turn'^2. Twice a turn all bars lie on one line.
+    Uniform bars of 1 m and 1 kg, upright at the start, the upper ones moving at `speed` (m/s) along x. All uprights
+    stay parallel: T = 1/2 ((count + 1)/3 + count) turn'^2. Twice a turn all bars lie on one line.
     """
     scene = SceneBuilder("windows", gravity=(0.0, gravity, 0.0))
     inertia, nodes = (1e-6, 1.0 / 12.0, 1.0 / 12.0), {"tip": (1.0, 0.0, 0.0)}

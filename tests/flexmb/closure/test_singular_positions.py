@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 import flexmb
+from flexmb.closure.branch import turned_over
 from flexmb.status import Status
 from tests.flexmb.closure import mechanisms as m
 
@@ -89,3 +92,20 @@ def test_as_many_modes_across_the_plane_as_rows_make_a_loop_singular():
     run = flexmb.simulate(m.four_bar(modes=2), 0.5)
     assert run.status in LOST and run.stopped_at == pytest.approx(0.1318, abs=1e-3)
     assert flexmb.simulate(m.four_bar(modes=2, closure="spherical"), 0.5).finished
+
+
+@pytest.mark.parametrize("turned", [0.0, 0.4, 0.6, 1.0])
+@pytest.mark.parametrize("row", [0, 1])
+def test_what_has_turned_over(row, turned):
+    """The judge by itself: 60 degrees are the limit, and what is not a number is not the same branch."""
+
+    def found(basis: np.ndarray) -> int:
+        cw = SimpleNamespace(basis=basis, former=np.eye(2, 3), rank=[2], chosen=[4, 7])
+        return int(turned_over.py_func(cw))
+
+    basis, angle = np.eye(2, 3), np.radians(59.0 + 2.0 * turned)
+    basis[row] = np.cos(angle) * basis[row] + np.sin(angle) * np.array([0.0, 0.0, 1.0])
+    assert found(basis) == (-1 if angle < np.radians(60.0) else [4, 7][row])
+    assert found(-np.eye(2, 3)) == 4
+    basis[row] = np.nan
+    assert found(basis) == [4, 7][row]
