@@ -89,7 +89,7 @@ def load_case(folder: Path) -> Case:
             missing = f'variant "{variant.name}" needs {variant.scene}, which is not there'
             raise CaseError(f"{folder / 'run.toml'}: {missing}")
     accepted: Accepted = {}
-    if (folder / ACCEPTED).is_file():
+    if _present(folder / ACCEPTED):
         accepted = _read(folder / ACCEPTED, Accepted)
         try:
             check_accepted(accepted, run)

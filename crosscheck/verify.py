@@ -6,6 +6,7 @@ import csv
 import io
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import msgspec
 import numpy as np
@@ -14,13 +15,12 @@ from numpy.typing import NDArray
 from crosscheck.case import RunFile, Variant
 from crosscheck.causes import likely_cause
 from crosscheck.columns import LOAD_GROUPS, MARKER_GROUPS, Columns, VerifyError, read_columns
-from crosscheck.execute import execute
 from crosscheck.library import Case
-from crosscheck.plan import MAIN, plan, sample_times, variant_scene
-from crosscheck.records import RunRecord
+from crosscheck.plan import MAIN, sample_times, variant_scene
+from crosscheck.records import read
 from crosscheck.report.outcome import Outcome
 from crosscheck.results import Result, collect
-from crosscheck.sweep import PROVIDER
+from crosscheck.sweep import PROVIDER, sweep
 from crosscheck.uncertainty import Rung, Uncertainty, estimate
 from crosscheck.verdict import Finding, Signal, Verdict, compare
 from flexmb.channels import distance, matches, signal_range
@@ -103,7 +103,7 @@ def _variant(case: Case, name: str | None) -> Variant:
 
 
 def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Result:
-    """The engine's result on the variant, run here and now."""
+    """The engine's result on the variant, run now, in a worker: what hangs or ends its process gives no reference."""
     run = msgspec.structs.replace(
         case.run,
         variants=(msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None),),
@@ -112,10 +112,10 @@ def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Resu
         conservations=(),
         charts=(),
     )
-    record, (job,) = plan(replace(case, run=run), (), provider)
-    runs: list[RunRecord] = []
-    execute(job, lambda event: runs.append(event) if isinstance(event, RunRecord) else None)
-    (results,) = collect([record, *runs]).cases
+    with TemporaryDirectory() as folder:
+        records = Path(folder) / "records.jsonl"
+        sweep((replace(case, run=run),), (), records, workers=1, provider=provider)
+        (results,) = collect(read(records)).cases
     result = results.get(variant.name, engine, MAIN)
     if result.status != "finished":
         raise VerifyError(f"the reference, {engine} on {variant.name}, is not there: {result.status}: {result.message}")

@@ -238,3 +238,12 @@ def test_the_command_shows_a_table_with_the_cause(tmp_path: Path) -> None:
     assert "(mm, say)" in checked.details["marker:tip.position"].cause
     assert checked.details["load:pivot.force"].cause == ""
     assert 0.0 < checked.details["marker:tip.position"].worst_s <= 4.0
+
+
+def test_an_engine_that_ends_its_process_is_no_reference(tmp_path: Path) -> None:
+    """Such an engine ended the command with its own exit code, which can be 0."""
+    case = load_case(CASE)
+    csv = tmp_path / "my.csv"
+    csv.write_text("t,tip.px,tip.py,tip.pz\n" + "".join(f"{t!r},0,0,0\n" for t in np.linspace(0.0, 4.0, 81).tolist()))
+    with pytest.raises(VerifyError, match="crasher .* is not there: crashed"):
+        verify_csv(case, csv, engine="crasher", provider=PROVIDER)

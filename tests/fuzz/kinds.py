@@ -42,6 +42,10 @@ from tests.fuzz import mutate
 
 TIMES = np.linspace(0.0, 1.0, 6)
 SHIPPED = Path(__file__).resolve().parents[2] / "cases"
+ACCEPTED = b"""["rigid, all engines"]
+"energy.total | fine (rigid) | stepper (rigid)" = { E = 3.0e-11 }
+"marker:tip.position | fine (rigid) | stepper (rigid)" = { E = 1.2e-9, U = 4.5e-8 }
+"""
 Accept = Callable[[Path], "str | None"]
 
 
@@ -74,6 +78,7 @@ def kinds(folder: Path) -> dict[str, Kind]:
         "scene": Kind("scene.toml", _scenes(), toml, (SceneError,), _scene, 'scene "'),
         "run file": Kind("run.toml", (run, *runs), toml, (CaseError,), case),
         "provenance": Kind("provenance.toml", grounds, toml, (CaseError,), case),
+        "accepted figures": Kind("accepted.toml", (ACCEPTED,), toml, (CaseError,), _accepted),
         "readme": Kind("README.md", ((CASE / "README.md").read_bytes(),), mutate.BYTES, (CaseError,), case),
         "verify csv": Kind("my.csv", (_csv(),), table, (VerifyError,), _csv_file),
         "trajectory csv": Kind("trajectory.csv", (_trajectory(),), table, (VerifyError,), _csv_file),
@@ -174,6 +179,13 @@ def _case(folder: Path) -> str | None:
         return wrong or "the provenance is there and was not read"
     ground = _toml(folder / "provenance.toml")
     return wrong or _differs(ground, msgspec.to_builtins(case.provenance))
+
+
+def _accepted(path: Path) -> str | None:
+    wrong = _case(path.parent)
+    value = msgspec.to_builtins(load_case(path.parent).accepted)
+    negative = any(isinstance(leaf, int | float) and leaf < 0 for _, leaf in _leaves(value))
+    return wrong or _differs(_toml(path), value) or _not_finite(value) or ("a figure is negative" if negative else None)
 
 
 def _toml(path: Path) -> Any:
