@@ -46,7 +46,7 @@ def check(seed: int) -> None:
         # what is left of the tree's equations is a load of closures, and the least of these is what they report
         missing = dense.M @ rates - dense.right
         size = np.max(np.abs(dense.M) @ np.abs(rates) + np.abs(dense.right))
-        assert np.max(np.abs(Vt[rank:] @ missing), initial=0.0) <= bound * size
+        assert np.max(np.abs(Vt[rank:] @ missing), initial=0.0) <= bound * size * condition  # of Vt itself
         least = U[:, :rank] @ (Vt[:rank] @ missing / values[:rank])
         for closure in scene.closures:
             expected = wrench[closure.name] @ least
