@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -11,10 +11,9 @@ from crosscheck.case import Comparison, Conservation, Control, Side
 from crosscheck.expectation import outside
 from crosscheck.patterns import most_specific
 from crosscheck.results import CaseResults, Result
-from crosscheck.verdict import Finding, Status, Verdict, compare, conserve
+from crosscheck.verdict import GRAVITY, Finding, Status, Verdict, compare, conserve
 from flexmb.channels import matches, norms
 
-MISSING: tuple[Status, ...] = ("did not run", "crashed", "did not finish", "failed", "diverged", "refused")
 MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
 TRUE_MODEL = "conservation law"
 
@@ -43,22 +42,36 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         yield _verdict(
             case, item.name, "comparison", channel, item.a, item.b, item.expect, item.reason, goal, finding, beyond
         )
-    yield from _unused(case, item, a, b)
+    if _missing(a, b) is None:
+        patterns = {"scale": item.scales, "band": item.band}
+        for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(case, item, a, b)):
+            yield _verdict(
+                case, item.name, "comparison", pattern, item.a, item.b, item.expect, item.reason, 0.0, finding,
+                finding.reason,
+            )  # fmt: skip
 
 
-def _unused(case: CaseResults, item: Comparison, a: Result, b: Result) -> Iterator[Verdict]:
+def _unused(
+    goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
+) -> Iterator[tuple[str, Finding]]:
     """Scales and bands whose pattern names no channel that is judged: misspelt, they would be left out in silence."""
-    judged = [name for name in _union(a.channels, b.channels) if most_specific(item.goals, name) is not None]
-    if _missing(a, b) is not None or not judged:
-        return
-    for what, patterns in (("scale", item.scales), ("band", item.band)):
-        for pattern in patterns:
+    judged = [name for name in _union(a.channels, b.channels) if most_specific(goals, name) is not None]
+    for what, patterns in given.items():
+        for pattern in patterns if judged else ():
             if not any(matches(pattern, name) for name in judged):
-                finding = Finding("unresolved", f'a {what} is given for "{pattern}", which is no channel judged here')
-                yield _verdict(
-                    case, item.name, "comparison", pattern, item.a, item.b, item.expect, item.reason, 0.0, finding,
-                    finding.reason,
-                )  # fmt: skip
+                text = f'a {what} is given for "{pattern}", which is no channel judged here'
+                yield pattern, Finding("unresolved", text)
+
+
+def _vanished(case: CaseResults, item: Comparison, a: Result, b: Result) -> Iterator[tuple[str, Finding]]:
+    """Channels with accepted figures that nobody offers any more, and kinds of energy that only one still does."""
+    judged = {channel for channel, _, _ in _channels(item.goals, a, b)}
+    for place in case.case.accepted.get(item.name, {}):
+        channel = place.partition(" | ")[0]
+        ours = place == key(channel, (item.a.engine, item.a.variant), (item.b.engine, item.b.variant))
+        if ours and channel not in judged:
+            why = "it has accepted figures and is not judged any more: take them out of accepted.toml if that is meant"
+            yield channel, Finding("did not run", why)
 
 
 def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
@@ -74,6 +87,9 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
             signal = faulty.control_signal(channel, twin, across)
             finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
         yield _verdict(case, item.name, "control", channel, item.a, item.b, "differ", why, goal, finding)
+    if _missing(faulty, b) is None:
+        for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b):
+            yield _verdict(case, item.name, "control", pattern, item.a, item.b, "differ", why, 0.0, finding)
 
 
 def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict:
@@ -145,7 +161,7 @@ def _missing(*results: Result) -> Finding | None:
     endings = [result.ending for result in results if result.status != "finished"]
     if not endings:
         return None
-    worst = min(endings, key=lambda ending: MISSING.index(ending.status))
+    worst = min(endings, key=lambda ending: GRAVITY.index(ending.status))
     return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
 
 

@@ -41,6 +41,10 @@ Status = Literal[
     "did not run",
 ]
 STATUSES: tuple[Status, ...] = get_args(Status)
+# The gravest first: what stands for several.
+GRAVITY: tuple[Status, ...] = (
+    "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
+)  # fmt: skip
 NEVER_EXPECTED = ("did not finish", "crashed", "did not run")
 WHOLE_RANGE = 1.0  # a goal beyond it resolves nothing
 
@@ -72,6 +76,11 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     outside: str = ""
     accepted: Figure | None = None
     worse: str = ""
+
+    @property
+    def sides(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Variant and engine of its two sides."""
+        return (self.variant_a, self.engine_a), (self.variant_b, self.engine_b)
 
     @property
     def ok(self) -> bool:

@@ -28,9 +28,9 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
         where = f"{worst.case}, {worst.comparison}, {pair(worst)}, {channels}"
         text = f"{worst.status}, expected {worst.expected}: {worst.reason}"
         console.print(marked("✕", "red", f"{where}: {text}"), soft_wrap=True)
-    for each in outcome.not_run:
+    for each in outcome.lost:
         where = f"{each.case}, {each.variant}, {each.engine}"
-        console.print(marked("–", "yellow", f"{where} did not run: {each.reason}"), soft_wrap=True)
+        console.print(marked("–", "yellow", f"{where} {each.status}: {each.reason}"), soft_wrap=True)
     for verdict in outcome.worse[:SHOWN]:
         console.print(marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}"), soft_wrap=True)
     for verdict in outcome.unrecorded[:SHOWN] if outcome.strict else ():

@@ -95,7 +95,7 @@ def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, An
         "summary": _first_paragraph(record.readme),
         "provenance": record.provenance,
         "variants": [_variant_view(case, variant) for variant in record.run.variants],
-        "ok": all(verdict.ok for verdict in verdicts) and not any(a.case == record.case for a in outcome.not_run),
+        "ok": all(verdict.ok for verdict in verdicts) and not any(a.case == record.case for a in outcome.lost),
         "tables": comparison_tables(verdicts),
         "conservation": conservation_table([verdict for verdict in verdicts if verdict.kind == "conservation"]),
         "controls": control_table([verdict for verdict in verdicts if verdict.kind == "control"]),

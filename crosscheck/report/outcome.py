@@ -14,6 +14,8 @@ from crosscheck.judge import judge
 from crosscheck.results import CaseResults, Session
 from crosscheck.verdict import Verdict
 
+FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked to run
+
 
 @dataclass(frozen=True)
 class Absence:
@@ -60,40 +62,49 @@ class Outcome:
         return [each for each in self.all if each.ok and each.accepted is None and recordable(each, BUILT_IN)]
 
     @property
-    def not_run(self) -> list[Absence]:
-        """What was asked for and did not run at all."""
-        return [absence for absence in self.absences if absence.status == "did not run"]
+    def lost(self) -> list[Absence]:
+        """What was asked for and did not run, or failed where no verdict is there to say so.
+
+        An engine that refuses or diverges has answered: a case that compares it with nothing expects nothing of it.
+        """
+        judged = {(verdict.case, *side) for verdict in self.all for side in verdict.sides}
+        return [
+            each
+            for each in self.absences
+            if each.status == "did not run"
+            or (each.status in FAULTS and (each.case, each.variant, each.engine) not in judged)
+        ]
 
     @property
     def ok(self) -> bool:
         """Every verdict is the expected one, everything asked for ran, nothing is lost, and there was something."""
-        sound = bool(self.all) and not self.unexpected and not self.not_run and not self.broken
+        sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken
         return sound and not (self.strict and (self.worse or self.unrecorded))
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
         if not self.all:
-            return "Nothing was compared" + (f": {self._lost}" if self.broken else "")
+            return "Nothing was compared" + (f": {self._broken}" if self.broken else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
             return f"All {len(self.all)} verdicts are as expected{grown}"
         parts = []
         if self.unexpected:
             parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
-        if self.not_run:
-            runs = "run" if len(self.not_run) == 1 else "runs"
-            parts.append(f"{len(self.not_run)} {runs} asked for did not happen")
+        if self.lost:
+            runs = "run" if len(self.lost) == 1 else "runs"
+            parts.append(f"{len(self.lost)} {runs} asked for gave no result")
         if self.worse:
             parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
         if self.strict and self.unrecorded:
             parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
         if self.broken:
-            parts.append(self._lost)
+            parts.append(self._broken)
         return " and ".join(parts)
 
     @property
-    def _lost(self) -> str:
+    def _broken(self) -> str:
         lines = "line is" if len(self.broken) == 1 else "lines are"
         return f"{len(self.broken)} {lines} no record: what stood there is lost"
 

@@ -47,19 +47,22 @@ def write_summary(outcome: Outcome, file: Path) -> None:
 
 
 def write_junit(outcome: Outcome, file: Path) -> None:
-    """junit.xml: a suite a case, a test case a verdict. What did not run is skipped, and an error beside it.
+    """junit.xml: a suite a case, a test case a verdict, and one that fails for each run that is lost.
+
+    Verdicts that wait for a lost run are skipped: its failure stands for them.
 
     What is worse than recorded says so in its output, and fails where that is asked for.
     """
     suites = ElementTree.Element("testsuites", name="crosscheck")
     for case, verdicts in outcome.verdicts.items():
         suite = ElementTree.SubElement(suites, "testsuite", name=case)
-        tests = [_test(suite, verdict, _complaint(outcome, verdict)) for verdict in verdicts]
-        missing = [each for each in outcome.not_run if each.case == case]
+        missing = [each for each in outcome.lost if each.case == case]
+        gone = {(each.variant, each.engine) for each in missing}
+        tests = [_test(suite, each, _complaint(outcome, each), bool(gone & set(each.sides))) for each in verdicts]
         for each in missing:
             name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
             test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
-            ElementTree.SubElement(test, "failure", type="did not run", message=each.reason)
+            ElementTree.SubElement(test, "failure", type=each.status, message=each.reason)
         suite.set("tests", str(len(tests) + len(missing)))
         suite.set("failures", str(tests.count("failure") + len(missing)))
         suite.set("skipped", str(tests.count("skipped")))
@@ -87,8 +90,8 @@ def _complaint(outcome: Outcome, verdict: Verdict) -> str:
     return "no accepted figures" if verdict.accepted is None and recordable(verdict, BUILT_IN) else ""
 
 
-def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str) -> str:
-    """One test case; returns what it counts as."""
+def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bool) -> str:
+    """One test case; returns what it counts as. `lost`: the failure of a run that it needs is there already."""
     name = f"{verdict.comparison}: {verdict.channel}, {pair(verdict)}"
     test = ElementTree.SubElement(suite, "testcase", classname=f"{verdict.case}.{verdict.kind}", name=name)
     if verdict.ok and verdict.worse:
@@ -98,12 +101,12 @@ def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str) -> str:
         return "failure"
     if verdict.ok:
         return "passed"
-    outcome = "skipped" if verdict.status == "did not run" else "failure"
     text = f"{verdict.status}, expected {verdict.expected}: {verdict.reason}"
-    element = ElementTree.SubElement(test, outcome, message=text)
-    if outcome == "failure":
-        element.set("type", verdict.status)
-    return outcome
+    if lost and verdict.status == "did not run":
+        ElementTree.SubElement(test, "skipped", message=text)
+        return "skipped"
+    ElementTree.SubElement(test, "failure", type=verdict.status, message=text)
+    return "failure"
 
 
 def pair(verdict: Verdict) -> str:

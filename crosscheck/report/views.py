@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from crosscheck.report.summary import pair
-from crosscheck.verdict import Status, Verdict
+from crosscheck.verdict import GRAVITY, Status, Verdict
 from flexmb.channels import family
 
 SYMBOLS: dict[Status, str] = {
@@ -20,9 +20,6 @@ SYMBOLS: dict[Status, str] = {
     "crashed": "☠",
     "did not run": "–",
 }
-GRAVITY: tuple[Status, ...] = (
-    "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
-)  # fmt: skip
 FAMILIES = {
     "marker.position": "Marker positions",
     "marker.orientation": "Marker orientations",
