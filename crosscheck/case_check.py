@@ -173,9 +173,10 @@ def _comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Proble
     if item.variant is not None:
         if item.a is not None or item.b is not None:
             yield _problem(place, "give either variant, or a and b", "take one of them out")
-        if len(item.engines) == 1:
+        variant = _find(run, item.variant)
+        if len(item.engines or (variant.engines if variant is not None else ())) == 1:
             text = "one engine has nobody to be compared with"
-            yield _problem(place.key("engines"), text, "name two, or none for all")
+            yield _problem(place.key("engines"), text, "name two, or none for all of the variant's if these are more")
         yield from _engines_once(item.engines, place.key("engines"))
         yield from _sides_run(run, item.variant, item.engines, place)
         return
@@ -357,7 +358,7 @@ def _no_variant(name: str, names: Sequence[str], place: Place) -> Problem:
 def _accepted(accepted: Accepted, run: RunFile) -> Iterator[Problem]:
     names = [item.name for item in run.comparisons]
     names += [f"{item.quantity.replace('_', ' ')} conserved" for item in run.conservations]
-    stale = "run the case with --accept again, or take it out"
+    stale = "take it out; `crosscheck run --accept` writes what is there now"
     for name, table in accepted.items():
         place = ROOT.key(name)
         if name not in names:

@@ -48,6 +48,9 @@ TimeLimit = Annotated[
     float | None,
     typer.Option("--time-limit", metavar="SECONDS", help="Stop what takes longer; default the case's limit or 1800."),
 ]
+Jobs = Annotated[
+    int | None, typer.Option("--jobs", "-j", min=1, help="Worker processes; by default one per core.")
+]
 Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
@@ -64,7 +67,7 @@ def run(
     ] = None,
     out: Out = Path("out"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+    jobs: Jobs = None,
     time_limit: TimeLimit = None,
     accept: Annotated[
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
@@ -98,9 +101,8 @@ def run(
                 chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, time_limit_s=time_limit,
                 listener=live.hear,
             )  # fmt: skip
-        if accept:
-            _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        _conclude(out / "records.jsonl", out, open_report, strict, last_session)
+        done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
+        _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
 
 
 @app.command("list")
@@ -183,7 +185,7 @@ def stability(
     ] = None,
     pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
-    jobs: Annotated[int | None, typer.Option("--jobs", "-j", help="Worker processes; by default one per core.")] = None,
+    jobs: Jobs = None,
     time_limit: Annotated[
         float | None, typer.Option("--time-limit", metavar="SECONDS", help="Stop a longer cell; default 1800.")
     ] = None,
@@ -238,23 +240,27 @@ def _check_limit(seconds: float | None) -> None:
         _refuse(f"--time-limit {seconds:g}: give a positive number of seconds")
 
 
-def _accept(cases: tuple[library.Case, ...], records: Path, partial: bool) -> None:
-    """Write what the cases have reached beside their run files, or say why not and leave with 1."""
+def _accept(cases: tuple[library.Case, ...], records: Path, partial: bool) -> bool:
+    """Write what the cases have reached beside their run files, or say why not; whether it was done."""
     try:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
     except NotAccepted as error:
         console.print(words(str(error), "red"), soft_wrap=True)
+        return False
+    return True
 
 
-def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice) -> None:
-    """Judge, write everything, show the table, and leave with the exit code."""
+def _conclude(
+    records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice, failed: bool = False
+) -> None:
+    """Judge, write everything, show the table, and leave with the exit code; 1 where something has `failed` before."""
     outcome, page = write_all(records, out, strict, chosen)
     code = print_outcome(console, outcome)
     console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
-    raise typer.Exit(code)
+    raise typer.Exit(code or int(failed))
 
 
 @contextmanager

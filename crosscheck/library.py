@@ -52,11 +52,18 @@ def shipped_cases() -> tuple[Case, ...]:
 
 
 def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
-    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder."""
+    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder.
+
+    CaseError also for two folders whose cases have the same name: records and report could not tell them apart.
+    """
     found: dict[str, Case] = {}
     for word in words:
         for case in _resolve_one(word):
-            found[case.name] = case
+            other = found.setdefault(case.name, case)
+            if other.folder != case.folder:
+                raise CaseError(
+                    f"{other.folder} and {case.folder} are both called {case.name}: rename a folder, or run one alone"
+                )
     return tuple(found.values())
 
 

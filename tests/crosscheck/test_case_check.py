@@ -94,6 +94,7 @@ def test_efforts_that_are_none_are_refused(kind: str) -> None:
         ('b = { variant = "segments", engine = "pinocchio" }', 'b = { variant = "full", engine = "native" }',
          "agrees with itself"),
         ('variant = "rigid"\ngoals', 'variant = "rigid"\nengines = ["native"]\ngoals', "nobody to be compared with"),
+        ('engines = ["native", "pinocchio", "mujoco", "exudyn"]', 'engines = ["native"]', "nobody to be compared with"),
         ("refined = { segments = 32 }", "refined = { segments = 16 }", "16 is not finer than 16"),
         ("refined = { segments = 32 }", "refined = {}", "refines nothing"),
         ("refined = { segments = 32 }", "refined = { elements = 0 }", "$.variant[2].refined.elements"),

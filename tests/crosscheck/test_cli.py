@@ -173,3 +173,38 @@ def test_a_run_reports_what_it_was_asked_for_and_report_shows_all(runner: CliRun
     assert runner.invoke(cli.app, ["report", str(out / "records.jsonl"), "--out", str(out)], env=WIDE).exit_code == 0
     summary = (out / "summary.md").read_text(encoding="utf-8")
     assert "pendulum/single" in summary and "pendulum/other" in summary
+
+
+@pytest.mark.parametrize("count", ["0", "-1", "many"])
+def test_there_is_at_least_one_worker(runner: CliRunner, tmp_path: Path, count: str) -> None:
+    """With none, a run would wait for ever."""
+    for words in (["run", str(CASE)], ["stability", "free_spin"]):
+        result = runner.invoke(cli.app, [*words, "--jobs", count, "--out", str(tmp_path)], env=WIDE)
+        assert (result.exit_code, "--jobs" in result.output) == (2, True), result.output
+
+
+def test_two_folders_of_one_name_are_refused(runner: CliRunner, tmp_path: Path) -> None:
+    """Only one of them would be run, and the other would be green with it."""
+    one, two = copy_case(tmp_path / "a"), copy_case(tmp_path / "b")
+    words = ["--out", str(tmp_path / "out"), "--jobs", "2"]
+    result = runner.invoke(cli.app, ["run", str(one), str(two), *words], env=WIDE)
+    assert (result.exit_code, "are both called pendulum/single" in result.output) == (2, True), result.output
+    assert runner.invoke(cli.app, ["run", str(one), str(one), *words], env=WIDE).exit_code == 0
+
+
+def test_accepting_nothing_is_not_green(runner: CliRunner, tmp_path: Path) -> None:
+    """Two cases, one without a part for the engine: all verdicts are as expected, and no figures were written."""
+    folder = copy_case(tmp_path)
+    other = folder.with_name("other")
+    shutil.copytree(folder, other)
+    file = other / "run.toml"
+    head = file.read_text(encoding="utf-8").split("[[variant]]")[0]
+    file.write_text(
+        head + '[[variant]]\nname = "a"\nengines = ["fine"]\n\n'
+        '[[conservation]]\nvariant = "a"\nquantity = "energy"\nlimit = 1e-3\n',
+        encoding="utf-8",
+    )
+    words = ["--accept", "-e", "stepper", "--out", str(tmp_path / "out"), "--jobs", "2"]
+    result = runner.invoke(cli.app, ["run", str(folder), str(other), *words], env=WIDE)
+    assert (result.exit_code, "nothing was compared in pendulum/other" in result.output) == (1, True), result.output
+    assert not (folder / "accepted.toml").exists()
