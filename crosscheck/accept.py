@@ -31,9 +31,8 @@ def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[
     outcome = conclude(collect(found))
     if not outcome.ok:
         raise NotAccepted(f"Nothing is accepted. {outcome.headline}: put that right first.")
-    idle = [case.name for case in cases if not outcome.verdicts[case.name]]
-    if idle:
-        raise NotAccepted(f"Nothing is accepted: nothing was compared in {', '.join(idle)}. Leave that out.")
+    if outcome.idle:
+        raise NotAccepted(f"Nothing is accepted: nothing was compared in {', '.join(outcome.idle)}. Leave that out.")
     latest = {record.case: record for record in found if isinstance(record, CaseRecord)}
     written = []
     archive = Archive(records)

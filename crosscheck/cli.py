@@ -21,6 +21,7 @@ from crosscheck.live import LiveProgress
 from crosscheck.lock import FolderInUseError, locked
 from crosscheck.report import Choice, write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome, words
+from crosscheck.selection import without_part
 from crosscheck.session import last_session, standing
 from crosscheck.sweep import sweep
 from crosscheck.verify import sample_times_csv, verify_csv
@@ -95,6 +96,9 @@ def run(
     """
     _check_limit(time_limit)
     chosen = _found(tuple(cases))
+    idle = without_part((case.run for case in chosen), tuple(engine or ()))
+    if idle:
+        _refuse(idle)
     with _sole_writer(out):
         with LiveProgress(console) as live:
             sweep(
@@ -164,8 +168,13 @@ def verify(
     **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
     """
     with _in_one_line():
-        (chosen,) = _found((case,))
+        found = _found((case,))
+        if len(found) > 1:
+            _refuse(f'"{case}" is {len(found)} cases: name one of {", ".join(each.name for each in found)}')
+        (chosen,) = found
         if template:
+            if csv.exists():
+                _refuse(f"{csv} is there already: a template would take its place; name another file")
             csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return

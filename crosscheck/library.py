@@ -14,7 +14,7 @@ from crosscheck.case import CaseError, Provenance, RunFile, Variant
 from crosscheck.case_check import check_accepted, check_run_file
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
-from flexmb.scene.problems import SceneError
+from flexmb.scene.problems import SceneError, closest
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
@@ -75,9 +75,9 @@ def _resolve_one(word: str) -> tuple[Case, ...]:
     named = tuple(case for case in cases if word in (case.name, case.name.partition("/")[2]))
     chosen = named or tuple(case for case in cases if word == "all" or word in case.run.tags)
     if not chosen:
-        known = ", ".join(case.name for case in cases) or "none"
+        known = {name for case in cases for name in (case.name, case.name.partition("/")[2], *case.run.tags)}
         raise CaseError(
-            f'"{word}" is no case, no tag and no folder with a run.toml. Shipped cases: {known}. '
+            f'"{word}" is no case, no tag and no folder with a run.toml: {closest(word, known)}. '
             "`crosscheck list` shows them all."
         )
     return chosen
@@ -121,7 +121,9 @@ def _present(file: Path) -> bool:
 def _read(file: Path, kind: type[T]) -> T:
     try:
         return to_struct(parse_toml(_text(file)), kind, str(file))
-    except (Unreadable, SceneError, RecursionError, OverflowError) as error:
+    except SceneError as error:  # the file of a case is no scene, whose message would call it one
+        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
+    except (Unreadable, RecursionError, OverflowError) as error:
         raise CaseError(f"{file}: {error}") from None
 
 

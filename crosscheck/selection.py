@@ -8,12 +8,14 @@ engine by engine; if it does not exist, that shows as *did not run*.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from itertools import combinations
 
 import msgspec
 
 from crosscheck.case import Chart, Comparison, Conservation, RunFile, Side, Variant
 from crosscheck.engines.registry import BUILT_IN
+from flexmb.scene.problems import closest
 
 
 def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
@@ -35,6 +37,17 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
         conservations=conservations,
         charts=_charts(run.charts, {variant.name for variant in variants}),
     )
+
+
+def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
+    """Which of the engines asked for nothing in any of the run files is for, and which could be; "" if none is idle."""
+    runs = tuple(runs)
+    busy = {engine for run in runs for variant in select(run, asked).variants for engine in variant.engines}
+    idle = [engine for engine in asked if engine not in busy]
+    known = {engine for run in runs for variant in run.variants for engine in _all(variant)}
+    if not idle:
+        return ""
+    return f"nothing that was asked for is for engine {', '.join(idle)}: {closest(idle[0], known)}"
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:

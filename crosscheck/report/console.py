@@ -31,6 +31,8 @@ def print_outcome(console: Console, outcome: Outcome) -> int:
     for each in outcome.lost:
         where = f"{each.case}, {each.variant}, {each.engine}"
         console.print(marked("–", "yellow", f"{where} {each.status}: {each.reason}"), soft_wrap=True)
+    for case in outcome.idle:
+        console.print(marked("–", "yellow", f"{case}: nothing was compared"), soft_wrap=True)
     for verdict in outcome.worse[:SHOWN]:
         console.print(marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}"), soft_wrap=True)
     for verdict in outcome.unrecorded[:SHOWN] if outcome.strict else ():

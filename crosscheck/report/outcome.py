@@ -52,6 +52,11 @@ class Outcome:
         return [verdict for verdict in self.all if not verdict.ok]
 
     @property
+    def idle(self) -> list[str]:
+        """Cases without any verdict, such as those in which the engines asked for have no part."""
+        return [case for case, group in self.verdicts.items() if not group]
+
+    @property
     def worse(self) -> list[Verdict]:
         """Verdicts as expected, whose E or U has grown beyond what was accepted."""
         return [verdict for verdict in self.all if verdict.ok and verdict.worse]

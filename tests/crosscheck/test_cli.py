@@ -208,3 +208,49 @@ def test_accepting_nothing_is_not_green(runner: CliRunner, tmp_path: Path) -> No
     result = runner.invoke(cli.app, ["run", str(folder), str(other), *words], env=WIDE)
     assert (result.exit_code, "nothing was compared in pendulum/other" in result.output) == (1, True), result.output
     assert not (folder / "accepted.toml").exists()
+
+
+def test_a_case_in_which_nothing_is_compared_is_named(runner: CliRunner, tmp_path: Path) -> None:
+    folder = copy_case(tmp_path)
+    other = folder.with_name("other")
+    shutil.copytree(folder, other)
+    text = (other / "run.toml").read_text(encoding="utf-8")
+    alone = text.split("[[variant]]")[0] + '[[variant]]\nname = "a"\nengines = ["fine"]\n'
+    (other / "run.toml").write_text(alone, encoding="utf-8")
+    words = ["--out", str(tmp_path / "out"), "--jobs", "2"]
+    result = runner.invoke(cli.app, ["run", str(folder), str(other), *words], env=WIDE)
+    assert (result.exit_code, "pendulum/other: nothing was compared" in result.output) == (0, True), result.output
+    assert runner.invoke(cli.app, ["run", str(other), *words], env=WIDE).exit_code == 1
+
+
+@pytest.mark.parametrize("asked", [["exudyn-beam"], ["fine", "steper"]])
+def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Path, asked: list[str]) -> None:
+    """It takes part neither by name nor, as a foreign one, where all engines are compared; nothing would tell of it."""
+    folder = copy_case(tmp_path)
+    file = folder / "run.toml"
+    text = file.read_text(encoding="utf-8")
+    assert text.count('variant = "rigid"\ngoals') == 1
+    named = text.replace('variant = "rigid"\ngoals', 'variant = "rigid"\nengines = ["fine", "stepper"]\ngoals')
+    file.write_text(named, encoding="utf-8")
+    engines = [word for name in asked for word in ("-e", name)]
+    result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
+    assert (result.exit_code, f"is for engine {asked[-1]}" in result.output) == (2, True), result.output
+    assert not (tmp_path / "out").exists()
+
+
+def test_messages_say_what_was_meant(runner: CliRunner, tmp_path: Path) -> None:
+    """Of a misspelt case, of several cases where one is asked for, and of a run file that is none."""
+    result = runner.invoke(cli.app, ["run", "four_baer", "--out", str(tmp_path)], env=WIDE)
+    assert (result.exit_code, 'did you mean "four_bar"?' in result.output) == (2, True), result.output
+    result = runner.invoke(cli.app, ["verify", "canonical", str(tmp_path / "my.csv")], env=WIDE)
+    assert (result.exit_code, "name one of" in result.output) == (2, True), result.output
+    (tmp_path / "run.toml").write_text("titel = 1\n", encoding="utf-8")
+    result = runner.invoke(cli.app, ["run", str(tmp_path), "--out", str(tmp_path)], env=WIDE)
+    assert (result.exit_code, "titel" in result.output, "scene" in result.output) == (2, True, False), result.output
+
+
+def test_a_template_takes_no_file_s_place(runner: CliRunner, tmp_path: Path) -> None:
+    file = csv_of(tmp_path / "my.csv")
+    before = file.read_bytes()
+    code, output = verify(runner, str(file), "--template")
+    assert (code, "is there already" in output, file.read_bytes() == before) == (2, True, True)
