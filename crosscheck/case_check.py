@@ -17,6 +17,7 @@ from crosscheck.case import (
     EffortLadder,
     Refined,
     RunFile,
+    Side,
     Variant,
 )
 from crosscheck.patterns import fault
@@ -187,6 +188,7 @@ def _comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Proble
         return
     for key, side in (("a", item.a), ("b", item.b)):
         yield from _sides_run(run, side.variant, (side.engine,), place.key(key))
+    yield from _same_times(run, item.a, item.b, place)
     if item.a == item.b:
         yield _problem(place.key("b"), "it is a: a result agrees with itself", "name another engine or variant")
 
@@ -195,6 +197,7 @@ def _control(run: RunFile, item: Control, place: Place) -> Iterator[Problem]:
     yield from _patterns(item.goals, item.scales, place)
     for key, side in (("a", item.a), ("b", item.b)):
         yield from _sides_run(run, side.variant, (side.engine,), place.key(key))
+    yield from _same_times(run, item.a, item.b, place)
 
 
 def _conservation(run: RunFile, item: Conservation, place: Place, seen: set[tuple[str, str, str]]) -> Iterator[Problem]:
@@ -338,6 +341,13 @@ def _sides_run(run: RunFile, name: str, engines: Iterable[str], place: Place) ->
         yield _no_variant(name, [each.name for each in run.variants], place)
     else:
         yield from _engines_run(variant, engines, place)
+
+
+def _same_times(run: RunFile, a: Side, b: Side, place: Place) -> Iterator[Problem]:
+    variants = [_find(run, side.variant) for side in (a, b)]
+    if len({(each.duration_s or run.duration_s, each.samples or run.samples) for each in variants if each}) > 1:
+        text = f'"{a.variant}" and "{b.variant}" have other sample times'
+        yield _problem(place, text, "give both the same duration_s and samples")
 
 
 def _engines_run(variant: Variant, engines: Iterable[str], place: Place) -> Iterator[Problem]:

@@ -15,6 +15,7 @@ from crosscheck.verdict import GRAVITY, Finding, Status, Verdict, compare, conse
 from flexmb.channels import matches, norms
 
 MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
+CLOCK = 1e-9  # relative difference of two clocks that show the same time: old records hold the engines' own
 TRUE_MODEL = "conservation law"
 
 
@@ -42,7 +43,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         yield _verdict(
             case, item.name, "comparison", channel, item.a, item.b, item.expect, item.reason, goal, finding, beyond
         )
-    if _missing(a, b) is None:
+    if _missing(a, b) is None and _elsewhere(a, b) is None:
         patterns = {"scale": item.scales, "band": item.band}
         for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(case, item, a, b)):
             yield _verdict(
@@ -87,7 +88,7 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
             signal = faulty.control_signal(channel, twin, across)
             finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
         yield _verdict(case, item.name, "control", channel, item.a, item.b, "differ", why, goal, finding)
-    if _missing(faulty, b) is None:
+    if _missing(faulty, b) is None and _elsewhere(faulty, b) is None:
         for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b):
             yield _verdict(case, item.name, "control", pattern, item.a, item.b, "differ", why, 0.0, finding)
 
@@ -135,7 +136,7 @@ def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[s
     Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
     is left out, any other channel that only one offers is a refusal of the other.
     """
-    missing = _missing(a, b)
+    missing = _missing(a, b) or _elsewhere(a, b)
     for pattern, goal in goals.items():
         if missing is not None:
             yield pattern, goal, missing
@@ -163,6 +164,17 @@ def _missing(*results: Result) -> Finding | None:
         return None
     worst = min(endings, key=lambda ending: GRAVITY.index(ending.status))
     return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
+
+
+def _elsewhere(a: Result, b: Result) -> Finding | None:
+    """Why two finished results are not of the same times, or of the same scene where they are of one variant."""
+    if a.times.shape != b.times.shape or not np.allclose(a.times, b.times, rtol=CLOCK, atol=0.0):
+        text = f"the results are at other times: {len(a.times)} samples to {a.times[-1]:g} s"
+        return Finding("failed", f"{text}, and {len(b.times)} to {b.times[-1]:g} s")
+    same = a.variant == b.variant and a.finest.role == b.finest.role
+    if same and a.finest.scene != b.finest.scene:
+        return Finding("failed", f"{a.engine} and {b.engine} ran different scenes as {a.variant}: run both again")
+    return None
 
 
 def _absent(result: Result, channel: str) -> Finding | None:

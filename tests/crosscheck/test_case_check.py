@@ -95,6 +95,8 @@ def test_efforts_that_are_none_are_refused(kind: str) -> None:
          "agrees with itself"),
         ('variant = "rigid"\ngoals', 'variant = "rigid"\nengines = ["native"]\ngoals', "nobody to be compared with"),
         ('engines = ["native", "pinocchio", "mujoco", "exudyn"]', 'engines = ["native"]', "nobody to be compared with"),
+        ('name = "full"', 'name = "full"\nduration_s = 5.0', "comparison[1]"),
+        ('name = "full"', 'name = "full"\nsamples = 101', "have other sample times"),
         ("refined = { segments = 32 }", "refined = { segments = 16 }", "16 is not finer than 16"),
         ("refined = { segments = 32 }", "refined = {}", "refines nothing"),
         ("refined = { segments = 32 }", "refined = { elements = 0 }", "$.variant[2].refined.elements"),

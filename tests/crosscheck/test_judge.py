@@ -258,3 +258,17 @@ def test_an_expectation_without_bounds_in_old_records_is_not_as_expected() -> No
     verdict = single(judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way(2.0)})]))
     assert (verdict.status, verdict.ok) == ("differ", False)
     assert "sets no bounds to E" in verdict.reason
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"times": pack(2.0 * TIMES)}, "at other times: 11 samples to 1 s, and 11 to 2 s"),
+        ({"times": pack(TIMES**2)}, "at other times"),
+        ({"scene": "t"}, "different scenes"),
+    ],
+)
+def test_results_of_other_times_or_scenes_are_not_compared(changes: dict, said: str) -> None:
+    other = [msgspec.structs.replace(run, **changes) for run in ladder("two", {TIP: way()})]
+    verdict = single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *other]))
+    assert (verdict.status, said in verdict.reason) == ("failed", True), verdict.reason
