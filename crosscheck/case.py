@@ -80,6 +80,25 @@ most 100 times low; ``diverged_s`` for the last sample time that a *diverged* ru
 the engine's own reason must contain (*failed*, *refused*). What crashed, did not finish or did not run is never as
 expected. Statuses are explained in `crosscheck.verdict`.
 
+Every key, those with a default in brackets with it; the structs below say more of each:
+
+- at the top: ``title``; ``tags`` [none]; ``duration_s`` (s); ``samples`` (from 0 to the end, both counted);
+  ``time_limit_s`` [1800] (s), for one engine on one variant with all its efforts; ``--time-limit`` comes before it;
+- ``variant``: ``name``; ``scene`` ["scene.toml"]; ``transform`` ["none"], or "rigidify", "modal_points", "segments"
+  with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
+  ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
+  ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
+  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and ``values`` from coarse to fine;
+  ``duration_s`` and ``samples`` [the case's]; ``note`` [none], shown in the report;
+- ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with ``variant``
+  and ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s`` or
+  ``because``, as ``expect`` needs; ``reason``;
+- ``control``: ``name``; ``mutation``; ``target`` [the scene]; ``a``; ``b``; ``goals``; ``scales``, as above;
+- ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``; ``engines``
+  [those of ``engines`` in the variant]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (one for it all),
+  ``diverged_s``, ``because`` and ``reason``, as above;
+- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
+
 ``case_check.py`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
 that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
 the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.accepted`).

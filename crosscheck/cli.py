@@ -19,6 +19,7 @@ from crosscheck.case import CaseError
 from crosscheck.engine_list import describe_engines
 from crosscheck.live import LiveProgress
 from crosscheck.lock import FolderInUseError, locked
+from crosscheck.pool import TIME_LIMIT_S
 from crosscheck.report import Choice, write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome, words
 from crosscheck.selection import without_part
@@ -47,7 +48,9 @@ console = Console(markup=False, emoji=False)  # names and paths stand in what it
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
 TimeLimit = Annotated[
     float | None,
-    typer.Option("--time-limit", metavar="SECONDS", help="Stop what takes longer; default the case's limit or 1800."),
+    typer.Option(
+        "--time-limit", metavar="SECONDS", help=f"Stop what takes longer; default the case's limit or {TIME_LIMIT_S:g}."
+    ),
 ]
 Jobs = Annotated[
     int | None, typer.Option("--jobs", "-j", min=1, help="Worker processes; by default one per core.")
@@ -196,7 +199,8 @@ def stability(
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Jobs = None,
     time_limit: Annotated[
-        float | None, typer.Option("--time-limit", metavar="SECONDS", help="Stop a longer cell; default 1800.")
+        float | None,
+        typer.Option("--time-limit", metavar="SECONDS", help=f"Stop a longer cell; default {TIME_LIMIT_S:g}."),
     ] = None,
 ) -> None:
     """

@@ -63,6 +63,9 @@ def verify_csv(
     times = sample_times(case.run, chosen)
     mine = read_columns(file, times)
     rough = read_columns(coarse, times) if coarse is not None else Columns({})
+    lacking = [name for name in mine.channels if name not in rough.channels]
+    if coarse is not None and lacking:
+        raise VerifyError(f"{coarse} lacks {', '.join(lacking)}, which {file} has: give both the same columns")
     reference = _reference(case, chosen, engine, provider)
     verdicts, details, left_out = [], {}, list(mine.left_out)
     for name, values in mine.channels.items():

@@ -254,3 +254,12 @@ def test_a_template_takes_no_file_s_place(runner: CliRunner, tmp_path: Path) -> 
     before = file.read_bytes()
     code, output = verify(runner, str(file), "--template")
     assert (code, "is there already" in output, file.read_bytes() == before) == (2, True, True)
+
+
+def test_a_coarse_csv_has_every_channel(runner: CliRunner, tmp_path: Path) -> None:
+    """Without it, the goal would be taken for the uncertainty where a difference was promised."""
+    fine, rough = csv_of(tmp_path / "my.csv"), tmp_path / "rough.csv"
+    lines = [line.split(",")[:4] for line in fine.read_text(encoding="utf-8").splitlines()]
+    rough.write_text("\n".join(map(",".join, lines)) + "\n", encoding="utf-8")
+    code, output = verify(runner, str(fine), "--coarse", str(rough))
+    assert (code, "lacks load:pivot.force" in output) == (2, True), output
