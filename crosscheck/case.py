@@ -88,14 +88,14 @@ Every key, those with a default in brackets with it; the structs below say more 
   with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
   ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
   ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
-  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and ``values`` from coarse to fine;
+  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
   ``duration_s`` and ``samples`` [the case's]; ``note`` [none], shown in the report;
-- ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with ``variant``
-  and ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s`` or
-  ``because``, as ``expect`` needs; ``reason``;
+- ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
+  ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
+  or ``because``, as ``expect`` needs; ``reason``;
 - ``control``: ``name``; ``mutation``; ``target`` [the scene]; ``a``; ``b``; ``goals``; ``scales``, as above;
-- ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``; ``engines``
-  [those of ``engines`` in the variant]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (one for it all),
+- ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``;
+  ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (one for it all),
   ``diverged_s``, ``because`` and ``reason``, as above;
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
 

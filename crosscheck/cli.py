@@ -87,15 +87,21 @@ def run(
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
 
-    An engine that takes too long for a scene, or too much memory, is stopped: *did not finish*.
+    An engine that takes longer for a scene than `--time-limit` says (or the case, or half an hour), or more than its
+    part of the memory, is stopped: *did not finish*. The others go on.
 
-    **Exit code**: 0 every verdict is the one the case expects and everything asked for ran;
-    1 something is not as expected or did not run; 2 the request itself makes no sense.
-    With `--strict` also 1 where E or U is *worse than recorded*, more than 10 times what was accepted, or where no
-    figures were accepted yet. `--accept` records nothing while anything is not as expected.
+    `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
+    reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than
+    recorded*: a warning, and with `--strict` an error, as is a comparison of the library's own engines without
+    accepted figures. Nothing is accepted while anything is not as expected.
+
+    **Exit code**: 0 every verdict is the one the case expects and everything asked for gave its result;
+    1 something is not as expected, failed or did not run, or `--accept` wrote nothing; 2 the request itself makes no
+    sense. With `--strict` also 1 where figures are worse than recorded or missing. `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
-    `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case`
+    `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case --accept` ·
+    `crosscheck run all --strict --time-limit 600`
     """
     _check_limit(time_limit)
     chosen = _found(tuple(cases))

@@ -67,7 +67,7 @@ def test_engines_are_listed_with_how_to_install_them(runner: CliRunner, monkeypa
 
 def test_help_teaches(runner: CliRunner) -> None:
     output = runner.invoke(cli.app, ["run", "--help"], env=WIDE).output
-    for word in ("Exit code", "resumes", "canonical", "report.html"):
+    for word in ("Exit code", "resumes", "canonical", "report.html", "--accept", "--strict", "--time-limit"):
         assert word in output
 
 
