@@ -76,9 +76,9 @@ resolved.
 
 An expectation other than *agree* needs its reason in words, and bounds, outside of which it is not as expected:
 ``band`` for the size of E (*differ*) or of U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
-most 100 times low; ``diverged_s`` for the last sample time that a *diverged* run reached; ``because`` for a text that
-the engine's own reason must contain (*failed*, *refused*). What crashed, did not finish or did not run is never as
-expected. Statuses are explained in `crosscheck.verdict`.
+most 100 times low; ``diverged_s`` for the last sample time that a *diverged* run reached, at most a quarter of the run
+wide; ``because`` for a text that the engine's own reason must contain (*failed*, *refused*). What crashed, did not
+finish or did not run is never as expected. Statuses are explained in `crosscheck.verdict`.
 
 Every key, those with a default in brackets with it; the structs below say more of each:
 
@@ -95,7 +95,7 @@ Every key, those with a default in brackets with it; the structs below say more 
   or ``because``, as ``expect`` needs; ``reason``;
 - ``control``: ``name``; ``mutation``; ``target`` [the scene]; ``a``; ``b``; ``goals``; ``scales``, as above;
 - ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``;
-  ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (one for it all),
+  ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (for it all),
   ``diverged_s``, ``because`` and ``reason``, as above;
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
 

@@ -33,6 +33,7 @@ TOLERANCES = (1e-15, 0.5)  # below, rounding decides; above, nothing is solved
 SIZES = (1e-30, 1e30)  # of anything in SI: beyond lies a slip
 ORDERS = (0.1, 16.0)
 WIDEST = 100.0  # a band that lets a difference grow more is none
+WIDEST_PART = 0.25  # of a run's duration, as a bound of the time at which it diverges
 ROOT = Place()
 BOUNDS = {"differ": "band", "unresolved": "band", "diverged": "diverged_s", "failed": "because", "refused": "because"}
 FIGURE_OF = {"differ": "E", "unresolved": "U"}
@@ -230,7 +231,8 @@ def _expectation(run: RunFile, item: Comparison | Conservation, place: Place) ->
         yield _problem(place.key("reason"), "an expected status needs a reason", "say why it is so")
     needed = BOUNDS.get(item.expect)
     for key in dict.fromkeys(BOUNDS.values()):
-        given = bool(getattr(item, key))
+        value = getattr(item, key)
+        given = bool(value.strip() if isinstance(value, str) else value)
         if key == needed and not given:
             text = f"an expected {item.expect} needs its bounds"
             yield _problem(place.key(key), text, _remedy(item, key))
@@ -240,9 +242,21 @@ def _expectation(run: RunFile, item: Comparison | Conservation, place: Place) ->
         yield from _covered(item, place.key("band"))
     if item.diverged_s is not None:
         low, high = item.diverged_s
-        if not 0.0 <= low < high <= DURATIONS_S[1]:
+        duration = _longest(run, item)
+        if not 0.0 <= low < high < math.inf or high > duration:
             remedy = "give the earliest and the latest time, in seconds"
-            yield _problem(place.key("diverged_s"), f"[{low:g}, {high:g}] is no time", remedy)
+            yield _problem(place.key("diverged_s"), f"[{low:g}, {high:g}] is no time of {duration:g} s", remedy)
+        elif high - low > WIDEST_PART * duration:
+            text = f"[{low:g}, {high:g}] is more than {WIDEST_PART:g} of the run's {duration:g} s"
+            yield _problem(place.key("diverged_s"), text, "narrow it to what was measured")
+
+
+def _longest(run: RunFile, item: Comparison | Conservation) -> float:
+    """Duration (s) of what is compared, the longer one of two."""
+    sides = (item.a, item.b) if isinstance(item, Comparison) else ()
+    names = {item.variant, *(side.variant for side in sides if side is not None)}
+    found = [_find(run, name) for name in names if name is not None]
+    return max((each.duration_s or run.duration_s for each in found if each is not None), default=run.duration_s)
 
 
 def _remedy(item: Comparison | Conservation, key: str) -> str:
