@@ -47,7 +47,7 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
     known = {engine for run in runs for variant in run.variants for engine in _all(variant)}
     if not idle:
         return ""
-    return f"nothing that was asked for is for engine {', '.join(idle)}: {closest(idle[0], known)}"
+    return f"no case that was asked for has a part for engine {', '.join(idle)}: {closest(idle[0], known)}"
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:

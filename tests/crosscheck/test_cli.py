@@ -234,7 +234,7 @@ def test_an_engine_without_a_part_is_no_request(runner: CliRunner, tmp_path: Pat
     file.write_text(named, encoding="utf-8")
     engines = [word for name in asked for word in ("-e", name)]
     result = runner.invoke(cli.app, ["run", str(folder), *engines, "--out", str(tmp_path / "out")], env=WIDE)
-    assert (result.exit_code, f"is for engine {asked[-1]}" in result.output) == (2, True), result.output
+    assert (result.exit_code, f"a part for engine {asked[-1]}" in result.output) == (2, True), result.output
     assert not (tmp_path / "out").exists()
 
 
