@@ -150,7 +150,7 @@ NATIVE_RUN = """
 import sys
 import numpy as np
 import crosscheck.execute as execute
-from crosscheck.engines.contract import Effort
+from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from crosscheck.library import load_case
 from pathlib import Path
