@@ -11,6 +11,7 @@ from pathlib import Path
 from filelock import FileLock, Timeout
 
 from flexmb.writing import folder as made
+from flexmb.writing import writing
 
 LOCK, HOLDER = ".crosscheck.lock", ".crosscheck.holder"
 
@@ -34,7 +35,9 @@ def locked(folder: Path) -> Iterator[None]:
             f"{folder} is in use by {_who(holder)}. Wait for its end, or give another folder with --out."
         ) from None
     try:
-        holder.write_text(f"process {os.getpid()} since {datetime.now(UTC):%Y-%m-%d %H:%M:%S} UTC", encoding="utf-8")
+        now = f"{datetime.now(UTC):%Y-%m-%d %H:%M:%S}"
+        with writing(holder):
+            holder.write_text(f"process {os.getpid()} since {now} UTC", encoding="utf-8")
         yield
     finally:
         holder.unlink(missing_ok=True)

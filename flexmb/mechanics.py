@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import warnings
+from functools import cached_property
 from typing import NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
-from flexmb import composite, dynamics, unsplit
+from flexmb import arguments, composite, dynamics, unsplit
 from flexmb.arrays import Constants, Index, Real, Workspace
 from flexmb.consistent import consistent_accelerations, held_hinges
 from flexmb.factors import MassMatrixFactors
@@ -28,16 +30,30 @@ class _Doubting(Protocol):
 
 
 class Precision(NamedTuple):
-    """status: OK, or that the inertia of a body, `fault`, is not positive definite; decimal digits left, 0 to 16."""
+    """What rounding leaves of the accelerations: `digits`, decimal and significant, 0 to 16.
+
+    status: OK, or that the inertia of a body is not positive definite; fault, body: its number and name, or those of
+    the body that costs most digits.
+    """
 
     status: int
     fault: int
+    body: str
     digits: float
 
     @property
     def is_low(self) -> bool:
         """Whether the accelerations exist, with few digits."""
         return self.status == OK and self.digits < FEW_DIGITS
+
+    @property
+    def warning(self) -> str:
+        """What `PrecisionWarning` says."""
+        return (
+            f"about {self.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
+            f'"{self.body}" moves nearly vanishes beside what it is summed from; bring masses, inertias and lengths '
+            "closer together, or leave out the freedom"
+        )
 
 
 class ConsistentMotion(NamedTuple):
@@ -133,7 +149,8 @@ class Mechanics:
         The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
         """
         t, y = self.layout.entering(state)
-        rates = self.layout.rates("accelerations", accelerations)
+        used = np.where(self._is_modal, 0.0, arguments.vector("accelerations", accelerations, self.nu))
+        rates = self.layout.rates("accelerations", used)
         if self._held is None:
             self._held = held_hinges(self.constants, self.workspace())
         held, w = self._held
@@ -178,6 +195,14 @@ class Mechanics:
             self._matrices = matrices(self.constants)
         return self._matrices
 
+    @cached_property
+    def _is_modal(self) -> NDArray[np.bool_]:
+        """Which entries of u (nu,) are modal."""
+        found = np.zeros(self.nu, bool)
+        for k in range(len(self.constants.body)):
+            found[self._modes(k)] = True
+        return found
+
     def _modes(self, k: int) -> slice:
         body = self.constants.body[k]
         return slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
@@ -196,22 +221,15 @@ class Mechanics:
         """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
         self._check(precision.status, precision.fault)
         if precision.is_low:
-            warnings.warn(self.few_digits(precision), PrecisionWarning, stacklevel=4)
-
-    def few_digits(self, precision: Precision) -> str:
-        """What `PrecisionWarning` says."""
-        return (
-            f"about {precision.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
-            f'"{self.body_names[precision.fault]}" moves nearly vanishes beside what it is summed from; bring masses, '
-            "inertias and lengths closer together, or leave out the freedom"
-        )
+            warnings.warn(precision.warning, PrecisionWarning, stacklevel=4)
 
     def _precision(self, factors: MassMatrixFactors) -> Precision:
         if factors.status != OK:
-            return Precision(factors.status, factors.fault, 0.0)
+            return Precision(factors.status, factors.fault, self.body_names[factors.fault], 0.0)
         condition = factors.condition
         status = Status.NOT_POSITIVE_DEFINITE if condition.is_singular else Status.OK
-        return Precision(int(status), _owner(self.constants, condition.speed), condition.digits)
+        owner = _owner(self.constants, condition.speed)
+        return Precision(int(status), owner, self.body_names[owner], condition.digits)
 
     def _check(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""

@@ -78,7 +78,7 @@ class Settings:
         if not FINEST_RTOL <= self.rtol <= COARSEST_RTOL:
             raise ValueError(
                 f"rtol is {self.rtol:g}: double precision resolves {FINEST_RTOL:.1e}, and above {COARSEST_RTOL:g} the "
-                "error of a step is not known; use a value from there to 1e-3"
+                "error of a step is not known; use a value between them"
             )
         if not self.atol > 0.0:
             raise ValueError(

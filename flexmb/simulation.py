@@ -110,8 +110,8 @@ def simulate(
     raw = _integrate(system, route, times, settings)
     trajectory = _observed(system, times, raw, algorithm)
     if start.is_low:
-        warnings.warn(system.few_digits(start), PrecisionWarning, stacklevel=2)
-        trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {system.few_digits(start)}")
+        warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
+        trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory

@@ -39,6 +39,9 @@ WITHOUT_PART = {
     "crosscheck.selection": "as plan",
     "crosscheck.library": "as plan",
     "crosscheck.drawing": "draws",
+    "crosscheck.accepted": "judges what is recorded",
+    "crosscheck.patterns": "judges what is recorded",
+    "flexmb.writing": "says what is wrong with a folder",
     "crosscheck.pool": "hands out jobs",
     "crosscheck.processes": "ends processes",
     "crosscheck.made_by": "makes the key",
@@ -150,7 +153,7 @@ NATIVE_RUN = """
 import sys
 import numpy as np
 import crosscheck.execute as execute
-from crosscheck.engines.contract import Effort
+from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from crosscheck.library import load_case
 from pathlib import Path

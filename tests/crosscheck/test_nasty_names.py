@@ -229,7 +229,7 @@ def test_the_other_printers_take_hostile_names(hostile: Path) -> None:
 
 
 def msgspec_case(record: object) -> object:
-    return type("Case", (), {"name": record.case, "run": record.run})()
+    return type("Case", (), {"name": record.case, "run": record.run, "accepted": {}})()
 
 
 def written(write: object, name: str) -> str:

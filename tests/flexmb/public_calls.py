@@ -267,7 +267,9 @@ def calls() -> dict[str, Call]:
         assert set(kinds) == set(arguments), called
         found[called] = Call(function, arguments, kinds)
 
-    pointwise = ("mass_matrix", "bias", "applied", "energy", "momentum", "partitions")
+    pointwise = (
+        "mass_matrix", "bias", "applied", "energy", "momentum", "partitions", "digits_left", "precision",
+    )  # fmt: skip
     for name in pointwise:
         add(f"System.{name}", getattr(tree, name), {"state": state}, state=states)
     for algorithm in ("articulated", "unsplit", "composite", "frisch", "frisch_as_printed"):
@@ -284,8 +286,10 @@ def calls() -> dict[str, Call]:
             **ALGORITHM,
         )
     of_rates = {"state": state, "accelerations": rates}
-    for name in ("inverse_dynamics", "modal_residual", "consistent_inverse_dynamics"):
-        add(f"System.{name}", getattr(tree, name), of_rates, state=states, accelerations=vectors)
+    for name, kind in {
+        "inverse_dynamics": vectors, "modal_residual": vectors, "consistent_inverse_dynamics": but_modal,
+    }.items():  # fmt: skip
+        add(f"System.{name}", getattr(tree, name), of_rates, state=states, accelerations=kind)
     add("System.hinge_loads", tree.hinge_loads, of_rates, state=states, accelerations=but_none(vectors))
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
@@ -335,7 +339,10 @@ def calls() -> dict[str, Call]:
     )  # fmt: skip
 
     start = chain.initial_state
-    for name in ("mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads"):
+    for name in (
+        "mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads", "digits_left",
+        "precision",
+    ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
     for algorithm in ("articulated", "composite"):
         arguments = {"state": start, "algorithm": algorithm}
@@ -480,6 +487,11 @@ def but_none(kind: Callable[[Any], Iterator[Variant]]) -> Callable[[Any], Iterat
     return lambda clean: (each for each in kind(clean) if each.value is not None)
 
 
+def but_modal(v: np.ndarray) -> Iterator[Variant]:
+    """Of speeds whose last is modal, and not looked at."""
+    return (each for each in vectors(v) if not each.name.endswith(f" at {len(v) - 1}"))
+
+
 def but_columns(kind: Callable[[Any], Iterator[Variant]]) -> Callable[[Any], Iterator[Variant]]:
     """Without the column: a matrix is right too."""
     return lambda clean: (each for each in kind(clean) if each.name != "column")
@@ -531,7 +543,8 @@ EXEMPT = {
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results
-    "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "SceneError",
+    "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "PrecisionWarning",
+    "SceneError",
 }  # fmt: skip
 CLASSES = (
     fm.System,

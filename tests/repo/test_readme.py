@@ -40,8 +40,8 @@ def test_crosscheck_options_exist() -> None:
 
 
 def test_the_test_command_is_what_continuous_integration_runs() -> None:
-    assert COMMANDS[1].startswith("python3 ") and COMMANDS[1].endswith("pytest")
-    assert 'grep -E "^python3 .*pytest$" README.md' in (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    (pattern,) = re.findall(r'grep -E "(.*)" README.md', (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
+    assert [line for line in README.splitlines() if re.search(pattern, line)] == [COMMANDS[1]]
 
 
 def test_the_python_examples_run() -> None:
