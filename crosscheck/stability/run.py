@@ -133,10 +133,10 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
 
 
 def _cut_short(job: CellJob, event: Event) -> CellRecord:
-    """A cell whose process died has failed; one that was stopped at a limit of this machine says nothing."""
+    """A cell whose process died, or was stopped at a limit, says nothing about a method: it did not run."""
     return CellRecord(
         identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
-        status="failed" if event.kind == "crashed" else "did not run", message=event.content,
+        status="did not run", message=event.content,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ import functools
 from dataclasses import replace
 from pathlib import Path
 
+import msgspec
 import pytest
 from matplotlib.image import imread
 from typer.testing import CliRunner
@@ -49,19 +50,24 @@ def test_a_bound_allows_better_and_refuses_worse(tmp_path: Path) -> None:
 
 
 def test_cells_that_fail_stop_or_die_are_colours_of_their_own(tmp_path: Path) -> None:
+    """A death says nothing about the method: whatever a map takes failures for, it is never green."""
     done = run_it("corner", tmp_path, scheduler=run.run_jobs, workers=2)
     found = {record.status for record in done.records.values()}
-    assert found == {"measured", "failed", "did not finish"}
-    died = [record for record in done.records.values() if record.x > 0.8 and record.y > 0.8]
-    assert died and all(record.message == "the worker process died (exit code 3)" for record in died)
+    assert found == {"measured", "failed", "did not finish", "did not run"}
+    died = {cell: record for cell, record in done.records.items() if record.x > 0.8 and record.y > 0.8}
+    assert died and all(record.message == "the worker process died (exit code 3)" for record in died.values())
+    assert {record.status for record in died.values()} == {"did not run"}
+    assert all(judge(replace(done.map, failure=k), done.mesh, done.records).status == "did not run" for k in (0, 1))
     raised = next(record for record in done.records.values() if record.x > 0.8 and record.y < 0.8)
     assert raised.message == "ArithmeticError: no such state"
-    assert done.verdict.status == "differ"  # no failure is right on this map
+    assert done.verdict.status == "did not run"
     pixels = imread(draw(done, tmp_path / "corner.png"))[..., :3]
     for status in ("failed", "did not finish"):
         colour = [int(STATUSES[status][n : n + 2], 16) / 255 for n in (1, 3, 5)]
         assert (abs(pixels - colour).max(axis=-1) < 0.01).sum() > 1000
-    as_unstable, as_stable = (judge(replace(done.map, failure=k), done.mesh, done.records) for k in (1, 0))
+    alive = done.records | {cell: msgspec.structs.replace(each, status="failed") for cell, each in died.items()}
+    assert judge(done.map, done.mesh, alive).status == "differ"  # no failure is right on this map
+    as_unstable, as_stable = (judge(replace(done.map, failure=k), done.mesh, alive) for k in (1, 0))
     assert (as_unstable.status, as_stable.status) == ("agree", "differ")  # the corner is outside the circle
 
 
