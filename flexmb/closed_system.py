@@ -28,7 +28,9 @@ class ClosedSystem(System):
         super().__init__(scene)
         own = closure_constants(scene, self.constants, self._closure_ports)
         slowest = slowest_mode(self._links)
-        self.closures = Closures(scene.closures, self.constants, own, self.workspace, slowest, self._check)
+        self.closures = Closures(
+            scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check
+        )
         self._start: State | None = None
 
     @property

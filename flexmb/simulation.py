@@ -161,8 +161,8 @@ def _end(t_end: float) -> float:
     """Plain; whether a run can end there is for the scene's check to say."""
     try:
         return arguments.number("t_end", t_end)
-    except ValueError:
-        return np.nan
+    except ValueError:  # not finite
+        return float(t_end) if isinstance(t_end, float) else np.inf
 
 
 def _refuse_too_many(samples: int, system: System) -> None:

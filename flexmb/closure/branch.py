@@ -37,12 +37,14 @@ def is_further(t, cw):
 def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
-    By the time that is left at the rate of the step, in the time in which ports pass through the whole mechanism.
+    By the time that is left at the rate of the step, in the time in which ports pass through the whole mechanism, as
+    fast as in that step: where they come to rest, they have no speed.
     """
     for a in range(cw.rank[0]):
         i = cc.row[cw.chosen[a]].closure
         left, fallen = cw.factor[a, a], cw.former_pivot[a] - (1.0 + ROUND_OFF) * cw.factor[a, a]
-        if left * (t - cw.time[0]) * cw.closure[i].speed < AT_CROSSING * fallen * cw.closure[i].size:
+        speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
+        if left * (t - cw.time[0]) * speed < AT_CROSSING * fallen * cw.closure[i].size:
             return cw.chosen[a]
     return -1
 
@@ -63,6 +65,8 @@ def turned_over(cw):
 def remember(t, cw):
     """Take the state that was factorised last for the one from which the next step starts."""
     cw.time[0] = t
+    for i in range(cw.closure.shape[0]):
+        cw.closure[i].former_speed = cw.closure[i].speed
     for r in range(cw.chosen.shape[0]):
         cw.former_rows[r] = cw.chosen[r]
     for a in range(cw.rank[0]):

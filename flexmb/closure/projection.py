@@ -9,7 +9,7 @@ import numpy as np
 from flexmb.closure.branch import has_started, is_further, recall, remember
 from flexmb.closure.factor import solve
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
-from flexmb.closure.rows import largest_gap
+from flexmb.closure.rows import fastest_opening, largest_gap
 from flexmb.coordinates import configuration_rate, load_state, normalise_quaternions
 from flexmb.coordinates import project as project_tree
 from flexmb.kernel import helper
@@ -18,7 +18,8 @@ from flexmb.status import CLOSURE_OPEN, OK
 CLOSED = 2.0**-44  # a closed row's value in the size of its closure: 5.7e-14, two hundred roundings
 OPEN = 1e-10  # beyond this a closure is open
 ADRIFT = 1e-2  # beyond this a stabilised closure is open: what its rows are corrected by has no effect
-MOVING_APART = 1e-8  # beyond this, in the speed of its ports, a closure opens
+MOVING_APART = 1e-8  # beyond this, in the speed of its ports, a closure opens ...
+SLOWEST = OPEN / MOVING_APART  # ... that pass so many sizes in a step: of a mechanism at rest rounding is all the speed
 REPEATS = 6
 
 
@@ -49,13 +50,14 @@ def _project(t, y, s):
     if status != OK:
         return status
     if cw.gain[1] > 0.0:  # stabilised: errors decay by themselves
-        return OK if largest_gap(cc, cw, False)[0] <= ADRIFT else _open(s, False)
+        gap, at = largest_gap(cc, cw)
+        return OK if gap <= ADRIFT else _open(s, at)
     _close(t, y, s)
-    if not largest_gap(cc, cw, False)[0] <= OPEN:
-        return _open(s, False)
-    if not largest_gap(cc, cw, True)[0] <= MOVING_APART:
-        return _open(s, True)
-    return OK
+    gap, at = largest_gap(cc, cw)
+    if not gap <= OPEN:
+        return _open(s, at)
+    rate, at = fastest_opening(cc, cw, SLOWEST / abs(t - cw.time[0]))
+    return OK if rate <= MOVING_APART else _open(s, at)
 
 
 @helper
@@ -72,8 +74,8 @@ def _choose_further(t, s):
 
 
 @helper
-def _open(s, rates):
-    s.w.fault[0] = largest_gap(s.cc, s.cw, rates)[1]
+def _open(s, closure):
+    s.w.fault[0] = closure
     return CLOSURE_OPEN
 
 
@@ -82,7 +84,7 @@ def _close(t, y, s):
     """Positions, then speeds."""
     cc, cw = s.cc, s.cw
     for _ in range(REPEATS):
-        if largest_gap(cc, cw, False)[0] <= CLOSED:
+        if largest_gap(cc, cw)[0] <= CLOSED:
             break
         for a in range(cw.rank[0]):
             cw.scratch[a] = -cw.row[cw.chosen[a]].value

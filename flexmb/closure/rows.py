@@ -150,13 +150,28 @@ def load_on_b(cc, cw, i):
 
 
 @helper
-def largest_gap(cc, cw, rates):
-    """Largest weighted value (or rate) of a row in the size (speed) of its closure, and the closure: (gap, i)."""
+def largest_gap(cc, cw):
+    """Largest weighted value of a row in the size of its closure, and the closure: (gap, i)."""
     worst, at = 0.0, 0
     for r in range(cc.row.shape[0]):
         i = cc.row[r].closure
-        value = abs(cw.row[r].rate if rates else cw.row[r].value) * cc.weight[r]
-        size = cw.closure[i].speed if rates else cw.closure[i].size
-        if value > worst * size:
-            worst, at = value / size, i
+        value = abs(cw.row[r].value) * cc.weight[r]
+        if value > worst * cw.closure[i].size:
+            worst, at = value / cw.closure[i].size, i
+    return worst, at
+
+
+@helper
+def fastest_opening(cc, cw, slowest):
+    """Largest weighted rate of a row in the speed of its closure, and the closure: (rate, i).
+
+    `slowest` (1/s): sizes of its closure that speed is at least.
+    """
+    worst, at = 0.0, 0
+    for r in range(cc.row.shape[0]):
+        i = cc.row[r].closure
+        value = abs(cw.row[r].rate) * cc.weight[r]
+        speed = cw.closure[i].speed + slowest * cw.closure[i].size
+        if value > worst * speed:
+            worst, at = value / speed, i
     return worst, at

@@ -17,6 +17,7 @@ from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWor
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
 from flexmb.scene.schema import Closure
+from flexmb.state import Layout
 from flexmb.status import OUT_OF_RANGE
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
@@ -44,6 +45,7 @@ class Closures:
         closures: Sequence[Closure],
         constants: Constants,
         own: ClosureConstants,
+        layout: Layout,
         tree: Callable[[], Workspace],
         slowest: float,
         check: Callable[[int, int], None],
@@ -53,10 +55,11 @@ class Closures:
         `check` raises unless a status is OK; its second argument is the body or closure at fault.
         """
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
+        self._layout = layout
         self.constants = constants, own
         self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
         self._size = np.zeros(len(own.row))  # of the rows' ports there
-        self._chain = self.chain("articulated")
+        self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
 
     def chain(self, algorithm: Literal["articulated", "composite"], rate: float = 0.0) -> Closed:
@@ -82,8 +85,8 @@ class Closures:
 
     @property
     def doubt(self) -> Index:
-        """(1,) whether the last evaluation met a pivot of the tree that may be rounding."""
-        return self._chain.w.doubt
+        """(1,) whether the last motion met a pivot of the tree that may be rounding."""
+        return self._evaluated.w.doubt
 
     @property
     def fault(self) -> int:
@@ -91,7 +94,10 @@ class Closures:
         return int(self._chain.fault[0])
 
     def motion(self, t: float, y: Real) -> ClosedMotion:
-        """Everything about accelerations and loads at y = [q, u, work], which must be closed."""
+        """Everything about accelerations and loads at y = [q, u, work], which must be closed.
+
+        ValueError or TypeError for what does not fit, DynamicsError where the closures are singular.
+        """
         return self._motion(t, y, self._chain)
 
     def composite_motion(self, t: float, y: Real) -> ClosedMotion:
@@ -101,8 +107,8 @@ class Closures:
         return self._motion(t, y, self._composite)
 
     def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
-        s.cw.rank[0] = self.rank
-        self._check(dynamics.linearise(t, y, s), int(s.fault[0]))
+        s.cw.rank[0], self._evaluated = self.rank, s
+        self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
         self._check(dynamics.closure_loads(s.w, s.cc, s.cw), int(s.fault[0]))
         least = s.cw.row["load"] - _shadow(s.cw.row["load"], null_loads(s.cw))
         return self._under(s, least)
@@ -173,7 +179,7 @@ class Closures:
 
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
         """Distance and (sine of the) angle by which every closure is open."""
-        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, self._chain)
+        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
     def _gap(self, i: int, key: str) -> tuple[float, float]:

@@ -68,6 +68,7 @@ CLOSURE_STATE = _record(
     ("world", _F, (9,)),  # R_World_A
     ("size", _F),  # m, what a row's value is compared with: the scene's length and the distance from the origin
     ("speed", _F),  # m/s, what its rate is compared with: speeds of the ports, and the fastest of the scene
+    ("former_speed", _F),  # of the last state that a run has accepted, `flexmb.closure.branch`
 )
 
 

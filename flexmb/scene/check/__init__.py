@@ -27,7 +27,10 @@ def check_scene(scene: Scene, t_end: float | None = None) -> None:
     """Raise SceneError with all problems of a scene, or return. With `t_end` (s) profiles must cover the run.
 
     SID bodies and every fidelity level pass: whether they can be run is for `compile` to say.
+    TypeError for what is no scene at all.
     """
+    if not isinstance(scene, Scene):
+        raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")
     to_struct(plain(scene), Scene)  # a struct built by hand may hold values of any type
     problems = [*_run_time(t_end), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]
     problems += functions(scene, t_end)

@@ -82,7 +82,7 @@ def _read(place: Place, body: ModalBody) -> Generator[Problem, None, ModalArrays
         if broken is None:
             return arrays
         remedy = f"give finite numbers, of at most {LARGEST:g}"
-        yield Problem(str(spot), f'"{broken}" holds a NaN or an infinity', remedy)
+        yield Problem(str(spot), f'"{broken}" holds a NaN, or a number beyond {LARGEST:g}', remedy)
     return None
 
 
