@@ -203,6 +203,15 @@ def test_errors_are_described_with_their_place_and_without_their_faults() -> Non
     assert describe(ValueError("x" * LONGEST_TEXT)).endswith("(12 characters more)")
 
 
+def test_the_place_of_an_error_is_where_it_was_raised() -> None:
+    names: dict[str, Any] = {}
+    exec(compile("def fall():\n\n    raise ValueError('why')\n", "/far/odd.py", "exec"), names)
+    exec(compile("def stumble():\n    fall()\n", "/far/even.py", "exec"), names)
+    with pytest.raises(ValueError) as caught:
+        names["stumble"]()
+    assert describe(caught.value) == "ValueError: why (fall, odd.py line 3)"
+
+
 def test_a_refusal_is_recorded_and_nothing_is_compiled() -> None:
     actor = Actor(says={"supports": Support("no", "no beams")})
     assert emitted(actor) == [the("refused", "no beams", version="1.0", support="no beams")]

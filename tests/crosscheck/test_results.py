@@ -75,6 +75,32 @@ def test_a_record_without_an_effort_has_no_runs() -> None:
     assert (found.status, found.message, found.runs, found.channels) == ("crashed", "why", (), ())
 
 
+@pytest.mark.parametrize(
+    ("changes", "status", "message", "reached"),
+    [
+        ({}, "finished", "", None),
+        ({"rungs": 4}, "did not run", "the finest effort is not recorded: the session was cut short", None),
+        ({"times": None}, "failed", "its record holds no times", None),
+        ({"status": "failed", "message": "why"}, "failed", "why", None),
+        ({"status": "did not finish", "message": "why"}, "did not finish", "why", None),
+        ({"status": "diverged", "message": "why"}, "diverged", "diverged at t = 1 s: why", 1.0),
+        ({"status": "diverged", "message": "why", "times": None}, "diverged", "diverged at t = 0 s: why", 0.0),
+        (
+            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])},
+            "diverged",
+            "diverged at t = 0 s: why",
+            0.0,
+        ),
+    ],
+)
+def test_a_result_is_its_finest_run(changes: dict[str, Any], status: str, message: str, reached: float | None) -> None:
+    runs = [msgspec.structs.replace(run, rungs=changes.get("rungs", 3)) for run in ladder("one", {TIP: way()})]
+    runs[-1] = msgspec.structs.replace(runs[-1], **changes)
+    found = one(runs[::-1])
+    assert (found.variant, found.engine, found.status, found.message) == ("rigid", "one", status, message)
+    assert (found.reached_s, found.runs) == (reached, tuple(runs))
+
+
 def test_signals_are_unpacked_once() -> None:
     result = one(ladder("one", {TIP: way(), FORCE: way(2.0)}))
     assert result.values(TIP) is result.values(TIP)
