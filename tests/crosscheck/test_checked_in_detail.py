@@ -229,6 +229,28 @@ def test_edges_that_pass() -> None:
             checked_run(replace(GOOD, markers=turned(factor)), TIMES, SCENE)
 
 
+@pytest.mark.parametrize("end", [0.25, 4.0])
+def test_times_may_be_off_by_one_rounding_of_the_last_for_each_sample(end: float) -> None:
+    times = np.linspace(0.0, end, T)
+    for part, right in ((0.95, True), (1.05, False)):
+        off = times.copy()
+        off[1] += part * T * np.finfo(float).eps * end
+        if right:
+            assert len(checked_run(replace(GOOD, times=off), times, SCENE).times) == T
+        else:
+            with pytest.raises(BrokenContract, match=r"times\[1\] is"):
+                checked_run(replace(GOOD, times=off), times, SCENE)
+    start = Trajectory("finished", "", np.zeros(1), {})
+    assert len(checked_run(start, np.zeros(1), SCENE).times) == 1
+
+
+def test_a_quaternion_may_be_off_by_just_its_rounding() -> None:
+    long = np.zeros((T, 4))
+    long[:, 0] = 1.0 + UNIT
+    run = checked_run(replace(GOOD, markers={"tip": replace(TIP, quaternion=long)}), TIMES, SCENE)
+    assert np.array_equal(run.markers["tip"].quaternion, long)
+
+
 def test_sound_answers_pass_as_they_are() -> None:
     assert checked_version("1.0") == "1.0"
     for kind in ("exact", "surrogate", "no"):
