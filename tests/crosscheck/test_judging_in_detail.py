@@ -143,6 +143,67 @@ def test_the_words_of_a_finding() -> None:
     )
 
 
+UNSIZED = ": the case must state a scale for this channel"
+SHAPES = "the results are of different shapes, (3, 1) and (2, 1): samples by components"
+
+
+def values(*given: float, doubt: float = 0.0, sizes: tuple[float, ...] = ()) -> Signal:
+    return Signal(np.array(given)[:, None], Uncertainty(np.full(len(given), doubt), doubt, "given"), sizes)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "scale", "status", "reason"),
+    [
+        (values(1.0, 2.0, 3.0), values(1.0, 2.0), None, "failed", SHAPES),
+        (values(), values(), None, "failed", "the results hold no values at all"),
+        (values(np.nan), values(1.0), None, "failed", "a result holds values that are not numbers"),
+        (values(1.0), values(np.inf), None, "failed", "a result holds values that are not numbers"),
+        (
+            values(1e308),
+            values(-1e308),
+            None,
+            "failed",
+            "the results are so large that their distance is no number",
+        ),
+        (values(0.0, doubt=1e-9), values(0.0), None, "unresolved", f"the signal's size is 0{UNSIZED}"),
+        (
+            values(1e308, -1e308, doubt=1.0),
+            values(1e308, -1e308),
+            None,
+            "unresolved",
+            f"the signal's size is inf{UNSIZED}",
+        ),
+        (
+            values(1e300),
+            values(0.0),
+            1e-300,
+            "unresolved",
+            "the distance 1e+300 is beyond measure in units of the scale 1e-300",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_why_there_is_nothing_to_compare(a: Signal, b: Signal, scale: float | None, status: str, reason: str) -> None:
+    found = compare(TIP, a, b, 0.5, scale)
+    assert (found.status, found.reason, found.E, found.U, found.scale) == (status, reason, None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "size"),
+    [
+        (values(0.0, 2.0), values(0.0, 3.0), 3.0),
+        (values(0.0, 0.0), values(0.0, 0.0, sizes=(5.0,)), 5.0),
+        (values(0.0, 0.0, sizes=(0.0, 0.25)), values(0.0, 0.0, sizes=(0.0,)), 0.25),
+        (values(0.0, 0.5, doubt=0.5), values(0.0, 0.5, sizes=(4.0,)), 4.0),
+        (values(0.0, 0.5, doubt=0.5), values(0.0, 0.25, sizes=(0.125,)), 0.5),
+    ],
+)
+def test_a_signal_that_is_zero_within_its_doubt_is_measured_by_its_family(a: Signal, b: Signal, size: float) -> None:
+    tiny = Uncertainty(np.full(2, 1e-3), 1e-3, "given") if a.uncertainty.value == 0.0 else a.uncertainty
+    found = compare(FORCE, Signal(a.values, tiny, a.sizes), b, 1.0)
+    assert found.scale == size
+
+
 def results(text: str, runs: list) -> CaseResults:
     """The results of records, before they are judged."""
     record = CaseRecord(case="made/made", run=run_file(text), provenance=None, readme="", variants={})
