@@ -104,6 +104,8 @@ def test_real_numbers_of_other_kinds_become_float64_in_rows() -> None:
     assert run.momentum is not None and run.work is not None
     assert np.array_equal(run.momentum, whole)
     assert run.momentum.flags.c_contiguous and run.momentum.dtype == run.work.dtype == np.float64
+    subclass = checked_run(replace(GOOD, work=numbers().view(type("Odd", (np.ndarray,), {}))), TIMES, SCENE)
+    assert type(subclass.work) is np.ndarray
     unsigned = checked_run(replace(GOOD, work=np.arange(T, dtype=np.uint8)), TIMES, SCENE)
     assert unsigned.work is not None and unsigned.work[-1] == T - 1
 
