@@ -160,7 +160,8 @@ def _array(found: Any, where: str, count: int, *width: int | None) -> Array:
     _require(plain, f"{where} is {_named(found)}, not an array")
     _require(found.dtype.kind in "fiu", f"{where} is of dtype {found.dtype}, not of real numbers")
     shape = (count, *(n if n is not None else found.shape[-1] for n in width if found.ndim))
-    _require(found.shape == shape, f"{where} has shape {found.shape}; {_shape(count, width)} was expected")
+    right = found.shape == shape and 0 not in shape[1:]
+    _require(right, f"{where} has shape {found.shape}; {_shape(count, width)} was expected")
     return np.array(found, dtype=np.float64, order="C", subok=False)
 
 
@@ -168,7 +169,7 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
     """How many samples from the first are finite throughout; all must be where the run says that it finished."""
     count = len(run.times)
     for where, values in _signals(run):
-        good = np.all(np.isfinite(values.reshape(len(values), -1)), axis=1)
+        good = np.all(np.isfinite(values), axis=tuple(range(1, values.ndim)))
         first = int(np.argmin(np.append(good, False)))
         if finished and first < len(run.times):
             raise BrokenContract(f"{where} is not finite at t = {run.times[first]:g} s, and the status is finished")

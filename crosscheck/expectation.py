@@ -38,7 +38,7 @@ def _beyond(what: str, figure: float | None, band: Band | None) -> str:
         return f"the case sets no bounds to {what}"
     low, high = band
     if figure is None:
-        return f"there is no {what} to hold against the expected {low:.3g} to {high:.3g}"
+        return f"there is no figure for {what}, expected is {low:.3g} to {high:.3g}"
     return "" if low <= figure <= high else f"{what} = {figure:.3g} is outside the expected {low:.3g} to {high:.3g}"
 
 

@@ -185,3 +185,11 @@ def test_no_agreement_of_the_library_is_uncertain_by_more_than_a_hundredth() -> 
 
 def test_every_case_of_the_library_has_accepted_figures() -> None:
     assert all(case.accepted for case in shipped_cases())
+
+
+def test_ten_times_the_figure_is_not_yet_worse() -> None:
+    assert worse(Figure(0.0, 0.5), 5.0, 5.0) == ""
+    assert worse(Figure(0.5, 0.25), 5.0, 2.5) == ""
+    assert (
+        worse(Figure(0.5, 0.25), 5.1, 2.6) == "U is 2.6e+00, accepted were 2.5e-01; E is 5.1e+00, accepted were 5.0e-01"
+    )

@@ -115,6 +115,25 @@ def test_a_diverged_run_is_cut_to_its_finite_samples() -> None:
     assert len(checked_run(replace(GOOD, status="failed", message="why", work=nothing), TIMES, SCENE).times) == 0
 
 
+def test_a_run_may_end_before_its_first_sample() -> None:
+    """Every array is there, and empty: the run keeps its own status and reason."""
+    tip = GOOD.markers["tip"]
+    empty = replace(
+        GOOD, status="diverged", message="singular at 0 s", times=TIMES[:0], momentum=GOOD.momentum[:0],
+        markers={"tip": MarkerPath(tip.position[:0], tip.quaternion[:0], tip.velocity[:0])}, loads={},
+        drives={"pivot": np.zeros((0, 1))}, energy={"kinetic": np.zeros(0)}, work=np.zeros(0),
+    )  # fmt: skip
+    run = checked_run(empty, TIMES, SCENE)
+    assert (run.status, run.message, len(run.times)) == ("diverged", "singular at 0 s", 0)
+    with pytest.raises(BrokenContract, match="before its first sample of 1 s and called it done"):
+        checked_run(replace(empty, status="finished"), TIMES, SCENE)
+
+
+def test_a_drive_has_a_coordinate() -> None:
+    with pytest.raises(BrokenContract, match=r"drives\['pivot'\] has shape \(11, 0\); \(11, n\) was expected"):
+        checked_run(replace(GOOD, drives={"pivot": np.zeros((11, 0))}), TIMES, SCENE)
+
+
 def test_times_may_be_off_by_the_roundings_of_a_clock_that_adds_up() -> None:
     added = np.concatenate([[0.0], np.cumsum(np.full(10, 0.1))])
     assert not np.array_equal(added, TIMES)

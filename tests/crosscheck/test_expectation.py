@@ -116,3 +116,41 @@ def test_a_reason_without_endings_is_the_findings_own() -> None:
     refused = Finding("refused", "two does not offer energy.total")
     assert outside(expecting("refused", because="does not offer"), TIP, refused) == ""
     assert outside(expecting("refused", because="cannot"), TIP, refused) == 'the expected reason is "cannot"'
+
+
+def test_what_is_outside_is_named_with_its_figures() -> None:
+    """What was measured, what was expected of it, and which bound the case lacks."""
+    late = Finding("diverged", "so", endings=(Ending("diverged", "so", 7.0),))
+    untimed = Finding("diverged", "so", endings=(Ending("diverged", "so"),))
+    failed = Finding("failed", "no luck")
+    vague = Finding("unresolved", "so", 1e-9, 0.5, 1.0)
+    for item, finding, said in (
+        (
+            expecting("differ", band={TIP: (1.0, 2.0)}),
+            Finding("differ", "so", 3.0),
+            "E = 3 is outside the expected 1 to 2",
+        ),
+        (expecting("differ"), Finding("differ", "so", 3.0), "the case sets no bounds to E"),
+        (expecting("unresolved", band={TIP: (1.0, 2.0)}), vague, "U = 0.5 is outside the expected 1 to 2"),
+        (expecting("unresolved"), vague, "the case sets no bounds to U"),
+        (
+            expecting("unresolved", band={TIP: (1.0, 2.0)}),
+            Finding("unresolved", "so"),
+            "there is no figure for U, expected is 1 to 2",
+        ),
+        (
+            expecting("diverged", diverged_s=(1.0, 2.0)),
+            late,
+            "the time reached (s) = 7 is outside the expected 1 to 2",
+        ),
+        (
+            expecting("diverged", diverged_s=(1.0, 2.0)),
+            untimed,
+            "there is no figure for the time reached (s), expected is 1 to 2",
+        ),
+        (expecting("failed"), failed, "the case sets no bounds to the reason"),
+        (expecting("failed", because="license"), failed, 'the expected reason is "license"'),
+        (expecting("failed", because="luck"), failed, ""),
+        (expecting("agree"), Finding("agree", "so", 0.0, 0.0), ""),
+    ):
+        assert outside(item, TIP, finding) == said

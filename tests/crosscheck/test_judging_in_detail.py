@@ -7,11 +7,13 @@ import numpy as np
 import pytest
 
 from crosscheck.accepted import Figure, dumps, figures, recordable
+from crosscheck.judge import judge
+from crosscheck.records import CaseRecord, VariantInfo
 from crosscheck.report.outcome import Outcome
 from crosscheck.results import CaseResults, Result, collect
 from crosscheck.uncertainty import Uncertainty, spatial
 from crosscheck.verdict import Finding, Signal, Verdict, compare, conserve
-from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, judged, ladder, run_file, single, way
+from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 FORCE = "load:pivot.force"
 CONTROL = """
@@ -141,10 +143,69 @@ def test_the_words_of_a_finding() -> None:
     )
 
 
+UNSIZED = ": the case must state a scale for this channel"
+SHAPES = "the results are of different shapes, (3, 1) and (2, 1): samples by components"
+
+
+def values(*given: float, doubt: float = 0.0, sizes: tuple[float, ...] = ()) -> Signal:
+    return Signal(np.array(given)[:, None], Uncertainty(np.full(len(given), doubt), doubt, "given"), sizes)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "scale", "status", "reason"),
+    [
+        (values(1.0, 2.0, 3.0), values(1.0, 2.0), None, "failed", SHAPES),
+        (values(), values(), None, "failed", "the results hold no values at all"),
+        (values(np.nan), values(1.0), None, "failed", "a result holds values that are not numbers"),
+        (values(1.0), values(np.inf), None, "failed", "a result holds values that are not numbers"),
+        (
+            values(1e308),
+            values(-1e308),
+            None,
+            "failed",
+            "the results are so large that their distance is no number",
+        ),
+        (values(0.0, doubt=1e-9), values(0.0), None, "unresolved", f"the signal's size is 0{UNSIZED}"),
+        (
+            values(1e308, -1e308, doubt=1.0),
+            values(1e308, -1e308),
+            None,
+            "unresolved",
+            f"the signal's size is inf{UNSIZED}",
+        ),
+        (
+            values(1e300),
+            values(0.0),
+            1e-300,
+            "unresolved",
+            "the distance 1e+300 is beyond measure in units of the scale 1e-300",
+        ),
+    ],
+)
+@pytest.mark.filterwarnings("error")
+def test_why_there_is_nothing_to_compare(a: Signal, b: Signal, scale: float | None, status: str, reason: str) -> None:
+    found = compare(TIP, a, b, 0.5, scale)
+    assert (found.status, found.reason, found.E, found.U, found.scale) == (status, reason, None, None, None)
+
+
+@pytest.mark.parametrize(
+    ("a", "b", "size"),
+    [
+        (values(0.0, 2.0), values(0.0, 3.0), 3.0),
+        (values(0.0, 0.0), values(0.0, 0.0, sizes=(5.0,)), 5.0),
+        (values(0.0, 0.0, sizes=(0.0, 0.25)), values(0.0, 0.0, sizes=(0.0,)), 0.25),
+        (values(0.0, 0.5, doubt=0.5), values(0.0, 0.5, sizes=(4.0,)), 4.0),
+        (values(0.0, 0.5, doubt=0.5), values(0.0, 0.25, sizes=(0.125,)), 0.5),
+    ],
+)
+def test_a_signal_that_is_zero_within_its_doubt_is_measured_by_its_family(a: Signal, b: Signal, size: float) -> None:
+    tiny = Uncertainty(np.full(2, 1e-3), 1e-3, "given") if a.uncertainty.value == 0.0 else a.uncertainty
+    found = compare(FORCE, Signal(a.values, tiny, a.sizes), b, 1.0)
+    assert found.scale == size
+
+
 def results(text: str, runs: list) -> CaseResults:
     """The results of records, before they are judged."""
-    from crosscheck.records import CaseRecord
-
     record = CaseRecord(case="made/made", run=run_file(text), provenance=None, readme="", variants={})
     return collect([record, *runs]).cases[0]
 
@@ -281,3 +342,140 @@ def test_an_unused_pattern_says_all_of_itself() -> None:
     }  # fmt: skip
     assert unused.reason == said
     assert single(judged(text, runs[:3])).status == "did not run"
+
+
+def test_an_unused_band_is_named_as_one() -> None:
+    text = (
+        ONE_PAIR
+        + 'expect = "differ"\nreason = "why"\nband = { "marker:tip" = [0.1, 1.0], "load:pivot" = [1.0, 2.0] }\n'
+    )
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way(1.5)})]
+    *_, unused = judged(text, runs).all
+    assert unused.reason == 'a band is given for "load:pivot", which is no channel judged here'
+
+
+@pytest.mark.parametrize("broken", ["one", "two"])
+def test_a_missing_side_is_told_once_for_each_goal(broken: str) -> None:
+    """Whichever side it is; what else the run file says of channels is not asked then."""
+    text = ONE_PAIR.replace("= 1e-3 }", '= 1e-3, "load" = 0.1 }') + 'scales = { "marker:top.position" = 2.0 }\n'
+    runs = {name: ladder(name, {TIP: way()}) for name in ("one", "two")}
+    runs[broken][-1] = ended(runs[broken][-1], "failed", "no luck")
+    found = judged(text, [*runs["one"], *runs["two"]]).all
+    said = f"{broken} on rigid: no luck"
+    assert [(each.channel, each.goal, each.status, each.reason) for each in found] == [
+        (TIP, 1e-3, "failed", said),
+        ("load", 0.1, "failed", said),
+    ]
+
+
+def test_bounds_are_held_against_what_was_expected_alone() -> None:
+    """An expected difference that is none, or a drift that is none, is not as expected; its size is no matter."""
+    text = ONE_PAIR + 'expect = "differ"\nreason = "why"\nband = { "marker:tip" = [0.1, 1.0] }\n'
+    verdict = single(judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
+    assert (verdict.status, verdict.outside, verdict.ok) == ("agree", "", False)
+    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+
+
+@pytest.mark.parametrize(
+    ("level", "status", "beyond"),
+    [
+        (0.5, "differ", ""),
+        (0.95, "differ", "E = 0.05 is outside the expected 0.1 to 1"),
+        (1.0, "agree", ""),
+    ],
+)
+def test_the_band_of_a_drift(level: float, status: str, beyond: str) -> None:
+    momentum = np.ones((len(TIMES), 3))
+    momentum[4] = level
+    text = CONTROL[CONTROL.index("[[variant]]") : CONTROL.index("[[control]]")]
+    text += CONTROL[CONTROL.index("[[conservation]]") :]
+    verdict = single(judged(text, ladder("two", {"momentum.linear": momentum})))
+    assert (verdict.status, verdict.outside) == (status, beyond)
+    assert verdict.ok is (level == 0.5)
+    assert verdict.reason.endswith(f"; {beyond}" if beyond else "limit 0.001")
+
+
+ACROSS = """
+[[variant]]
+name = "rigid"
+engines = ["one", "two"]
+
+[[variant]]
+name = "cut"
+transform = "segments"
+segments = 2
+refined = { segments = 4 }
+engines = ["two"]
+"""
+
+
+def across(item: str) -> list[Verdict]:
+    """Verdicts where the other side's variant has a refined run that is another."""
+    true = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()}), *ladder("two", {TIP: way()}, variant="cut")]
+    refined = ladder("two", {TIP: way(1.1)}, variant="cut", role="refined")[-1:]
+    faulty = ladder("one", {TIP: way(3.0)}, role="control:fault")[-1:]
+    return judged(ACROSS + item, [*true, *refined, *faulty]).all
+
+
+@pytest.mark.parametrize("sides", [("one", "rigid", "two", "cut"), ("two", "cut", "one", "rigid")])
+def test_across_variants_the_doubt_of_either_side_is_also_spatial(sides: tuple[str, ...]) -> None:
+    item = f"""
+[[comparison]]
+name = "both"
+a = {{ engine = "{sides[0]}", variant = "{sides[1]}" }}
+b = {{ engine = "{sides[2]}", variant = "{sides[3]}" }}
+goals = {{ "{TIP}" = 0.5 }}
+"""
+    (found,) = across(item)
+    assert (found.status, found.level) == ("agree", "rigid")
+    assert np.isclose(found.U or 0.0, 0.1 * 1.25 / 0.75, rtol=1e-3)
+
+
+def test_a_control_across_variants_too() -> None:
+    item = f"""
+[[control]]
+name = "fault"
+mutation = "mass"
+a = {{ engine = "one", variant = "rigid" }}
+b = {{ engine = "two", variant = "cut" }}
+goals = {{ "{TIP}" = 0.5 }}
+scales = {{ "{TIP}" = 1.0 }}
+"""
+    (found,) = across(item)
+    assert found.status == "differ" and np.isclose(found.E or 0.0, 2.0, rtol=1e-4)
+    assert np.isclose(found.U or 0.0, 0.1 * 1.25 / 0.75, rtol=1e-3)
+
+
+def test_a_control_has_no_accepted_figure() -> None:
+    place = f"{TIP} | one (rigid) | two (rigid)"
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    runs += ladder("one", {TIP: way(1.5)}, role="control:fault")[-1:]
+    text = CONTROL.split("[[conservation]]")[0]
+    control = single(judged(text, runs, {"fault": {place: Figure(1e-9, 1e-9)}}))
+    assert (control.accepted, control.worse, control.ok) == (None, "", True)
+
+
+def test_levels_of_both_sides_are_named_once_each() -> None:
+    text = """
+[[variant]]
+name = "rigid"
+engines = ["one", "two"]
+
+[[variant]]
+name = "soft"
+engines = ["two"]
+
+[[comparison]]
+name = "both"
+a = { engine = "one", variant = "rigid" }
+b = { engine = "two", variant = "soft" }
+goals = { "marker:tip.position" = 1e-3 }
+"""
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()}, variant="soft")]
+    infos = {"rigid": VariantInfo(level="exact", drawing=None), "soft": VariantInfo(level="full", drawing=None)}
+    record = CaseRecord(case="made/made", run=run_file(text), provenance=None, readme="", variants=infos)
+    (verdict,) = judge(collect([record, *runs]).cases[0])
+    assert (verdict.level, verdict.status) == ("exact / full", "agree")
+    alike = {name: VariantInfo(level="full", drawing=None) for name in infos}
+    (verdict,) = judge(collect([msgspec.structs.replace(record, variants=alike), *runs]).cases[0])
+    assert verdict.level == "full"
