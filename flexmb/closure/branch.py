@@ -18,7 +18,6 @@ from flexmb.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
 AT_CROSSING = 2.0**-20
-AT_REST = 2.0**-36  # of the mechanism's size: 256 times how far closures are closed, a part 2^-16 of `AT_CROSSING`
 ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
 
 
@@ -39,14 +38,13 @@ def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
     By the time that is left at the rate of the step, in the time in which ports pass through the whole mechanism, as
-    fast as in that step: where they come to rest, they have no speed. In a step in which they rest pivots fall by
-    rounding only: it counts as one in which they move by `AT_REST`.
+    fast as in that step: where they come to rest, they have no speed.
     """
     for a in range(cw.rank[0]):
         i = cc.row[cw.chosen[a]].closure
         left, fallen = cw.factor[a, a], cw.former_pivot[a] - (1.0 + ROUND_OFF) * cw.factor[a, a]
-        speed, size = max(cw.closure[i].speed, cw.closure[i].former_speed), cw.closure[i].size
-        if left * max((t - cw.time[0]) * speed, AT_REST * size) < AT_CROSSING * fallen * size:
+        speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
+        if left * (t - cw.time[0]) * speed < AT_CROSSING * fallen * cw.closure[i].size:
             return cw.chosen[a]
     return -1
 
