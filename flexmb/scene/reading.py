@@ -17,7 +17,8 @@ TEXT_LIMIT = 16 * MIB  # of a file that people write; tomllib takes some 10 s fo
 # of nothing else holds no data.
 FREE, RATIO = 64 * MIB, 100
 DEEPEST = 64  # parts of a dotted key: no scene and no run file has more than three
-DOTTED = re.compile(rf"(?:[\w-]+[ \t]*\.[ \t]*){{{DEEPEST}}}")
+# Looked for where a word begins, giving nothing back: a search from anywhere in a long word takes its square.
+DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 
 
 class Unreadable(ValueError):

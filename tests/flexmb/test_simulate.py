@@ -178,7 +178,7 @@ def test_steps_stop_where_a_load_switches():
         ({"method": "rk4"}, "give a positive step"),
         ({"method": "rk4", "step": -1.0}, "give a positive step"),
         ({"step": 0.1}, "leave step out"),
-        ({"rtol": 1e-17}, "use a value from there"),
+        ({"rtol": 1e-17}, "use a value between them"),
         ({"atol": 0.0}, "give a positive one"),
         ({"samples": 1}, "at least 2 output times"),
         ({"samples": [0.0, 2.0, 1.0]}, "must increase from 0 to t_end"),
