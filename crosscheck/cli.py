@@ -13,22 +13,22 @@ from typing import Annotated, NoReturn
 import typer
 from rich.console import Console
 
-from crosscheck import library
-from crosscheck.accept import NotAccepted, accept_figures
-from crosscheck.case import CaseError
-from crosscheck.engine_list import describe_engines
-from crosscheck.live import LiveProgress
-from crosscheck.lock import FolderInUseError, locked
-from crosscheck.pool import TIME_LIMIT_S
+from crosscheck.judging.accept import NotAccepted, accept_figures
+from crosscheck.library import find
+from crosscheck.library.case import CaseError
+from crosscheck.library.selection import without_part
+from crosscheck.records.lock import FolderInUseError, locked
+from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome, words
-from crosscheck.selection import without_part
-from crosscheck.session import last_session, standing
-from crosscheck.sweep import sweep
-from crosscheck.verify import sample_times_csv, verify_csv
-from crosscheck.verify_table import channels_table
+from crosscheck.running.engine_list import describe_engines
+from crosscheck.running.live import LiveProgress
+from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.sweep import sweep
+from crosscheck.verify.table import channels_table
+from crosscheck.verify.verify import sample_times_csv, verify_csv
+from flexmb.output.writing import in_words
 from flexmb.scene.problems import closest
-from flexmb.writing import in_words
 
 EXIT_USAGE = 2
 
@@ -239,10 +239,10 @@ def stability(
     raise typer.Exit(code)
 
 
-def _found(words: tuple[str, ...]) -> tuple[library.Case, ...]:
+def _found(words: tuple[str, ...]) -> tuple[find.Case, ...]:
     """The cases asked for, or the end of the program with exit code 2."""
     try:
-        return library.resolve(words)
+        return find.resolve(words)
     except CaseError as error:
         _refuse(str(error))
 
@@ -259,7 +259,7 @@ def _check_limit(seconds: float | None) -> None:
         _refuse(f"--time-limit {seconds:g}: give a positive number of seconds")
 
 
-def _accept(cases: tuple[library.Case, ...], records: Path, partial: bool) -> bool:
+def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
     """Write what the cases have reached beside their run files, or say why not; whether it was done."""
     try:
         for file, count in accept_figures(cases, records, partial):

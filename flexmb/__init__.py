@@ -21,17 +21,17 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.system import ClosureError
-    from flexmb.interruption import Interrupted
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linearize import linearize
     from flexmb.linear.model import LinearModel
     from flexmb.linear.spin import SteadySpin, steady_spin
-    from flexmb.simulation import simulate
-    from flexmb.state import DynamicsError, PrecisionWarning, State
-    from flexmb.status import Status
-    from flexmb.system import Evaluation, System, compile
-    from flexmb.trajectory import Trajectory
+    from flexmb.run.interruption import Interrupted
+    from flexmb.run.simulate import simulate
+    from flexmb.run.trajectory import Trajectory
+    from flexmb.system.system import Evaluation, System, compile
+    from flexmb.tables.state import DynamicsError, PrecisionWarning, State
+    from flexmb.tables.status import Status
 
 _LATER = {
     "Advice": "flexmb.advisor.advice",
@@ -42,19 +42,19 @@ _LATER = {
     "equilibrium": "flexmb.linear.equilibrium",
     "EquilibriumError": "flexmb.linear.equilibrium",
     "linearize": "flexmb.linear.linearize",
-    "Interrupted": "flexmb.interruption",
+    "Interrupted": "flexmb.run.interruption",
     "LinearModel": "flexmb.linear.model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
-    "simulate": "flexmb.simulation",
-    "Status": "flexmb.status",
-    "DynamicsError": "flexmb.state",
-    "Evaluation": "flexmb.system",
-    "PrecisionWarning": "flexmb.state",
-    "State": "flexmb.state",
-    "System": "flexmb.system",
-    "compile": "flexmb.system",
-    "Trajectory": "flexmb.trajectory",
+    "simulate": "flexmb.run.simulate",
+    "Status": "flexmb.tables.status",
+    "DynamicsError": "flexmb.tables.state",
+    "Evaluation": "flexmb.system.system",
+    "PrecisionWarning": "flexmb.tables.state",
+    "State": "flexmb.tables.state",
+    "System": "flexmb.system.system",
+    "compile": "flexmb.system.system",
+    "Trajectory": "flexmb.run.trajectory",
 }
 
 __all__ = [

@@ -11,11 +11,11 @@ import typer
 from rich.console import Console
 from rich.text import Text
 
-from flexmb.printable import printable
+from flexmb.output.printable import printable
+from flexmb.output.writing import check_folder, folder, in_words, writing
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.reference import json_schema
-from flexmb.writing import check_folder, folder, in_words, writing
 
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
@@ -87,9 +87,9 @@ def simulate(
     """
     interrupted = False
     with _no_traceback():
-        from flexmb.interruption import Interrupted
-        from flexmb.simulation import simulate as run  # after the words are understood: it loads the compiler
-        from flexmb.summary import summary
+        from flexmb.run.interruption import Interrupted
+        from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
+        from flexmb.run.summary import summary
 
         check_folder(out)
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
@@ -274,7 +274,7 @@ def linearize(
         from flexmb.linear.linearize import linearize as linearized
         from flexmb.linear.spin import steady_spin
         from flexmb.linear.table import modes_table
-        from flexmb.system import compile
+        from flexmb.system.system import compile
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")

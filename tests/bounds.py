@@ -11,9 +11,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 UNIT_ROUNDOFF = 2.0**-53
 
@@ -58,6 +58,6 @@ def observed_order(steps: ArrayLike, errors: ArrayLike, floor: float, last: int 
 def relative(a: ArrayLike, b: ArrayLike, scale: ArrayLike | None = None) -> float:
     """max |a - b| over the larger magnitude of both, or over `scale`'s where the terms are larger than their sum."""
     a, b = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
-    sizes: Sequence[Array] = [a, b] if scale is None else [np.asarray(scale, dtype=float)]
+    sizes: Sequence[Real] = [a, b] if scale is None else [np.asarray(scale, dtype=float)]
     size = max(float(np.max(np.abs(x), initial=0.0)) for x in sizes)
     return float(np.max(np.abs(a - b), initial=0.0)) / size if size > 0.0 else 0.0

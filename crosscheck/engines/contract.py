@@ -9,12 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, runtime_checkable
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
+Array = Real  # as engines outside this package import it
 Status = Literal["finished", "diverged", "failed"]
 
 
@@ -30,7 +28,7 @@ class Support:
 class Run:
     """What to simulate: from t = 0 to the last of `times` (s, strictly increasing, first is 0)."""
 
-    times: Array
+    times: Real
 
 
 @dataclass(frozen=True)
@@ -56,10 +54,10 @@ class MarkerSnapshot:
     The linear acceleration is the classical one of the marker point (not the spatial acceleration's linear part).
     """
 
-    position: Array
-    quaternion: Array
-    velocity: Array
-    acceleration: Array
+    position: Real
+    quaternion: Real
+    velocity: Real
+    acceleration: Real
 
 
 @dataclass(frozen=True)
@@ -74,42 +72,43 @@ class Snapshot:
     """
 
     markers: dict[str, MarkerSnapshot]
-    loads: dict[str, Array]
-    wheel_loads: dict[str, Array]
-    drives: dict[str, Array]
+    loads: dict[str, Real]
+    wheel_loads: dict[str, Real]
+    drives: dict[str, Real]
     energy: dict[str, float]
-    momentum: Array | None
+    momentum: Real | None
 
 
 @dataclass(frozen=True)
 class MarkerPath:
     """Marker motion over time: position (T,3), quaternion (T,4), spatial velocity (T,6) [angular; linear]."""
 
-    position: Array
-    quaternion: Array
-    velocity: Array
+    position: Real
+    quaternion: Real
+    velocity: Real
 
 
 @dataclass(frozen=True)
 class Trajectory:
     """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
 
-    All this is checked before it is recorded (`crosscheck.checked`); an answer that breaks it counts as *failed*. Names
-    are those of the scene; a marker, a load or an energy that is left out is a channel that the engine does not offer.
+    All this is checked before it is recorded (`crosscheck.running.checked`); an answer that breaks it counts as
+    *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
+    does not offer.
     `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
     done so far by drives, motors, dampers and loads, where the engine integrates it. `wall_s` times only the solve.
     """
 
     status: Status
     message: str
-    times: Array
+    times: Real
     markers: dict[str, MarkerPath]
-    loads: dict[str, Array] = field(default_factory=dict)
-    wheel_loads: dict[str, Array] = field(default_factory=dict)
-    drives: dict[str, Array] = field(default_factory=dict)
-    energy: dict[str, Array] = field(default_factory=dict)
-    momentum: Array | None = None
-    work: Array | None = None
+    loads: dict[str, Real] = field(default_factory=dict)
+    wheel_loads: dict[str, Real] = field(default_factory=dict)
+    drives: dict[str, Real] = field(default_factory=dict)
+    energy: dict[str, Real] = field(default_factory=dict)
+    momentum: Real | None = None
+    work: Real | None = None
     wall_s: float = 0.0
     evaluations: int = 0
 

@@ -9,48 +9,47 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flexmb.scene.schema import Body, Hinge
 from flexmb.scene.tree import GROUND, node_frame
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 
-
-def scalar_last(quaternion: ArrayLike) -> Array:
+def scalar_last(quaternion: ArrayLike) -> Real:
     """wxyz (..., 4) to xyzw (Pinocchio, SciPy)."""
     return np.asarray(quaternion, dtype=float)[..., [1, 2, 3, 0]]
 
 
-def scalar_first(quaternion: ArrayLike) -> Array:
+def scalar_first(quaternion: ArrayLike) -> Real:
     """xyzw (..., 4) to wxyz (this project, MuJoCo, Exudyn)."""
     return np.asarray(quaternion, dtype=float)[..., [3, 0, 1, 2]]
 
 
-def angular_first(spatial: ArrayLike) -> Array:
+def angular_first(spatial: ArrayLike) -> Real:
     """[linear; angular] (..., 6) to [angular; linear]; its own inverse."""
     return np.asarray(spatial, dtype=float)[..., [3, 4, 5, 0, 1, 2]]
 
 
-def cross(a: Array, b: Array) -> Array:
+def cross(a: Real, b: Real) -> Real:
     """a x b over the last axis (..., 3): `np.cross` without its generality, which costs twenty times as much."""
     return a[..., [1, 2, 0]] * b[..., [2, 0, 1]] - a[..., [2, 0, 1]] * b[..., [1, 2, 0]]
 
 
-def cross_matrix(a: ArrayLike) -> Array:
+def cross_matrix(a: ArrayLike) -> Real:
     """skew(a) (3,3): skew(a) b = a x b."""
     x, y, z = np.asarray(a, dtype=float)
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def rotation_matrix(quaternion: ArrayLike) -> Array:
+def rotation_matrix(quaternion: ArrayLike) -> Real:
     """R (3,3) of a unit quaternion wxyz."""
     w, *vector = np.asarray(quaternion, dtype=float)
     v = np.array(vector)
     return (w * w - v @ v) * np.eye(3) + 2.0 * np.outer(v, v) + 2.0 * w * cross_matrix(v)
 
 
-def quaternion_of(rotation: ArrayLike) -> Array:
+def quaternion_of(rotation: ArrayLike) -> Real:
     """Unit quaternion wxyz with w >= 0 of a rotation matrix (3,3), by its largest component (no cancellation)."""
     R = np.asarray(rotation, dtype=float)
     # 4 q q' in terms of R; the row with the largest diagonal is the best conditioned.
@@ -63,7 +62,7 @@ def quaternion_of(rotation: ArrayLike) -> Array:
     return q if q[0] >= 0.0 else -q
 
 
-def rotation_vector(quaternion: ArrayLike) -> Array:
+def rotation_vector(quaternion: ArrayLike) -> Real:
     """Rotation vector (3,) of a unit quaternion wxyz, angle in [0, pi]."""
     q = np.asarray(quaternion, dtype=float)
     q = q if q[0] >= 0.0 else -q
@@ -71,27 +70,27 @@ def rotation_vector(quaternion: ArrayLike) -> Array:
     return 2.0 * q[1:] if s == 0.0 else 2.0 * np.arctan2(s, q[0]) / s * q[1:]
 
 
-def axis_rotation(axis: ArrayLike, angle: float) -> Array:
+def axis_rotation(axis: ArrayLike, angle: float) -> Real:
     """R (3,3) of a turn by `angle` about the unit vector `axis` (Rodrigues)."""
     K = cross_matrix(axis)
     return np.eye(3) + np.sin(angle) * K + (1.0 - np.cos(angle)) * K @ K
 
 
-def quaternion_rate(quaternion: ArrayLike, omega: ArrayLike) -> Array:
+def quaternion_rate(quaternion: ArrayLike, omega: ArrayLike) -> Real:
     """d/dt of wxyz for the angular velocity `omega` in the turning (outboard) axes: 1/2 q o (0, omega)."""
     w, x, y, z = quaternion
     a, b, c = omega
     return 0.5 * np.array([-x * a - y * b - z * c, w * a + y * c - z * b, w * b + z * a - x * c, w * c + x * b - y * a])
 
 
-def shift_wrench(wrench: Array, offset: Array) -> Array:
+def shift_wrench(wrench: Real, offset: Real) -> Real:
     """[tau; f] (..., 6) about Q from the same wrench about O, with `offset` (..., 3) from Q to O, one set of axes."""
     moved = np.array(wrench, dtype=float)
     moved[..., :3] += cross(offset, moved[..., 3:])
     return moved
 
 
-def rotate_spatial(rotation: Array, spatial: ArrayLike) -> Array:
+def rotate_spatial(rotation: Real, spatial: ArrayLike) -> Real:
     """Both halves of a spatial vector (6,) from B to A components with R_AB."""
     return (np.asarray(spatial, dtype=float).reshape(2, 3) @ rotation.T).reshape(6)
 
@@ -100,8 +99,8 @@ def rotate_spatial(rotation: Array, spatial: ArrayLike) -> Array:
 class Frame:
     """Pose of a frame B in A: `position` (3,) m of B's origin in A axes, `rotation` (3,3) = R_AB."""
 
-    position: Array
-    rotation: Array
+    position: Real
+    rotation: Real
 
     def __matmul__(self, inner: Frame) -> Frame:
         """X_AB @ X_BC = X_AC."""
@@ -111,7 +110,7 @@ class Frame:
         return Frame(-self.rotation.T @ self.position, self.rotation.T)
 
     @property
-    def quaternion(self) -> Array:
+    def quaternion(self) -> Real:
         """wxyz."""
         return quaternion_of(self.rotation)
 

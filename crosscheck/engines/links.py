@@ -10,7 +10,6 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import (
     IDENTITY_FRAME,
@@ -48,8 +47,8 @@ from flexmb.scene.schema import (
 )
 from flexmb.scene.tree import GROUND, coordinates, ordered
 from flexmb.surrogate.lumping import Inertia, combine, inertia_of, rigid_equivalent
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 Kind = Literal["body", "wheel", "point mass"]
 X: Vector = (1.0, 0.0, 0.0)
 Y: Vector = (0.0, 1.0, 0.0)
@@ -64,7 +63,7 @@ class Scalar:
     """
 
     angular: bool
-    axis: Array
+    axis: Real
     value: float
     rate: float
     stiffness: float
@@ -78,8 +77,8 @@ class Scalar:
 class Ball:
     """Quaternion wxyz and angular velocity in outboard axes; torque -stiffness * rotation vector - damping * omega."""
 
-    quaternion: Array
-    angular_velocity: Array
+    quaternion: Real
+    angular_velocity: Real
     stiffness: float = 0.0
     damping: float = 0.0
 
@@ -88,10 +87,10 @@ class Ball:
 class Floating:
     """Position of the outboard origin in inboard axes, quaternion; both velocities relative, in outboard axes."""
 
-    position: Array
-    quaternion: Array
-    angular_velocity: Array
-    velocity: Array
+    position: Real
+    quaternion: Real
+    angular_velocity: Real
+    velocity: Real
 
 
 Freedom = Scalar | Ball | Floating

@@ -16,12 +16,12 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
-from flexmb.closed_system import ClosedSystem
-from flexmb.methods import FIXED, LINEARISING, Method
+from flexmb.integrate.settings import FIXED, LINEARISING, Method
+from flexmb.run.simulate import simulate
+from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
-from flexmb.simulation import simulate
-from flexmb.system import ERRATA, Algorithm, System, compile
-from flexmb.trajectory import Trajectory as NativeTrajectory
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.system import ERRATA, Algorithm, System, compile
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)

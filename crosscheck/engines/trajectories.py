@@ -5,22 +5,20 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerPath, Snapshot, Status, Trajectory
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 def stack(
-    times: Array,
+    times: Real,
     samples: Sequence[Snapshot],
     *,
     status: Status,
     message: str,
     wall_s: float,
     evaluations: int,
-    work: Array | None = None,
+    work: Real | None = None,
 ) -> Trajectory:
     """One trajectory from the snapshot of each sample time reached; never empty, since t = 0 is always reached."""
     first = samples[0]
@@ -47,7 +45,7 @@ def stack(
     )
 
 
-def continuous(quaternions: Array) -> Array:
+def continuous(quaternions: Real) -> Real:
     """The same rotations (T,4) with signs chosen so that successive quaternions are near each other."""
     steps = np.sign(np.sum(quaternions[1:] * quaternions[:-1], axis=1))
     signs = np.cumprod(np.concatenate([[1.0], np.where(steps < 0.0, -1.0, 1.0)]))

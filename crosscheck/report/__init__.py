@@ -3,13 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from crosscheck.records import Record, read
+from crosscheck.judging.results import collect
+from crosscheck.records.records import Record, read
+from crosscheck.records.session import standing
 from crosscheck.report.html import write_report
 from crosscheck.report.outcome import Outcome, conclude, write_verdicts
 from crosscheck.report.summary import write_junit, write_summary
-from crosscheck.results import collect
-from crosscheck.session import standing
-from flexmb.writing import folder, writing
+from flexmb.output.writing import folder, writing
 
 __all__ = ["Choice", "Outcome", "write_all"]
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-from crosscheck.drawing import Drawing, Line
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.records.drawing import Drawing, Line
 from crosscheck.report.store import Store
-from crosscheck.results import CaseResults, Result
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:

@@ -11,17 +11,16 @@ from dataclasses import asdict
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from crosscheck.judge import drift_of
+from crosscheck.judging.judge import drift_of
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.verdict import Verdict
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
-from crosscheck.results import CaseResults, Result
-from crosscheck.verdict import Verdict
-from crosscheck.workprecision import WorkPrecision, work_precision
-from flexmb.channels import distance, family, matches, signal_range, unit
+from crosscheck.report.workprecision import WorkPrecision, work_precision
+from flexmb.run.channels import distance, family, matches, signal_range, unit
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
 RUNAWAY = 20.0  # a signal that many times as large as another has run away from it
 STILL, BAND = 1e-3, 0.05  # a signal that moves less than that part of its size is still, and shown in such a band
@@ -129,7 +128,7 @@ def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> di
     }
 
 
-def _shown_range(signals: list[Array]) -> list[float] | None:
+def _shown_range(signals: list[Real]) -> list[float] | None:
     """Limits of the drawing where the automatic ones would hide what matters, else None.
 
     Where one signal runs away: twice the smallest signal. Where all stay put: a band about them, not their round-off.

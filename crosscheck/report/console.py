@@ -8,12 +8,12 @@ from rich.console import Console
 from rich.table import Column, Table
 from rich.text import Text
 
-from crosscheck.engine_list import EngineState
-from crosscheck.library import Case
+from crosscheck.judging.verdict import STATUSES, Verdict
+from crosscheck.library.find import Case
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.summary import pair
-from crosscheck.verdict import STATUSES, Verdict
-from flexmb.printable import printable
+from crosscheck.running.engine_list import EngineState
+from flexmb.output.printable import printable
 
 SHOWN = 20
 

@@ -8,11 +8,11 @@ from pathlib import Path
 
 import msgspec
 
-from crosscheck.accepted import recordable
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.judge import judge
-from crosscheck.results import CaseResults, Session
-from crosscheck.verdict import Verdict
+from crosscheck.judging.accepted import recordable
+from crosscheck.judging.judge import judge
+from crosscheck.judging.results import CaseResults, Session
+from crosscheck.judging.verdict import Verdict
 
 FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked to run
 

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from crosscheck.results import Result
+from crosscheck.judging.results import Result
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 SAMPLES = 201
 
 
@@ -22,7 +22,7 @@ class Store:
         self._signals: dict[tuple[int, str], int] = {}
         self._times: dict[bytes, int] = {}
 
-    def times(self, times: Array) -> int:
+    def times(self, times: Real) -> int:
         """Number of the thinned sample times."""
         key = times.tobytes()
         if key not in self._times:
@@ -37,13 +37,13 @@ class Store:
             self._signals[key] = self._add(values[_chosen(len(values))])
         return self._signals[key]
 
-    def peaks(self, values: Array) -> int:
+    def peaks(self, values: Real) -> int:
         """Number of a non-negative curve (T,), each thinned sample the largest since the one before."""
         chosen = _chosen(len(values))
         starts = np.concatenate([[0], chosen[:-1] + 1])
         return self._add(np.maximum.reduceat(values, starts))
 
-    def _add(self, values: Array) -> int:
+    def _add(self, values: Real) -> int:
         table = values.reshape(len(values), -1)
         data = base64.b64encode(np.ascontiguousarray(table, dtype="<f4").tobytes()).decode()
         self.series.append({"k": table.shape[1], "data": data})

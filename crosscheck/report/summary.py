@@ -7,11 +7,11 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from crosscheck.accepted import recordable
 from crosscheck.engines.registry import BUILT_IN
+from crosscheck.judging.accepted import recordable
+from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.report.outcome import Outcome
-from crosscheck.verdict import STATUSES, Verdict
-from flexmb.printable import printable
+from flexmb.output.printable import printable
 
 SHOWN = 40
 # What means something to Markdown within a line: an underscore not between letters, a sign of a list at the beginning.

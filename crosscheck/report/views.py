@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
+from crosscheck.judging.verdict import GRAVITY, Status, Verdict
 from crosscheck.report.summary import pair
-from crosscheck.verdict import GRAVITY, Status, Verdict
-from flexmb.channels import family
+from flexmb.run.channels import family
 
 SYMBOLS: dict[Status, str] = {
     "agree": "✓",

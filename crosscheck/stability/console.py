@@ -12,14 +12,14 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.records import BrokenRecords
+from crosscheck.records.records import BrokenRecords
 from crosscheck.report.console import marked, words
 from crosscheck.stability.judge import MapVerdict
 from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
+from flexmb.output.writing import folder, writing
 from flexmb.scene.reading import regular_size
-from flexmb.writing import folder, writing
 
 VERDICTS = "maps.json"
 

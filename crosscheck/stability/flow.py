@@ -10,16 +10,14 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
-from flexmb.propagate import recursion
-from flexmb.state import pack
-from flexmb.status import OK, Status
-from flexmb.system import System
-
-Array = NDArray[np.float64]
+from flexmb.run.propagate import recursion
+from flexmb.system.system import System
+from flexmb.tables.state import pack
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Real
 
 SIZE = 1e-6
 RTOL, ATOL = 1e-12, 1e-16
@@ -34,7 +32,7 @@ class StoppedError(ArithmeticError):
         self.status = status
 
 
-def flow(system: System, start: Array, time: float) -> Array:
+def flow(system: System, start: Real, time: float) -> Real:
     """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
     counts, controlled = np.zeros(COUNTS, np.int64), system.nq + system.nu
@@ -45,7 +43,7 @@ def flow(system: System, start: Array, time: float) -> Array:
     return np.asarray(out[1])
 
 
-def transition_matrix(system: System, places: Sequence[int], time: float) -> Array:
+def transition_matrix(system: System, places: Sequence[int], time: float) -> Real:
     """(n,n): how disturbances of the states at `places` of the scene's motion have changed after `time` (s)."""
     start = pack(system.initial_state)
     columns = []

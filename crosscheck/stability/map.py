@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
 NO_PREDICTION = -3  # instead of the number of a class
@@ -44,18 +44,18 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
         """Name and unit."""
         return f"{self.name} ({self.unit})" if self.unit else self.name
 
-    def values(self, fractions: Array) -> Array:
+    def values(self, fractions: Real) -> Real:
         """Parameters at fractions 0..1 of the axis."""
         if self.log:
             return np.asarray(self.low * (self.high / self.low) ** fractions)
         return np.asarray(self.low + (self.high - self.low) * fractions)
 
-    def edges(self, level: int) -> Array:
+    def edges(self, level: int) -> Real:
         """Bounds (n+1,) of the cells after `level` halvings."""
         count = self.count(level)
         return self.values(np.arange(count + 1) / count)
 
-    def centres(self, level: int) -> Array:
+    def centres(self, level: int) -> Real:
         """Middles (n,) of the cells after `level` halvings."""
         count = self.count(level)
         return self.values((np.arange(count) + 0.5) / count)
@@ -93,11 +93,11 @@ class Overlay:
 
     name: str
     source: str
-    predict: Callable[[Array, Array], Array]
+    predict: Callable[[Real, Real], Real]
     levels: tuple[float, ...] = (0.0,)
     bound: bool = False
 
-    def classes(self, x: Array, y: Array) -> NDArray[np.intp]:
+    def classes(self, x: Real, y: Real) -> NDArray[np.intp]:
         """Numbers of the classes expected at x, y; `NO_PREDICTION` where the theory gives no number."""
         predicted = self.predict(x, y)
         return np.where(np.isnan(predicted), NO_PREDICTION, np.searchsorted(self.levels, predicted, side="right"))

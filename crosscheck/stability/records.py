@@ -8,8 +8,8 @@ from pathlib import Path
 
 import msgspec
 
-from crosscheck.made_by import made_by
-from crosscheck.records import BrokenLine, Environment, decoded_lines
+from crosscheck.records.made_by import made_by
+from crosscheck.records.records import BrokenLine, Environment, decoded_lines
 from crosscheck.stability.map import Axis, CellStatus, StabilityMap
 from crosscheck.stability.refine import Cell
 

@@ -11,10 +11,10 @@ from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
-from crosscheck.checked import clean
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.pool import Event, run_jobs
-from crosscheck.records import Archive, environment
+from crosscheck.records.records import Archive, environment
+from crosscheck.running.checked import clean
+from crosscheck.running.pool import Event, run_jobs
 from crosscheck.stability.judge import MapVerdict, judge, label
 from crosscheck.stability.map import Outcome, StabilityMap
 from crosscheck.stability.records import CellRecord, MapRecord, Written, cells_of, identity, read

@@ -5,17 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flexmb.state import pack
-from flexmb.status import OK, Status
-from flexmb.system import System
-from flexmb.tangent import jacobian, tangent_workspace
-
-Array = NDArray[np.float64]
+from flexmb.entry.tangent import jacobian, tangent_workspace
+from flexmb.system.system import System
+from flexmb.tables.state import pack
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Real
 
 
-def linearised(system: System, places: Sequence[int]) -> Array:
+def linearised(system: System, places: Sequence[int]) -> Real:
     """Rows and columns `places` of the derivative of d[q, u]/dt at the initial state of the scene.
 
     `places` must be closed: what they do not name (angles about a spin, positions) has no effect on them.

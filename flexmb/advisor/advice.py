@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb import arguments
 from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
@@ -20,6 +19,7 @@ from flexmb.advisor.search import search
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.tables import arguments
 
 BUDGET = 4e10
 """Operations that the walk's runs may take before the walk down ends; about 20 s."""

@@ -1,8 +1,8 @@
 """Runs of models by methods, each made once: their signals, their error and their cost in counted operations.
 
 Costs decide, so they are counted, not timed: the operations of one evaluation of the model's accelerations, with those
-of its closures (`flexmb.counting`), times the evaluations of the run. Advice is the same on every machine; times are
-shown beside.
+of its closures (`flexmb.jit.counting`), times the evaluations of the run. Advice is the same on every machine; times
+are shown beside.
 """
 
 from __future__ import annotations
@@ -11,19 +11,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb import composite, dynamics
 from flexmb.advisor.methods import Method, operations, simulated, steps_within
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
-from flexmb.closed_system import ClosedSystem
 from flexmb.closure import dynamics as closed
 from flexmb.closure.system import ClosureError
-from flexmb.counting import count
+from flexmb.entry import articulated, composite
 from flexmb.jain.places import matrices
+from flexmb.jit.counting import count
 from flexmb.scene.schema import Scene
-from flexmb.state import pack
-from flexmb.status import Status
-from flexmb.system import Algorithm, System, compile
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.system import Algorithm, System, compile
+from flexmb.tables.state import pack
+from flexmb.tables.status import Status
 
 SAMPLES = 401
 MAX_STEPS = 400_000
@@ -125,5 +125,5 @@ def _operations(system: System, algorithm: Algorithm) -> int:
             composite.accelerations, 0.0, y, system.constants, system.workspace(), places
         ).operations.total
     return count(
-        dynamics.accelerations, 0.0, y, system.recursion_constants, system.recursion_workspace()
+        articulated.accelerations, 0.0, y, system.recursion_constants, system.recursion_workspace()
     ).operations.total

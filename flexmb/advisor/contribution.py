@@ -10,14 +10,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.advisor.response import Response, RigidRun, mass_shapes
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.schema import Free, Hinge, Marker, Scene
 from flexmb.scene.tree import GROUND
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -25,10 +23,10 @@ class Moved:
     """The response of one body in World axes: momenta of its modes about its origin, (T,3,m), and where it is."""
 
     response: Response
-    position: Array
-    turn: Array
-    linear: Array
-    angular: Array
+    position: Real
+    turn: Real
+    linear: Real
+    angular: Real
 
 
 def moved(rigid: RigidRun, response: Response) -> Moved:
@@ -41,7 +39,7 @@ def moved(rigid: RigidRun, response: Response) -> Moved:
     return Moved(response, position, turn, turn @ linear, turn @ angular)
 
 
-def contribution(channel: str, rigid: RigidRun, scene: Scene, part: Moved) -> Array:
+def contribution(channel: str, rigid: RigidRun, scene: Scene, part: Moved) -> Real:
     """What the modes add to a channel over time, (T,k,m), in the channel's unit; rotation vectors for orientations."""
     kind, _, rest = channel.partition(":")
     r = part.response
@@ -65,7 +63,7 @@ def contribution(channel: str, rigid: RigidRun, scene: Scene, part: Moved) -> Ar
     return np.zeros((len(r.eta), 1, r.eta.shape[1]))
 
 
-def _carried(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple[Array, Array]:
+def _carried(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple[Real, Real]:
     """Rotation and translation (T,3,m), World axes, of a marker per unit modal coordinate."""
     body = part.response.body.name
     node, at = marker.node, marker.body
@@ -81,7 +79,7 @@ def _carried(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tupl
     return turning, moving + np.cross(turning, arm[:, :, None], axis=1)
 
 
-def _recoil(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple[Array, Array]:
+def _recoil(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple[Real, Real]:
     """Rotation and translation (T,3,m) of a freely flying scene, per unit coordinate, that keep momentum as it was.
 
     The rest of the scene turns and moves as one rigid body, with its inertia at the start.
@@ -101,7 +99,7 @@ def _recoil(rigid: RigidRun, scene: Scene, marker: Marker, part: Moved) -> tuple
     return turning, moving + np.cross(turning, arm[:, :, None], axis=1)
 
 
-def _load(rigid: RigidRun, scene: Scene, name: str, what: str, part: Moved) -> Array:
+def _load(rigid: RigidRun, scene: Scene, name: str, what: str, part: Moved) -> Real:
     """Change of the load that a hinge inboard of the body transmits, (T,3,m), for a drive (T,3,m) of its torque."""
     r = part.response
     at: str = r.body.name
@@ -147,6 +145,6 @@ def _inboard(scene: Scene, body: str) -> Hinge | None:
     return next((hinge for hinge in scene.hinges if hinge.child == body), None)
 
 
-def _into(turn: Array, vectors: Array) -> Array:
+def _into(turn: Real, vectors: Real) -> Real:
     """World components (T,3,m) in the axes of `turn` (T,3,3), body -> World."""
     return np.asarray(np.swapaxes(turn, 1, 2) @ vectors)

@@ -29,8 +29,7 @@ from flexmb.frisch.equivalence.appendage import appendage_of
 from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _TINY = np.finfo(float).tiny
 SEGMENT_ERROR = 4.5
@@ -52,8 +51,8 @@ class Indicators:
     """
 
     flexibility: float
-    static: Array
-    dynamic: Array
+    static: Real
+    dynamic: Real
     family: NDArray[np.intp]
     stiffening: float
     compression: float
@@ -138,7 +137,7 @@ def of_level(level: str, body: Indicators) -> float:
     return second_order + (whole * bent if level == "linear" else 0.0)
 
 
-def _axis(body: BeamBody) -> tuple[Array, Array, Array]:
+def _axis(body: BeamBody) -> tuple[Real, Real, Real]:
     """x (n,), mass (n,) along the axis and slopes (n,3,m) of the eigenmodes there."""
     model = eigenmodes(replace(body, points="line"))
     root, tip = model.nodes["root"], model.nodes["tip"]
@@ -148,7 +147,7 @@ def _axis(body: BeamBody) -> tuple[Array, Array, Array]:
     return x[order], np.concatenate([model.mass, [0.0, 0.0]])[order], slopes[order]
 
 
-def _geometric(response: Response) -> Array:
+def _geometric(response: Response) -> Real:
     """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes of a beam."""
     body = response.body
     if not isinstance(body, BeamBody):
@@ -166,7 +165,7 @@ def _geometric(response: Response) -> Array:
     return stiffness / response.frequencies[: g.shape[1]] ** 2
 
 
-def _like_a_cantilever(response: Response) -> Array:
+def _like_a_cantilever(response: Response) -> Real:
     """|kappa| (T,1) of a raw body, whose slopes nobody knows: as if it were a uniform cantilever of its length.
 
     Of its first mode: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by a force at the tip, all

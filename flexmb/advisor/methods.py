@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.simulation import simulate
-from flexmb.system import Algorithm, System
-from flexmb.trajectory import Statistics, Trajectory
+from flexmb.run.simulate import simulate
+from flexmb.run.trajectory import Statistics, Trajectory
+from flexmb.system.system import Algorithm, System
 
 ABSOLUTE = 1e-2
 """Absolute over relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from flexmb.modal import flexible_model
@@ -16,8 +15,7 @@ from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.surrogate.lumping import vector
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, families: tuple[str, ...]) -> Scene:
@@ -87,7 +85,7 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
     )  # fmt: skip
 
 
-def _second_order(node: ModalNode, X: Array) -> dict[str, Any]:
+def _second_order(node: ModalNode, X: Real) -> dict[str, Any]:
     """The second-order data of a node in the modes X (m,k), by the keys of the scene."""
     found = {}
     for name, array in node_arrays(node).items():
@@ -96,21 +94,21 @@ def _second_order(node: ModalNode, X: Array) -> dict[str, Any]:
     return found
 
 
-def _nested(array: Array) -> tuple[Any, ...]:
+def _nested(array: Real) -> tuple[Any, ...]:
     """An array as a scene has it."""
     return tuple(map(_nested, array)) if array.ndim > 1 else tuple(array.tolist())
 
 
-def _square(array: Array | None, X: Array) -> Any:
+def _square(array: Real | None, X: Real) -> Any:
     """What each pair of modes has, (...,m,m), in the modes X (m,k): (...,k,k)."""
     return None if array is None else X.T @ array @ X
 
 
-def _combined(shapes: tuple[tuple[float, float, float], ...], X: Array) -> tuple[tuple[float, float, float], ...]:
+def _combined(shapes: tuple[tuple[float, float, float], ...], X: Real) -> tuple[tuple[float, float, float], ...]:
     return tuple(vector(shape) for shape in X.T @ np.array(shapes))
 
 
-def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
+def _rows(matrix: Real) -> tuple[tuple[float, ...], ...]:
     symmetric = (matrix + matrix.T) / 2.0
     return tuple(tuple(float(value) for value in row) for row in symmetric)
 
@@ -128,13 +126,13 @@ def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: Moda
     )
 
 
-def _products(a: FlexibleModel, b: FlexibleModel) -> Array:
+def _products(a: FlexibleModel, b: FlexibleModel) -> Real:
     """Kinetic energy's products (m_a, m_b) of the modes of two models of one body with the same inertia points."""
     moved_a, moved_b = _centres(a), _centres(b)
     turning = np.einsum("pim,pij,pjn->mn", a.rotation, a.inertia, b.rotation, optimize=True)
     return np.einsum("p,pim,pin->mn", a.mass, moved_a, moved_b, optimize=True) + turning
 
 
-def _centres(model: FlexibleModel) -> Array:
+def _centres(model: FlexibleModel) -> Real:
     """Mode shapes (n,3,m) of the mass centres of the points."""
     return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)

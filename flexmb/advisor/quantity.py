@@ -1,6 +1,6 @@
 """What the user cares about: channels of a run, and how far two runs are apart in them.
 
-A quantity names channels as in `flexmb.channels`: `marker:tip.position`, `marker:*.orientation`, `load:hub.torque`,
+A quantity names channels as in `flexmb.run.channels`: `marker:tip.position`, `marker:*.orientation`, `load:hub.torque`,
 `drive:hub`, `energy.total`; "energy" or "load:hub" names all that begin so. Its error is the largest distance of two
 runs over the output times and over its channels, relative to a scale: the one given after "@" in SI units
 (`load:hub.torque@50`), or the range of the signal, which for positions and orientations is the farthest it gets from
@@ -14,13 +14,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from flexmb.channels import Run, channels_of, distance, family, magnitude, matches, signal_range, unit
+from flexmb.run.channels import Run, channels_of, distance, family, magnitude, matches, signal_range, unit
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
-Signals = dict[str, Array]
+Signals = dict[str, Real]
 
 _STILL = 1e-12  # of its magnitude: a signal that changes by less does not change
 
@@ -75,7 +74,7 @@ def measured(wanted: tuple[Quantity, ...], run: Run) -> Signals:
     return found
 
 
-def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Array]) -> dict[str, float]:
+def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[str, float]:
     """What the error of each channel is relative to, in its own unit. ValueError where a signal has no range."""
     found: dict[str, float] = {}
     for quantity in wanted:
@@ -95,7 +94,7 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Array]) -> dict
     return found
 
 
-def error(a: Mapping[str, Array], b: Mapping[str, Array], scale: Mapping[str, float]) -> float:
+def error(a: Mapping[str, Real], b: Mapping[str, Real], scale: Mapping[str, float]) -> float:
     """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter."""
     worst = 0.0
     for name, size in scale.items():

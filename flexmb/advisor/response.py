@@ -28,13 +28,12 @@ from flexmb.dense.profiles import profile
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from flexmb.modal.model import FlexibleModel
+from flexmb.run.trajectory import Trajectory
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.schema import Load, Marker, Scene
 from flexmb.surrogate import rigidify
-from flexmb.system import System, compile
-from flexmb.trajectory import Trajectory
-
-Array = NDArray[np.float64]
+from flexmb.system.system import System, compile
+from flexmb.typing import Real
 
 MODES = 12
 FAMILIES = ("axial", "bending_y", "bending_z")
@@ -54,12 +53,12 @@ class RigidRun:
         extra = {_body(b.name) for b in self.scene.bodies} | {_hinge(h.name) for h in self.scene.hinges}
         return changed(self.run, markers={k: path for k, path in self.run.markers.items() if k not in extra})
 
-    def frame(self, body: str) -> tuple[Array, Array]:
+    def frame(self, body: str) -> tuple[Real, Real]:
         """World positions (T,3) and rotations (T,3,3) body -> World of a body's frame."""
         path = self.run.markers[_body(body)]
         return path.position, Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix()
 
-    def hinge_point(self, hinge: str) -> Array:
+    def hinge_point(self, hinge: str) -> Real:
         """World positions (T,3) of a hinge's outboard point."""
         return self.run.markers[_hinge(hinge)].position
 
@@ -72,19 +71,19 @@ class Response:
 
     body: BeamBody | ModalBody
     model: FlexibleModel
-    frequencies: Array
+    frequencies: Real
     family: NDArray[np.intp]
-    force: Array
-    eta: Array
-    etad: Array
-    etadd: Array
-    w: Array
-    alpha: Array
-    acceleration: Array
-    loads: tuple[tuple[str, Array, Array], ...]
+    force: Real
+    eta: Real
+    etad: Real
+    etadd: Real
+    w: Real
+    alpha: Real
+    acceleration: Real
+    loads: tuple[tuple[str, Real, Real], ...]
 
 
-def rigid_run(scene: Scene, times: Array) -> RigidRun | str:
+def rigid_run(scene: Scene, times: Real) -> RigidRun | str:
     """The run of the rigid scene, or why there is none: a mechanism that locks without flexibility."""
     still = rigidify(scene)
     extra = [Marker(name=_body(b.name), body=b.name) for b in still.bodies]
@@ -148,12 +147,12 @@ def _beam(beam: BeamBody) -> FlexibleModel:
     raise ValueError(f'beam "{beam.name}" has no mode')
 
 
-def mass_shapes(model: FlexibleModel) -> Array:
+def mass_shapes(model: FlexibleModel) -> Real:
     """Mode shapes (n,3,m) of the points' mass centres."""
     return model.translation + np.cross(model.rotation, model.com_offset[:, :, None], axis=1)
 
 
-def _combined(model: FlexibleModel, X: Array) -> FlexibleModel:
+def _combined(model: FlexibleModel, X: Real) -> FlexibleModel:
     nodes = {
         name: changed(node, translation=node.translation @ X, rotation_modes=node.rotation_modes @ X)
         for name, node in model.nodes.items()
@@ -170,7 +169,7 @@ def _families(model: FlexibleModel) -> NDArray[np.intp]:
     return np.argmax(moved, axis=0)
 
 
-def _oscillators(omega: Array, damping: Array, force: Array, times: Array, start: Array) -> tuple[Array, Array]:
+def _oscillators(omega: Real, damping: Real, force: Real, times: Real, start: Real) -> tuple[Real, Real]:
     """eta and etad (T,m) of etadd + damping etad + omega^2 eta = force (T,m), linear between equally spaced times."""
     step = times[1] - times[0]
     chain = np.zeros((len(omega), 4, 4))  # of [eta, etad, force, its change in a step], in steps
@@ -186,7 +185,7 @@ def _oscillators(omega: Array, damping: Array, force: Array, times: Array, start
     return states[:, :, 0], states[:, :, 1]
 
 
-def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> Array:
+def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> Real:
     """Initial eta and etad (m,2)."""
     start = np.zeros((model.mode_count, 2))
     state = next((each for each in scene.modal_states if each.body == body.name), None)
@@ -198,13 +197,13 @@ def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> 
     return start
 
 
-def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Array) -> list[tuple[str, Array, Array]]:
+def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real) -> list[tuple[str, Real, Real]]:
     """What hinges, wheels, point masses and loads do to the body at its nodes: (node, torque, force), body axes."""
     origin, _ = rigid.frame(body.name)
     model = eigenmodes(body)
     found = []
 
-    def add(node: str, point: Array, load: Array, sign: float) -> None:
+    def add(node: str, point: Real, load: Real, sign: float) -> None:
         arm = point - origin - np.einsum("tij,j->ti", turn, model.nodes[node].position)
         force = sign * load[:, 3:]
         found.append((node, _into(turn, sign * load[:, :3] + np.cross(arm, force)), _into(turn, force)))
@@ -226,7 +225,7 @@ def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Arra
     return found
 
 
-def _given(load: Load, times: Array, turn: Array) -> Array:
+def _given(load: Load, times: Real, turn: Real) -> Real:
     """A load of the scene over time (T,6), World axes; `turn` (T,3,3) node -> World."""
     size = np.array([float(profile(load.function, t).value) for t in times])
     direction = np.array(load.direction)
@@ -236,7 +235,7 @@ def _given(load: Load, times: Array, turn: Array) -> Array:
     return wrench
 
 
-def _into(turn: Array, vectors: Array) -> Array:
+def _into(turn: Real, vectors: Real) -> Real:
     """World components (T,3) in body axes."""
     return np.einsum("tji,tj->ti", turn, vectors)
 

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.frisch.equivalence.appendage import appendage_of
@@ -15,8 +14,7 @@ from flexmb.modal import flexible_model
 from flexmb.scene.bodies import BeamBody, ModalBody, Node, RigidBody
 from flexmb.scene.schema import AngularCoordinate, Hinge, Revolute, Scene, Universal
 from flexmb.surrogate.lumping import rigid_equivalent, vector
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _ACROSS = 1e-6  # cosine of axes that count as being at right angles
 _CLAMP = ("origin", "root")
@@ -84,7 +82,7 @@ def _spring(body: BeamBody | ModalBody, fit: Fit) -> Hinge:
     return Universal(**placed, first=turns[0], second=turns[1])
 
 
-def _across(axis: Array) -> Array:
+def _across(axis: Real) -> Real:
     """A unit vector at right angles to `axis`."""
     other = np.cross(axis, np.eye(3)[np.argmin(np.abs(axis))])
     return np.asarray(other / np.linalg.norm(other))

@@ -10,11 +10,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import Real
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
 from flexmb.closure.system import ClosureError, Closures
-from flexmb.status import OK
+from flexmb.tables.status import OK
+from flexmb.typing import Real
 
 STEPS = 200
 STRONGEST = 1e12  # damping beyond which no step makes the errors smaller

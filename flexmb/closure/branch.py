@@ -14,7 +14,7 @@ branches apart. A part d of the mechanism away from it they differ by d^2 in the
 
 from math import inf
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
 AT_CROSSING = 2.0**-20

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.arrays import Constants
+from flexmb.building.links import Link, closure_sides, matrix
 from flexmb.closure import tables as t
-from flexmb.links import Link, closure_sides, matrix
 from flexmb.scene import schema as s
+from flexmb.tables.arrays import Constants
 
 # Suppressed rotations and translations, axes of frame A; z is the axis of a closure that has one.
 SUPPRESSED = {

@@ -1,16 +1,16 @@
 """Entry points of closed chains: right-hand side, what is observable at one state, linearised closures, projection."""
 
-from flexmb.balance import power
 from flexmb.closure.factor import choose_rows
 from flexmb.closure.forces import accelerate, choose, free_tree, locate, on_branch, respond, row_loads, transmit
 from flexmb.closure.projection import displace, project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.sizes import measure_ports
-from flexmb.coordinates import configuration_rate, load_state
-from flexmb.dynamics import world_loads
-from flexmb.kernel import kernel
+from flexmb.entry.articulated import world_loads
+from flexmb.jain.balance import power
+from flexmb.jit.kernel import kernel
+from flexmb.motion.coordinates import configuration_rate, load_state
 from flexmb.spatial.vector import mat3, store3, times
-from flexmb.status import OK
+from flexmb.tables.status import OK
 
 NOTHING, COORDINATES, SPEEDS = range(3)
 

@@ -8,7 +8,7 @@ closed configuration what is left of a redundant row is round-off and the residu
 
 from math import sqrt
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 DEPENDENT = 1e-9
 

@@ -10,13 +10,13 @@ from flexmb.closure.branch import at_crossing, has_started, is_further, turned_o
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
-from flexmb.coordinates import load_state
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
+from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.sweeps import SINGLE, forward_dynamics, outward
-from flexmb.kernel import by_bundle, helper
-from flexmb.loads import drive_loads, hinge_loads
+from flexmb.jit.kernel import by_bundle, helper
+from flexmb.motion.coordinates import load_state
 from flexmb.spatial.vector import add3, scale, vec3
-from flexmb.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
+from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 
 
 @helper

@@ -12,14 +12,14 @@ of the hinge: so its components along the hinge's motions are what springs and m
 
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.unit_loads import apply_load, apply_unit_load, clear_body, clear_loads, project_inward
-from flexmb.coordinates import load_state
 from flexmb.jain import composite, innovations
 from flexmb.jain.inverse import inverse_dynamics
 from flexmb.jain.kinematics import acceleration_sweep, pose_sweep, velocity_sweep
 from flexmb.jain.sweeps import forward_dynamics
-from flexmb.kernel import by_bundle, helper
+from flexmb.jit.kernel import by_bundle, helper
+from flexmb.motion.coordinates import load_state
 from flexmb.spatial.vector import add3, mat3, matmul, scale, times, transpose, vec3
-from flexmb.status import OK
+from flexmb.tables.status import OK
 
 
 @helper

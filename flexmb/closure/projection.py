@@ -10,10 +10,10 @@ from flexmb.closure.branch import has_started, is_further, recall, remember
 from flexmb.closure.factor import solve
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
-from flexmb.coordinates import configuration_rate, load_state, normalise_quaternions
-from flexmb.coordinates import project as project_tree
-from flexmb.kernel import helper
-from flexmb.status import CLOSURE_OPEN, OK
+from flexmb.jit.kernel import helper
+from flexmb.motion.coordinates import configuration_rate, load_state, normalise_quaternions
+from flexmb.motion.coordinates import project as project_tree
+from flexmb.tables.status import CLOSURE_OPEN, OK
 
 CLOSED = 2.0**-44  # a closed row's value in the size of its closure: 5.7e-14, two hundred roundings
 OPEN = 1e-10  # beyond this a closure is open

@@ -20,7 +20,7 @@ from math import sqrt
 from flexmb.closure.factor import norm
 from flexmb.closure.forces import pass_load
 from flexmb.closure.unit_loads import at_port, clear_body
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import dot, vec3
 
 _ZERO = (0.0, 0.0, 0.0)

@@ -10,15 +10,16 @@ from typing import Literal, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.arrays import RUTHLESS, Constants, Index, Real, Workspace
 from flexmb.closure import dynamics
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
 from flexmb.scene.schema import Closure
-from flexmb.state import Layout
-from flexmb.status import OUT_OF_RANGE
+from flexmb.tables.arrays import RUTHLESS, Constants, Workspace
+from flexmb.tables.state import Layout
+from flexmb.tables.status import OUT_OF_RANGE
+from flexmb.typing import Index, Real
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
 SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import Constants, Index, Real, Record, Workspace
-from flexmb.bundle import bundle
 from flexmb.jain.places import Matrices
 from flexmb.jain.response import Response
+from flexmb.jit.bundle import bundle
+from flexmb.tables.arrays import Constants, Workspace
+from flexmb.typing import Index, Real, Record
 
 ROTATION, TRANSLATION = range(2)
 ON_GROUND = -1  # body of a frame that is fixed in World

@@ -12,8 +12,8 @@ from flexmb.closure.tables import ON_GROUND, ROTATION
 from flexmb.hinges.catalogue import REVOLUTE
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.sweeps import SINGLE
-from flexmb.kernel import helper
-from flexmb.spatial.inertia import shift_force
+from flexmb.jit.kernel import helper
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, store3, sub, times, times_t, vec3
 
 
@@ -78,7 +78,7 @@ def at_port(c, w, cw, side, s, tau, f):
     for n in range(c.body[k].modes):
         column = w.port_mode[side.port, n]
         cw.modal[k, s, n] += dot(vec3(column.W, 0), tau) + dot(vec3(column.L, 0), f)
-    tau, f = shift_force(tau, f, vec3(w.port[side.port].r, 0))
+    tau, f = shift_force((tau, f), vec3(w.port[side.port].r, 0))
     add3(cw.force[k, s], 0, tau)
     add3(cw.force[k, s], 3, f)
 
@@ -133,7 +133,7 @@ def _about_hinge(c, w, cw, k, s):
             angular = vec3(w.port_mode[i, n].W, 0)
             linear = sub(vec3(w.port_mode[i, n].L, 0), cross(angular, r))
             cw.modal[k, s, n] -= dot(angular, tau) + dot(linear, f)
-        tau, f = shift_force(tau, f, scale(-1.0, r))
+        tau, f = shift_force((tau, f), scale(-1.0, r))
     return tau, f
 
 
@@ -144,13 +144,13 @@ def _hand_on(c, w, cw, k, s, tau, f):
     if parent < 0:
         return
     R = mat3(w.body[k].rotation, 0)
-    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
+    tau, f = shift_force((times(R, tau), times(R, f)), vec3(w.body[k].arm, 0))
     i = c.body[k].inboard_port
     if i >= 0:
         for n in range(c.body[parent].modes):
             column = w.port_mode[i, n]
             cw.modal[parent, s, n] += dot(vec3(column.W, 0), tau) + dot(vec3(column.L, 0), f)
-        tau, f = shift_force(tau, f, vec3(w.port[i].r, 0))
+        tau, f = shift_force((tau, f), vec3(w.port[i].r, 0))
     add3(cw.force[parent, s], 0, tau)
     add3(cw.force[parent, s], 3, f)
 

@@ -17,8 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 from flexmb.dense.jets import Frame, Jet, constant, join, skew, vector
 from flexmb.dense.kinematics import Motion, field, on_body
 from flexmb.dense.tree import Member, Rotor, Tree
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 STEP = 2.0**-200
 
 
@@ -29,29 +29,29 @@ class FirstOrderBody:
     Accelerations are classical, of the origin, without gravity.
     """
 
-    M: Array
-    bias: Array
-    rotation: Array
-    position: Array
-    speeds: Array
-    rates: Array
+    M: Real
+    bias: Real
+    rotation: Real
+    position: Real
+    speeds: Real
+    rates: Real
 
     @property
     def kinetic(self) -> float:
         return 0.5 * float(self.speeds @ self.M @ self.speeds)
 
-    def force(self, gravity: Array) -> Array:
+    def force(self, gravity: Real) -> Real:
         """What the elements need to move so, beyond gravity (3,) in World axes: M (rates - g) + bias, (m+6,)."""
         rates = self.rates.copy()
         rates[-3:] -= self.rotation.T @ gravity
         return self.M @ rates + self.bias
 
-    def mass_moment(self) -> Array:
+    def mass_moment(self) -> Real:
         """sum m x (3,) in World: the coupling of angular and linear velocity is s~."""
         s = vector(self.M[-6:-3, -3:])
         return np.asarray(self.M[-1, -1] * self.position + self.rotation @ s)
 
-    def world(self, rows: Array) -> tuple[Array, Array, Array]:
+    def world(self, rows: Real) -> tuple[Real, Real, Real]:
         """Rigid rows of a force or momentum (m+6,) in World axes: torque (1,3) about, force (1,3), position (1,3)."""
         return (self.rotation @ rows[-6:-3])[None], (self.rotation @ rows[-3:])[None], self.position[None]
 
@@ -71,7 +71,7 @@ def first_order_body(tree: Tree, k: int, frame: Frame, motion: Motion) -> FirstO
     )  # fmt: skip
 
 
-def body_jacobian(member: Member, frame: Frame, nu: int) -> Array:
+def body_jacobian(member: Member, frame: Frame, nu: int) -> Real:
     """(m+6,nu): a member's modal speeds and the velocity of its frame, body axes, for u = e_j; `frame` along those."""
     modes = np.eye(nu)[member.u_modes]
     R = frame.rotation.value[0, 0]
@@ -79,7 +79,7 @@ def body_jacobian(member: Member, frame: Frame, nu: int) -> Array:
     return np.vstack([modes, (frame.angular_velocity()[:, 0] @ R).T, (linear[:, 0] @ R).T])
 
 
-def _mass_and_bias(tree: Tree, k: int, eta: Array, etad: Array, w: Array) -> tuple[Array, Array]:
+def _mass_and_bias(tree: Tree, k: int, eta: Real, etad: Real, w: Real) -> tuple[Real, Real]:
     """M and bias at the body's own state, the sum over its elements made twice real."""
     member, rotors = tree.members[k], [rotor for rotor in tree.rotors if rotor.member == k]
     model, m = member.model, member.model.mode_count
@@ -99,7 +99,7 @@ def _mass_and_bias(tree: Tree, k: int, eta: Array, etad: Array, w: Array) -> tup
 
 
 def _elements(
-    tree: Tree, member: Member, rotors: list[Rotor], eta: Array, etad: ArrayLike, w: Array, v: Array
+    tree: Tree, member: Member, rotors: list[Rotor], eta: Real, etad: ArrayLike, w: Real, v: Real
 ) -> Frame:
     """Elements at i h eta along B motions: etad (B,m), w and v (B,3) of the body frame, none of which changes."""
     count = len(w)
@@ -116,6 +116,6 @@ def _elements(
     return body.carry(Frame(positions, rotations))
 
 
-def _first_order(x: NDArray[np.complex128]) -> Array:
+def _first_order(x: NDArray[np.complex128]) -> Real:
     """Orders zero and one of what was evaluated at i h times its argument."""
     return np.asarray(x.real + x.imag / STEP)

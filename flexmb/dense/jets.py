@@ -13,9 +13,9 @@ from types import EllipsisType
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # sin(x)/x and (1 - cos(x))/x^2 as power series in x^2; 24 terms are exact to round-off for |x| <= 2 pi.
 SINE = Polynomial([(-1.0) ** k / factorial(2 * k + 1) for k in range(24)])
@@ -26,9 +26,9 @@ VERSINE = Polynomial([(-1.0) ** k / factorial(2 * k + 2) for k in range(24)])
 class Jet:
     """x, dx/dt, d2x/dt2; their shapes broadcast."""
 
-    value: Array
-    rate: Array
-    acceleration: Array
+    value: Real
+    rate: Real
+    acceleration: Real
 
     def __add__(self, other: Jet) -> Jet:
         return Jet(self.value + other.value, self.rate + other.rate, self.acceleration + other.acceleration)
@@ -42,7 +42,7 @@ class Jet:
     def __getitem__(self, key: tuple[slice | EllipsisType | None | int, ...] | int) -> Jet:
         return self.map(lambda x: x[key])
 
-    def map(self, linear: Callable[[Array], Array]) -> Jet:
+    def map(self, linear: Callable[[Real], Real]) -> Jet:
         """A constant linear operation."""
         return Jet(linear(self.value), linear(self.rate), linear(self.acceleration))
 
@@ -72,11 +72,11 @@ class Frame:
         """Along the first of B motions."""
         return Frame(self.position[0], self.rotation[0])
 
-    def angular_velocity(self) -> Array:
+    def angular_velocity(self) -> Real:
         """w (...,3) with dR/dt = w~ R."""
         return vector(self.rotation.rate @ np.swapaxes(self.rotation.value, -1, -2))
 
-    def angular_acceleration(self) -> Array:
+    def angular_acceleration(self) -> Real:
         """alpha = dw/dt (...,3): the skew part of d2R/dt2 R' (what is left, dR/dt dR/dt', is symmetric)."""
         return vector(self.rotation.acceleration @ np.swapaxes(self.rotation.value, -1, -2))
 
@@ -90,13 +90,13 @@ def constant(value: ArrayLike) -> Jet:
 def join(jets: list[Jet], motions: int) -> Jet:
     """Jets of the points of several bodies, (1 or B, K, ...), as one along K."""
 
-    def along(parts: list[Array]) -> Array:
+    def along(parts: list[Real]) -> Real:
         return np.concatenate([np.broadcast_to(x, (motions, *x.shape[1:])) for x in parts], axis=1)
 
     return Jet(along([j.value for j in jets]), along([j.rate for j in jets]), along([j.acceleration for j in jets]))
 
 
-def product(operation: Callable[[Array, Array], Array], a: Jet, b: Jet) -> Jet:
+def product(operation: Callable[[Real, Real], Real], a: Jet, b: Jet) -> Jet:
     """Leibniz for a bilinear operation."""
     return Jet(
         operation(a.value, b.value),
@@ -115,12 +115,12 @@ def scale(factor: Jet, matrix: Jet) -> Jet:
     return product(lambda s, A: s[..., None, None] * A, factor, matrix)
 
 
-def quadratic(G: Array, x: Jet) -> Jet:
+def quadratic(G: Real, x: Jet) -> Jet:
     """1/2 x' G x for vectors x (...,m): G (...,m,m), symmetric."""
     return product(lambda a, b: 0.5 * np.einsum("...m,...mn,...n->...", a, G, b), x, x)
 
 
-def chain(f: Array, df: Array, d2f: Array, x: Jet) -> Jet:
+def chain(f: Real, df: Real, d2f: Real, x: Jet) -> Jet:
     """f(x) from f, f' and f'' at x.value."""
     return Jet(f, df * x.rate, d2f * x.rate**2 + df * x.acceleration)
 
@@ -130,14 +130,14 @@ def polynomial(p: Polynomial, x: Jet) -> Jet:
     return chain(p(x.value), p.deriv()(x.value), p.deriv(2)(x.value), x)
 
 
-def skew(v: Array) -> Array:
+def skew(v: Real) -> Real:
     """v~ with v~ a = v x a, (...,3) -> (...,3,3)."""
     x, y, z = np.moveaxis(v, -1, 0)
     zero = np.zeros_like(x)
     return np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*v.shape, 3)
 
 
-def vector(A: Array) -> Array:
+def vector(A: Real) -> Real:
     """v of the skew part of A, (...,3,3) -> (...,3)."""
     return 0.5 * np.stack(
         [A[..., 2, 1] - A[..., 1, 2], A[..., 0, 2] - A[..., 2, 0], A[..., 1, 0] - A[..., 0, 1]], axis=-1

@@ -21,17 +21,17 @@ from flexmb.dense.jets import (
 )
 from flexmb.dense.tree import Member, Rotor, Seat, Tree
 from flexmb.scene import schema as s
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 AXES = dict(zip("xyz", np.eye(3), strict=True))
 
 
 class Motion(NamedTuple):
     """B motions from one configuration: coordinates q (nq,), speeds u (B,nu), rates of the speeds (B,nu)."""
 
-    q: Array
-    u: Array
-    rates: Array
+    q: Real
+    u: Real
+    rates: Real
 
     def hinge(self, member: Member) -> Jet:
         """Coordinates of a hinge whose speeds are their rates, (B,1,n)."""
@@ -52,8 +52,8 @@ class Motion(NamedTuple):
 class Points(NamedTuple):
     """All P inertia points: mass (P,), inertia (P,3,3) about the mass centre in point axes, their member (P,)."""
 
-    mass: Array
-    inertia: Array
+    mass: Real
+    inertia: Real
     member: NDArray[np.int64]
 
 
@@ -145,7 +145,7 @@ def _floating(c: Jet) -> Frame:
     return Frame(position, rotation)
 
 
-def _attitude(quaternion: Array, w: Array, w_rate: Array) -> Jet:
+def _attitude(quaternion: Real, w: Real, w_rate: Real) -> Jet:
     """R of a scalar-first quaternion with angular velocity w in turning axes: R' = R w~, R'' = R (w~ w~ + dw/dt~)."""
     q0, qv = quaternion[0, 0, 0], quaternion[0, 0, 1:]
     R = (q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)

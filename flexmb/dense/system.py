@@ -21,25 +21,24 @@ from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames,
 from flexmb.dense.profiles import profile
 from flexmb.dense.tree import Scalar, Seat, Tree, build
 from flexmb.scene import schema as s
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class Jacobian(NamedTuple):
     """Velocities per speed of K frames: angular (K,3,nu), linear (K,3,nu), World axes."""
 
-    angular: Array
-    linear: Array
+    angular: Real
+    linear: Real
 
 
 class Wrenches(NamedTuple):
     """On each of K points: torque (K,3) about it, force (K,3), and where it is (K,3); World."""
 
-    torque: Array
-    force: Array
-    position: Array
+    torque: Real
+    force: Real
+    position: Real
 
-    def about(self, origin: Array, chosen: NDArray[np.bool_]) -> Array:
+    def about(self, origin: Real, chosen: NDArray[np.bool_]) -> Real:
         """Sum (6,) [torque; force] of the chosen ones about `origin`."""
         force = self.force[chosen]
         torque = self.torque[chosen] + np.cross(self.position[chosen] - origin, force)
@@ -49,7 +48,7 @@ class Wrenches(NamedTuple):
 class Snapshot:
     """One motion at one instant: q (nq,), u (nu,), rates of the speeds (nu,)."""
 
-    def __init__(self, tree: Tree, q: Array, u: Array, rates: Array) -> None:
+    def __init__(self, tree: Tree, q: Real, u: Real, rates: Real) -> None:
         self._tree, self._motion = tree, Motion(q, u[None], rates[None])
         self._frames = member_frames(tree, self._motion)
 
@@ -73,10 +72,10 @@ class Snapshot:
 class SiteMotion(NamedTuple):
     """A marker in World: position (3,), rotation (3,3), velocity and classical acceleration (6,) [angular; linear]."""
 
-    position: Array
-    rotation: Array
-    velocity: Array
-    acceleration: Array
+    position: Real
+    rotation: Real
+    velocity: Real
+    acceleration: Real
 
 
 class DenseSystem:
@@ -101,7 +100,7 @@ class DenseSystem:
         inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
         return Points(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
 
-    def mass_matrix(self, q: Array) -> Array:
+    def mass_matrix(self, q: Real) -> Real:
         """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of bodies of level linear."""
         J, now = self._jacobian(q), self._at(q)
         M = np.einsum("p,pai,paj->ij", self._summed.mass, J.linear, J.linear)
@@ -109,7 +108,7 @@ class DenseSystem:
         S = self._body_jacobians(q)
         return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
 
-    def bias(self, q: Array, u: Array, t: float = 0.0) -> Array:
+    def bias(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes."""
         J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
         inertial = self._inertial(now, self._summed)
@@ -124,7 +123,7 @@ class DenseSystem:
             c[member.u_modes] += member.model.damping @ u[member.u_modes]
         return c
 
-    def applied(self, q: Array, u: Array, t: float = 0.0) -> Array:
+    def applied(self, q: Real, u: Real, t: float = 0.0) -> Real:
         """tau (nu,) of springs, dampers and motors of hinges, point masses and wheels."""
         tau = np.zeros(self.nu)
         for x in self.tree.scalars:
@@ -138,7 +137,7 @@ class DenseSystem:
                 tau[member.u_hinge] -= member.hinge.damping_Nms_rad * u[member.u_hinge]
         return tau
 
-    def on_profile(self, q: Array, u: Array, t: float) -> tuple[Array, Array]:
+    def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:
         """q and u with every prescribed coordinate at its function's value and rate."""
         q, u = q.copy(), u.copy()
         for x in self._prescribed:
@@ -146,7 +145,7 @@ class DenseSystem:
             q[x.q], u[x.u] = f.value, f.rate
         return q, u
 
-    def accelerations(self, t: float, q: Array, u: Array) -> Array:
+    def accelerations(self, t: float, q: Real, u: Real) -> Real:
         """udot (nu,): M_ff udot_f = tau_f - c_f - M_fp udot_p, where p are the prescribed speeds."""
         q, u = self.on_profile(q, u, t)
         rates, free = np.zeros(self.nu), np.ones(self.nu, dtype=bool)
@@ -157,16 +156,16 @@ class DenseSystem:
         rates[free] = np.linalg.solve(M[np.ix_(free, free)], right[free])
         return rates
 
-    def drives(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+    def drives(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Drive loads of prescribed coordinates by hinge, point mass or wheel, beyond springs, dampers and motors."""
         q, u = self.on_profile(q, u, t)
         residual = self.mass_matrix(q) @ rates + self.bias(q, u, t) - self.applied(q, u, t)
-        found: dict[str, Array] = {}
+        found: dict[str, Real] = {}
         for x in self._prescribed:
             found[x.owner] = np.append(found.get(x.owner, np.zeros(0)), residual[x.u])
         return found
 
-    def hinge_loads(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+    def hinge_loads(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Total load (6,) [torque; force] on the outboard body about the outboard hinge point, by hinge.
 
         Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes.
@@ -188,7 +187,7 @@ class DenseSystem:
             found[member.hinge.name] = total
         return found
 
-    def wheel_loads(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, Array]:
+    def wheel_loads(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Load (6,) [torque; force] of bearing and motor on each wheel about its centre."""
         q, u = self.on_profile(q, u, t)
         inertial = self._inertial(self._seen(q, u, rates), self.points)
@@ -198,7 +197,7 @@ class DenseSystem:
             for i, rotor in enumerate(self.tree.rotors)
         }
 
-    def markers(self, t: float, q: Array, u: Array, rates: Array) -> dict[str, SiteMotion]:
+    def markers(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, SiteMotion]:
         """Motion of all markers, with the true deformation at every level."""
         q, u = self.on_profile(q, u, t)
         now = Snapshot(self.tree, q, u, rates)
@@ -210,7 +209,7 @@ class DenseSystem:
             found[marker.name] = SiteMotion(f.position.value, f.rotation.value, velocity, acceleration)
         return found
 
-    def energy(self, q: Array, u: Array) -> dict[str, float]:
+    def energy(self, q: Real, u: Real) -> dict[str, float]:
         """Kinetic, strain, spring and gravity energy (J)."""
         now = self._at(q, u)
         frames, bodies = now.points, now.first_order.values()
@@ -233,7 +232,7 @@ class DenseSystem:
             "gravity": -float(first_moment @ self._gravity),
         }
 
-    def momentum(self, q: Array, u: Array) -> Array:
+    def momentum(self, q: Real, u: Real) -> Real:
         """(6,) [angular about the World origin; linear]."""
         now = self._at(q, u)
         frames = now.points
@@ -248,7 +247,7 @@ class DenseSystem:
     def _prescribed(self) -> list[Scalar]:
         return [x for x in self.tree.scalars if x.prescribed is not None]
 
-    def _undeformed(self, q: Array) -> Array:
+    def _undeformed(self, q: Real) -> Real:
         """q with the modal coordinates of ruthless bodies at zero."""
         q = q.copy()
         for member in self.tree.members:
@@ -256,7 +255,7 @@ class DenseSystem:
                 q[member.q_modes] = 0.0
         return q
 
-    def _seen(self, q: Array, u: Array, rates: Array) -> Snapshot:
+    def _seen(self, q: Real, u: Real, rates: Real) -> Snapshot:
         """As inertia sees the motion: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
@@ -264,25 +263,25 @@ class DenseSystem:
                 u[member.u_modes] = 0.0
         return Snapshot(self.tree, self._undeformed(q), u, rates)
 
-    def _at(self, q: Array, u: Array | None = None) -> Snapshot:
+    def _at(self, q: Real, u: Real | None = None) -> Snapshot:
         """Configuration and velocities: eta = 0 for ruthless bodies, at rest without u."""
         zero = np.zeros(self.nu)
         return Snapshot(self.tree, self._undeformed(q), zero if u is None else u, zero)
 
-    def _unit_motions(self, q: Array) -> Motion:
+    def _unit_motions(self, q: Real) -> Motion:
         return Motion(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
 
-    def _jacobian(self, q: Array) -> Jacobian:
+    def _jacobian(self, q: Real) -> Jacobian:
         """Of all inertia points."""
         motion = self._unit_motions(q)
         return _columns(point_frames(self.tree, member_frames(self.tree, motion), motion))
 
-    def _body_jacobians(self, q: Array) -> dict[int, Array]:
+    def _body_jacobians(self, q: Real) -> dict[int, Real]:
         """Of the bodies of level linear by number, (m+6,nu)."""
         frames = member_frames(self.tree, self._unit_motions(q)) if self.tree.linear else []
         return {k: body_jacobian(self.tree.members[k], frames[k], self.nu) for k in self.tree.linear}
 
-    def _site_jacobian(self, name: str, q: Array) -> Jacobian:
+    def _site_jacobian(self, name: str, q: Real) -> Jacobian:
         """Of one load's node."""
         motion = self._unit_motions(q)
         frames = member_frames(self.tree, motion)
@@ -296,7 +295,7 @@ class DenseSystem:
         force = chosen.mass[:, None] * (frames.position.acceleration - self._gravity)
         return Wrenches(torque, force, frames.position.value)
 
-    def _loads(self, q: Array, t: float) -> dict[str, Wrenches]:
+    def _loads(self, q: Real, t: float) -> dict[str, Wrenches]:
         """Loads at nodes by name, one point each."""
         now = self._at(q)
         found = {}
@@ -319,13 +318,13 @@ class DenseSystem:
         return found
 
 
-def _turned(chosen: Points, frames: Frame) -> Array:
+def _turned(chosen: Points, frames: Frame) -> Real:
     """Inertia tensors (P,3,3) in World axes."""
     R = frames.rotation.value
     return np.asarray(R @ chosen.inertia @ np.swapaxes(R, -1, -2))
 
 
-def rotation_vector(quaternion: Array) -> Array:
+def rotation_vector(quaternion: Real) -> Real:
     """Rotation vector (3,) of a scalar-first quaternion, of length at most pi."""
     return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
 

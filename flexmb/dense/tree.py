@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.flexible import flexible_model
@@ -18,8 +18,7 @@ from flexmb.modal.model import FlexibleModel, ModalNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
 
@@ -29,8 +28,8 @@ class Seat:
     """A frame fixed to a node: `offset` (3,) m and `rotation` (3,3) frame -> node, in node axes."""
 
     node: ModalNode
-    offset: Array
-    rotation: Array
+    offset: Real
+    rotation: Real
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Rotor:
     u: int
 
     @property
-    def inertia(self) -> Array:
+    def inertia(self) -> Real:
         """(3,3) about the centre, in axes that turn with the wheel."""
         axis = np.array(self.wheel.axis)
         along = np.outer(axis, axis)
@@ -172,7 +171,7 @@ def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion:
     return Seat(model.nodes[node], np.array(offset, dtype=float), _matrix(quaternion))
 
 
-def _matrix(quaternion: ArrayLike) -> Array:
+def _matrix(quaternion: ArrayLike) -> Real:
     return Rotation.from_quat(np.asarray(quaternion, dtype=float), scalar_first=True).as_matrix()
 
 
@@ -187,7 +186,7 @@ def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
 
 
 def rigid_model(
-    mass: float, com: Array, inertia: Array, frames: Mapping[str, tuple[Vector, Quaternion]]
+    mass: float, com: Real, inertia: Real, frames: Mapping[str, tuple[Vector, Quaternion]]
 ) -> FlexibleModel:
     """A body without modes: one point at its centre of mass."""
     none = np.zeros((3, 0))

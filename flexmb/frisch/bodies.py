@@ -6,9 +6,8 @@ so that what stands for one body is of first order about its hinge point; loads 
 the frame of a wheel turns with its node.
 """
 
-from flexmb.arrays import FORCE, NODE_AXES
 from flexmb.frisch.tables import FIXED_SPIN_AXIS, NO_LOADS_ON_MODES, SECOND_ORDER
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import (
     add,
     add3,
@@ -28,6 +27,7 @@ from flexmb.spatial.vector import (
     times_t,
     vec3,
 )
+from flexmb.tables.arrays import FORCE, NODE_AXES
 
 
 @helper

@@ -7,11 +7,11 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from flexmb import arrays as a
+from flexmb.building.links import Link
 from flexmb.frisch import tables as t
 from flexmb.frisch.errata import Erratum
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
-from flexmb.links import Link
+from flexmb.tables import arrays as a
 
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 _SWITCHES = (

@@ -5,7 +5,7 @@ force that hinge k-1 transmits, phi^c + phi^H and F^c + F^H; likewise the row of
 """
 
 from flexmb.frisch.reduction import expanded_accelerations
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import cross, store3, sub, vec3
 
 

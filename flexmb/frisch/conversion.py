@@ -9,14 +9,12 @@ rotary parts of the others are sums in which the single points are lost.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.frisch.elements import Particles, Rotary, Slopes, elements, inertia_of, particles, rotary, slopes
 from flexmb.frisch.parameters import ModeParameters, assemble
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # A share of turning inertia that parameters hold beyond the given points, below which it is round-off of their sums.
 _ROUND_OFF = 1e-12
@@ -114,7 +112,7 @@ def _combined(a: Particles, b: Particles, sign: float) -> Particles:
     return Particles(*(getattr(a, name) + sign * getattr(b, name) for name in Particles.__dataclass_fields__))
 
 
-def _steiner(a: Array, b: Array) -> Array:
+def _steiner(a: Real, b: Real) -> Real:
     """a.b 1 - a b' (..., 3, 3)."""
     return inertia_of(a[..., :, None] * b[..., None, :])
 
@@ -125,7 +123,7 @@ def _none(modes: int) -> TurningPoints:
     return TurningPoints(np.zeros(0), vectors, vectors, np.zeros((0, 3, 3)), shapes, shapes)
 
 
-def _spatial_mass(p: ModeParameters) -> Array:
+def _spatial_mass(p: ModeParameters) -> Real:
     """Mass matrix (n+6,n+6) at rest, order [modes; angular; linear], about the body origin."""
     mA = p.mass * p.A
     C0 = p.Q + np.cross(p.alpha, mA)

@@ -11,13 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.integrals import TurningPoints
 from flexmb.modal.model import FlexibleModel
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -25,12 +23,12 @@ class Elements:
     """p elements in body axes: mass (p,) kg, mass centre x (p,3) m, its offset c (p,3) m from the turning point,
     inertia (p,3,3) kg m^2 about the mass centre, modes phiT, phiR (p,n,3) of mass centre and rotation."""
 
-    mass: Array
-    x: Array
-    c: Array
-    inertia: Array
-    phiT: Array
-    phiR: Array
+    mass: Real
+    x: Real
+    c: Real
+    inertia: Real
+    phiT: Real
+    phiR: Real
 
 
 @dataclass(frozen=True)
@@ -42,13 +40,13 @@ class Particles:
     """
 
     mass: float
-    Phi: Array
-    mA: Array
-    mQ: Array
-    D: Array
-    F: Array
-    K: Array
-    M1: Array
+    Phi: Real
+    mA: Real
+    mQ: Real
+    D: Real
+    F: Real
+    K: Real
+    M1: Real
 
 
 @dataclass(frozen=True)
@@ -58,11 +56,11 @@ class Rotary:
     Phi (3,3) their part of (17); C (n,3) (55); J (n,3,3) (67); K (n,n,3) their part of (72); M1 (n,n) that of (41).
     """
 
-    Phi: Array
-    C: Array
-    J: Array
-    K: Array
-    M1: Array
+    Phi: Real
+    C: Real
+    J: Real
+    K: Real
+    M1: Real
 
 
 @dataclass(frozen=True)
@@ -72,11 +70,11 @@ class Slopes:
     K (n,n,3) their part of K_mn; mA1, Q1 (n,n,3); M1 (n,n,n) [k,m,n]; F (n,n,3,3).
     """
 
-    K: Array
-    mA1: Array
-    Q1: Array
-    M1: Array
-    F: Array
+    K: Real
+    mA1: Real
+    Q1: Real
+    M1: Real
+    F: Real
 
 
 def elements(points: FlexibleModel | TurningPoints) -> Elements:
@@ -92,7 +90,7 @@ def turning(e: Elements) -> Elements:
     return Elements(e.mass[kept], e.x[kept], e.c[kept], e.inertia[kept], e.phiT[kept], e.phiR[kept])
 
 
-def particles(e: Elements, alpha: Array) -> Particles:
+def particles(e: Elements, alpha: Real) -> Particles:
     """Sums over the masses of `e` about the point `alpha` (3,)."""
     rho = e.x - alpha
     moment = np.einsum("p,pma,pnb->mnab", e.mass, e.phiT, e.phiT, optimize=True)
@@ -108,7 +106,7 @@ def particles(e: Elements, alpha: Array) -> Particles:
     )
 
 
-def mass_centre(e: Elements) -> Array:
+def mass_centre(e: Elements) -> Real:
     """alpha (3,), (8); the origin for a body without mass, such as the ring of a gimbal."""
     mass = e.mass.sum()
     return e.mass @ e.x / mass if mass > 0.0 else np.zeros(3)
@@ -127,7 +125,7 @@ def rotary(e: Elements) -> Rotary:
     )
 
 
-def slopes(e: Elements, alpha: Array) -> Slopes:
+def slopes(e: Elements, alpha: Real) -> Slopes:
     """What the exact kinetic energy of turning elements has at first order in the coordinates, about `alpha`.
 
     Per rate adot_n an element turns by phiR_n + 1/2 theta~ phiR_n, its mass centre moves by phiT_n + sum_k a_k bend_kn,
@@ -158,24 +156,24 @@ def slopes(e: Elements, alpha: Array) -> Slopes:
     )
 
 
-def inertia_of(moment: Array) -> Array:
+def inertia_of(moment: Real) -> Real:
     """tr(S) 1 - S of second moments (..., 3, 3)."""
     return np.trace(moment, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - moment
 
 
-def axial(moment: Array) -> Array:
+def axial(moment: Real) -> Real:
     """sum a x b (..., 3) of sums of a b' (..., 3, 3)."""
     return np.stack([moment[..., i, j] - moment[..., j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=-1)
 
 
-def _curvature(e: Elements) -> Array:
+def _curvature(e: Elements) -> Real:
     """bend (p,n,n,3) of exp(theta~) c: half of phiR_m x (phiR_n x c) + phiR_n x (phiR_m x c)."""
     arm = np.cross(e.phiR, e.c[:, None])
     nested = np.cross(e.phiR[:, :, None], arm[:, None])
     return 0.5 * (nested + np.swapaxes(nested, 1, 2))
 
 
-def _curved_inertia(e: Elements, bend: Array) -> Array:
+def _curved_inertia(e: Elements, bend: Real) -> Real:
     """Half the second derivatives (n,n,3,3) of the inertia about the body origin that turning causes.
 
     That of a mass by its mass centre's bend, that of exp(theta~) Phi_i exp(-theta~) by
@@ -190,6 +188,6 @@ def _curved_inertia(e: Elements, bend: Array) -> Array:
     return inertia_of(_symmetric(moment)) + 0.5 * (turned + np.swapaxes(turned, 0, 1))
 
 
-def _symmetric(tensors: Array) -> Array:
+def _symmetric(tensors: Real) -> Real:
     """Symmetric parts of tensors (..., 3, 3)."""
     return 0.5 * (tensors + np.swapaxes(tensors, -2, -1))

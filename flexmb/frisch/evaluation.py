@@ -1,16 +1,16 @@
 """Entry points of Frisch's route: right-hand side of the motion, accelerations, loads."""
 
-from flexmb.coordinates import configuration_rate, hinge_forces, load_state
 from flexmb.frisch.bodies import node_load
 from flexmb.frisch.constraint import constraint_loads
 from flexmb.frisch.motion import relative_motion
 from flexmb.frisch.nests import nest_sums
 from flexmb.frisch.partitions import coefficient_matrix
 from flexmb.frisch.reduction import reduce, solve
-from flexmb.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.range import is_out_of_range
+from flexmb.motion.coordinates import configuration_rate, hinge_forces, load_state
 from flexmb.spatial.vector import add, cross, dot, vec3
-from flexmb.status import OK, OUT_OF_RANGE
+from flexmb.tables.status import OK, OUT_OF_RANGE
 
 
 @kernel

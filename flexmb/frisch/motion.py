@@ -6,10 +6,9 @@ hinge sits on a node that deforms (free-free modes). Node frames move exactly: b
 exponential of the rotation shapes. As printed they move by constant shapes, (118), (121), (124).
 """
 
-from flexmb.arrays import RUTHLESS
 from flexmb.frisch.tables import FIXED_SHAPES
 from flexmb.hinges import catalogue
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.field import field_motion
 from flexmb.spatial.vector import (
     add,
@@ -25,6 +24,7 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
+from flexmb.tables.arrays import RUTHLESS
 
 
 @helper

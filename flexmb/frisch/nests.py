@@ -5,7 +5,7 @@ further out, shifted along beta: the order of the work is N where the print's do
 """
 
 from flexmb.frisch.bodies import body_terms, load_terms, steiner, store6, wheel_terms
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import add, add3, axpy, cross, store3, sym6, sym_add, sym_axpy, vec3
 
 

@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from flexmb.frisch.elements import elements, mass_centre, particles, rotary
 from flexmb.modal.model import FlexibleModel
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # Shapes printed to ten digits vanish at the clamp this well.
 _PRINTED = 1e-9
@@ -78,7 +76,7 @@ def normalised(model: FlexibleModel, name: str = "flexible body") -> FlexibleMod
     )
 
 
-def _orthonormal(M1: Array, stiffness: Array, name: str) -> Array:
+def _orthonormal(M1: Real, stiffness: Real, name: str) -> Real:
     """X with X' M1 X = 1 and X' K X diagonal, for symmetric M1, K (n,n)."""
     d = np.diag(M1)
     scale = np.where(d > 0.0, 1.0 / np.sqrt(np.where(d > 0.0, d, 1.0)), 0.0)

@@ -19,13 +19,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.frisch.elements import Elements, Particles, elements, mass_centre, particles, rotary, slopes, turning
 from flexmb.frisch.normalisation import check_boundary
 from flexmb.modal.model import FlexibleModel
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -55,24 +53,24 @@ class ModeParameters:
     """
 
     mass: float
-    alpha: Array
-    Phi: Array
-    A: Array
-    B: Array
-    C: Array
-    Q: Array
-    D: Array
-    E: Array
-    H: Array
-    J: Array
-    F: Array
-    K: Array
-    M1: Array
-    A1: Array
-    Q1: Array
-    M1_slope: Array
-    stiffness: Array
-    damping: Array
+    alpha: Real
+    Phi: Real
+    A: Real
+    B: Real
+    C: Real
+    Q: Real
+    D: Real
+    E: Real
+    H: Real
+    J: Real
+    F: Real
+    K: Real
+    M1: Real
+    A1: Real
+    Q1: Real
+    M1_slope: Real
+    stiffness: Real
+    damping: Real
 
     @property
     def mode_count(self) -> int:
@@ -100,7 +98,7 @@ def mode_parameters(model: FlexibleModel, *, as_printed: bool = False, name: str
 
 
 def assemble(
-    alpha: Array, masses: Particles, turned: Elements, stiffness: Array, damping: Array, *, as_printed: bool
+    alpha: Real, masses: Particles, turned: Elements, stiffness: Real, damping: Real, *, as_printed: bool
 ) -> ModeParameters:
     """Parameters out of the sums over all masses, about their mass centre alpha, and the elements that turn."""
     m, D = masses.mass, masses.D

@@ -5,7 +5,7 @@ k. Every sum over the nest of k of terms with gamma_{i-1} = gamma_{k-1} + d foll
 Where neither nest holds the other, the matrix is zero: those places are never written.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub, sym6, sym_full, vec3
 
 

@@ -7,11 +7,11 @@ symmetric matrix, and the constraint loads, which do no work in any motion S des
 """
 
 from flexmb.frisch.tables import ONE_SIDED
-from flexmb.kernel import helper
-from flexmb.linear_algebra import cholesky_rows, cholesky_solve
-from flexmb.pivots import is_small
+from flexmb.jit.kernel import helper
+from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
+from flexmb.spatial.pivots import is_small
 from flexmb.spatial.vector import store3, vec3
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 
 
 @helper

@@ -8,16 +8,17 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.arrays import Constants, Index, Real
-from flexmb.assemble import assemble
+from flexmb.building.assemble import assemble
+from flexmb.building.links import Link, links
+from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
 from flexmb.frisch.errata import CORRECTED, Erratum
 from flexmb.frisch.tables import NestedWorkspace, workspace
-from flexmb.links import Link, links
-from flexmb.numbering import Numbering, wheels_by_body
 from flexmb.scene.schema import Scene
-from flexmb.state import Layout, finite_result
+from flexmb.tables.arrays import Constants
+from flexmb.tables.state import Layout, finite_result
+from flexmb.typing import Index, Real
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import COLUMN, SPEED_STATE, Constants, Index, Real, Record
-from flexmb.bundle import bundle
+from flexmb.jit.bundle import bundle
+from flexmb.tables.arrays import COLUMN, SPEED_STATE, Constants
+from flexmb.typing import Index, Real, Record
 
 _F, _I = np.float64, np.int64
 

@@ -11,5 +11,5 @@
     Configuration rate qdot(q, u), written to dq[i:i+nq].
 
 q and u are the whole vectors; the hinge's coordinates begin at q[i], its speeds at u[j]. `sequence` (3,) holds the axis
-numbers of a gimbal. Axes of one-axis kinds are z: `flexmb.system` turns the hinge frames so at build time.
+numbers of a gimbal. Axes of one-axis kinds are z: `flexmb.system.system` turns the hinge frames so at build time.
 """

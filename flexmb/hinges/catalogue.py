@@ -13,7 +13,7 @@ from flexmb.hinges import (
     translation3,
     weld,
 )
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 WELD, REVOLUTE, PRISMATIC, CYLINDRICAL, GIMBAL2, GIMBAL3, SPHERICAL, PLANAR, TRANSLATION2, TRANSLATION3, FREE = range(
     11

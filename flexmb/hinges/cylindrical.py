@@ -1,6 +1,6 @@
 """Cylindrical: rotation about z and translation along z; q = [angle, displacement]."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import rotation_z
 
 NQ, NV = 2, 2

@@ -1,6 +1,6 @@
 """Free: q = [position of O in O+ axes, quaternion], u = [angular velocity; velocity of O], both in O axes."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import cross, times

@@ -1,6 +1,6 @@
 """Two successive rotations about carried axes (universal hinge: "xy"): R = R_a(q1) R_b(q2)."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import rotation_axis
 from flexmb.spatial.vector import add, cross, matmul, scale, times_t
 

@@ -1,7 +1,7 @@
 """Three successive rotations about carried axes: R = R_a(q1) R_b(q2) R_c(q3). Singular where a and c align."""
 
 from flexmb.hinges.gimbal2 import unit
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import rotation_axis
 from flexmb.spatial.vector import add, cross, matmul, scale, times_t
 

@@ -1,6 +1,6 @@
 """Planar: translation in the x-y plane of O+, then rotation about z; q = [x, y, angle]."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import rotation_z
 from flexmb.spatial.scalar import cos, sin
 

@@ -1,6 +1,6 @@
 """Prismatic: one translation along z."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 NQ, NV = 1, 1
 

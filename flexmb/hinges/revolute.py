@@ -1,6 +1,6 @@
 """Revolute: one rotation about z."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import rotation_z
 
 NQ, NV = 1, 1

@@ -1,6 +1,6 @@
 """Spherical: q = quaternion of O relative to O+ (scalar first), u = relative angular velocity in O axes."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
 
 NQ, NV = 4, 3

@@ -1,6 +1,6 @@
 """Two translations along x and y of O+ (a point mass free in a plane)."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 NQ, NV = 2, 2
 

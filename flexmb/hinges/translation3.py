@@ -1,6 +1,6 @@
 """Three translations along the axes of O+ (a point mass free in space)."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 NQ, NV = 3, 3
 

@@ -1,6 +1,6 @@
 """Weld: no freedom."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 NQ, NV = 0, 0
 

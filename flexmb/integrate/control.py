@@ -10,8 +10,8 @@ import math
 
 import numpy as np
 
-from flexmb.kernel import helper, written_out
-from flexmb.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.jit.kernel import helper, written_out
+from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 SAFETY = 0.9
 SHRINK = 0.2  # strongest change of step after a rejection ...

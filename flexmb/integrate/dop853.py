@@ -27,8 +27,8 @@ from flexmb.integrate.control import (
     step_factor,
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
-from flexmb.kernel import helper, kernel
-from flexmb.status import NONFINITE, OK, STEP_TOO_SMALL
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 _END = STAGES  # row of A with the weights of the result; k[_END] is the derivative there
 _ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)

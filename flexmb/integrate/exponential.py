@@ -35,8 +35,8 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
-from flexmb.kernel import helper, kernel
-from flexmb.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 NODES = np.array([0.25, 0.5, 0.75, 1.0])
 # Row l: l-th derivative at 0 of the polynomial that vanishes at 0 and has given values at the nodes.

@@ -29,8 +29,8 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
-from flexmb.kernel import helper, kernel
-from flexmb.status import NONFINITE, NOT_CONVERGED, OK
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
 _ITERATIONS = 12  # of Newton's method, at most
 _ROUNDING = 2.0**-46  # a correction this far below accelerations is theirs: 64 roundings

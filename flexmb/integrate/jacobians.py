@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from flexmb.integrate.control import all_finite
-from flexmb.kernel import helper
-from flexmb.status import NONFINITE, OK
+from flexmb.jit.kernel import helper
+from flexmb.tables.status import NONFINITE, OK
 
 # Entries of `counts` behind those of `control`: Jacobians, and factorisations or exponentials of a matrix.
 JACOBIANS, FACTORISATIONS = 5, 6

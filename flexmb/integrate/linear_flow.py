@@ -17,7 +17,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 LEVELS = 36
 QUARTER = 2  # level of tau = 1/4, the coarsest one kept

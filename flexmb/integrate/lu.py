@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 
 @helper

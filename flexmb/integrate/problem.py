@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from flexmb.bundle import AnyBundle
-from flexmb.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, pointer
+from flexmb.jit.bundle import AnyBundle
+from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, pointer
 
 
 class Problem(NamedTuple):

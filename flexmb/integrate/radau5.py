@@ -31,8 +31,8 @@ from flexmb.integrate.control import (
 from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
-from flexmb.kernel import helper, kernel
-from flexmb.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
 _ITERATIONS = 7  # of Newton's method, at most
 _GROW = 8.0  # strongest growth of a step

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, permitted, stretch
-from flexmb.kernel import kernel, written_out
-from flexmb.status import NONFINITE, OK
+from flexmb.jit.kernel import kernel, written_out
+from flexmb.tables.status import NONFINITE, OK
 
 
 @written_out

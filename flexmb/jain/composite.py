@@ -8,18 +8,18 @@ instead of in the order of u. Rows of M are then filled from one end to the othe
 A wheel is one more speed of its body, whose force is the torque I q on its node.
 """
 
-from flexmb.coordinates import hinge_forces
 from flexmb.jain import inverse
 from flexmb.jain.explicit import inertia_to_parent, refer_to_hinge
 from flexmb.jain.kinematics import motion_column, velocity_sweep
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
-from flexmb.linear_algebra import cholesky_rows, cholesky_solve
-from flexmb.pivots import is_small
+from flexmb.motion.coordinates import hinge_forces
 from flexmb.spatial.inertia import inertia_times, load_inertia
+from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
+from flexmb.spatial.pivots import is_small
 from flexmb.spatial.vector import dot, mat3, scale, times, vec3
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 TILE = 16
 
@@ -119,7 +119,7 @@ def _own_forces(c, w, m, k):
     p = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].nv):
         angular, linear = motion_column(c, w, k, n)
-        tau, f = inertia_times(p, angular, linear)
+        tau, f = inertia_times(p, (angular, linear))
         _store_force(m.X, first + n, tau, f)
     nm = c.body[k].modes
     for n in range(nm):

@@ -13,12 +13,12 @@ deformation, the tables are made anew at each evaluation.
 
 from math import sqrt
 
-from flexmb.arrays import RUTHLESS
 from flexmb.jain.explicit import cholesky, refer_rigid
 from flexmb.jain.reduced import node_inertia
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
 from flexmb.spatial.vector import add_outer, axpy, dot, scale, store3, sub, vec3
+from flexmb.tables.arrays import RUTHLESS
 
 NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
 
@@ -213,8 +213,9 @@ def _responses(c, w, k):
 
 
 @helper
-def modal_accelerations(c, w, k, alpha, a):
+def modal_accelerations(c, w, k, A):
     """etadd from the acceleration of O: outward half of (64)."""
+    alpha, a = A
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):

@@ -17,7 +17,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from fractions import Fraction
 
-from flexmb.counting import Operations
+from flexmb.jit.counting import Operations
 
 EXPLICIT_UP_TO = 7  # modes; beyond, D_f is inverted by the matrix identity of appendix B
 

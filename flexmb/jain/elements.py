@@ -18,18 +18,18 @@ from flexmb.dense.jets import skew
 from flexmb.dense.kinematics import Motion, field, hinge_frame, member_frames, on_body, seat_frame
 from flexmb.dense.tree import Member, Rotor, Seat, Tree, rigid_model
 from flexmb.scene import schema as s
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 STEP = 2.0**-200
 
 
-def value(x: Complex) -> Array:
+def value(x: Complex) -> Real:
     """What was evaluated at q + i h dq/dt, at q."""
     return np.asarray(x.real)
 
 
-def rate(x: Complex) -> Array:
+def rate(x: Complex) -> Real:
     """Its inertial rate."""
     return np.asarray(x.imag / STEP)
 
@@ -55,12 +55,12 @@ class NodalBody:
     p: Complex
 
     @property
-    def M_m(self) -> Array:
+    def M_m(self) -> Real:
         """Modal mass matrix (m+6,m+6) (23)."""
         A = value(self.A)
         return np.asarray(np.einsum("pai,pab,pbj->ij", A, value(self.M_s), A))
 
-    def b_m(self, V_m: Array) -> Array:
+    def b_m(self, V_m: Real) -> Real:
         """Modal gyroscopic forces (m+6,) at V_m (28), (31), (37): as printed, but inertias turn with their nodes."""
         A, M_s = value(self.A), value(self.M_s)
         w = (A @ V_m)[:, :3]
@@ -73,7 +73,7 @@ class NodalBody:
 class Configuration:
     """A tree of members at coordinates q and speeds u, with every frame and mode shape in World axes."""
 
-    def __init__(self, tree: Tree, q: Array, u: Array) -> None:
+    def __init__(self, tree: Tree, q: Real, u: Real) -> None:
         self.tree, self.q, self.u = tree, q, u
         at_rest = np.zeros((1, tree.nu))
         self._motion = Motion(q + 1j * STEP * coordinate_rates(tree, q, u), at_rest, at_rest)
@@ -161,7 +161,7 @@ class Configuration:
         return Motion(self._motion.q, units, np.zeros_like(units))
 
 
-def spatial_inertia(mass: Array, central: NDArray, p: NDArray) -> NDArray:
+def spatial_inertia(mass: Real, central: NDArray, p: NDArray) -> NDArray:
     """M_s (P,6,6) about nodes: masses (P,), inertias (P,3,3) about mass centres, which lie p (P,3) from the nodes."""
     cross, m = skew(p), mass[:, None, None]
     linear = np.broadcast_to(m * np.eye(3), cross.shape)
@@ -184,7 +184,7 @@ def _wheel(tree: Tree, rotor: Rotor) -> Member:
     return Member(wheel.name, rotor.member, hinge, rotor.seat, own, model, "rigid", q, u, none, none)
 
 
-def undeformed(tree: Tree, q: Array, u: Array) -> tuple[Array, Array]:
+def undeformed(tree: Tree, q: Real, u: Real) -> tuple[Real, Real]:
     """q and u with eta = etadot = 0 for members of level ruthless, Appendix B (B1)."""
     q, u = q.copy(), u.copy()
     for member in tree.members:
@@ -193,7 +193,7 @@ def undeformed(tree: Tree, q: Array, u: Array) -> tuple[Array, Array]:
     return q, u
 
 
-def coordinate_rates(tree: Tree, q: Array, u: Array) -> Array:
+def coordinate_rates(tree: Tree, q: Real, u: Real) -> Real:
     """dq/dt (nq,)."""
     rates = np.zeros(tree.nq)
     for member in tree.members:
@@ -208,6 +208,6 @@ def coordinate_rates(tree: Tree, q: Array, u: Array) -> Array:
     return rates
 
 
-def _quaternion_rate(x: Array, w: Array) -> Array:
+def _quaternion_rate(x: Real, w: Real) -> Real:
     """1/2 x (0, w): scalar first, w in turning axes."""
     return 0.5 * np.concatenate([[-x[1:] @ w], x[0] * w + np.cross(x[1:], w)])

@@ -8,11 +8,11 @@ from typing import Any, Literal, get_args
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
-from flexmb import arrays as a
+from flexmb.tables import arrays as a
 
 Elimination = Literal["fastest", "explicit", "woodbury", "condensed"]
 
-ELIMINATIONS = ("explicit", "woodbury", "condensed")  # by the numbers of flexmb.arrays
+ELIMINATIONS = ("explicit", "woodbury", "condensed")  # by the numbers of flexmb.tables.arrays
 
 WELL_CONDITIONED = 1e4  # modal masses scaled to a unit diagonal; condensing loses the square root of it
 NEGLIGIBLE = 2.0**-49  # rows of a scaled root of Omega below it are rounding: 16 units

@@ -3,21 +3,21 @@
 After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
 """
 
-from flexmb.jain.pivots import note_modes
-from flexmb.kernel import helper
-from flexmb.pivots import SINGULAR
+from flexmb.jain.doubt import note_modes
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
     load_inertia,
     outer_inertia,
     rotate_inertia,
-    shift_force,
     shift_inertia,
     store_inertia,
     sum_inertia,
 )
+from flexmb.spatial.pivots import SINGULAR
 from flexmb.spatial.scalar import sqrt
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, store3, sub, times, vec3
 
 
@@ -108,7 +108,7 @@ def from_hinge(c, w, k, n):
 def _add_momentum(c, w, k, n, p, s):
     """P_fr += s B'P_rr, row n."""
     angular, linear = from_hinge(c, w, k, n)
-    tau, f = inertia_times(p, angular, linear)
+    tau, f = inertia_times(p, (angular, linear))
     add3(w.mode[k, n].pfr, 0, scale(s, tau))
     add3(w.mode[k, n].pfr, 3, scale(s, f))
 
@@ -120,7 +120,7 @@ def refer_coupling(c, w, k, s):
     p = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, p, s)
-        tau, f = shift_force(vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3), back)
+        tau, f = shift_force((vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3)), back)
         store3(w.mode[k, n].pfr, 0, tau)
 
 
@@ -133,16 +133,17 @@ def refer_rigid(c, w, k):
         w.mode[k, n].zf -= dot(angular, tau) + dot(linear, f)
     back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
     store_inertia(w.body[k].inertia, 0, shift_inertia(load_inertia(w.body[k].inertia, 0), back))
-    tau, f = shift_force(tau, f, back)
+    tau, f = shift_force((tau, f), back)
     store3(w.body[k].force, 0, tau)
 
 
 @helper
-def to_parent(c, w, k, p, tau, f):
+def to_parent(c, w, k, p, F):
     """P_R^+ and z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+    tau, f = F
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     gamma = shift_inertia(rotate_inertia(R, p), arm)
-    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    tau, f = shift_force((times(R, tau), times(R, f)), arm)
     _add_inertia(c, w, k, gamma)
     _add_force(c, w, w, k, tau, f)
 
@@ -154,10 +155,11 @@ def inertia_to_parent(c, w, k, p):
 
 
 @helper
-def force_to_parent(c, w, z, k, tau, f):
+def force_to_parent(c, w, z, k, F):
     """A [tau; f] added to the parent's force; z holds forces: the workspace w, or a response to w's factors."""
+    tau, f = F
     R = mat3(w.body[k].rotation, 0)
-    tau, f = shift_force(times(R, tau), times(R, f), vec3(w.body[k].arm, 0))
+    tau, f = shift_force((times(R, tau), times(R, f)), vec3(w.body[k].arm, 0))
     _add_force(c, w, z, k, tau, f)
 
 
@@ -170,13 +172,13 @@ def _add_inertia(c, w, k, gamma):
         r = vec3(w.port[i].r, 0)
         for n in range(c.body[parent].modes):
             angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
-            tau_n, f_n = inertia_times(gamma, angular, linear)
+            tau_n, f_n = inertia_times(gamma, (angular, linear))
             for m in range(n + 1):
                 s = dot(tau_n, vec3(w.port_mode[i, m].W, 0)) + dot(f_n, vec3(w.port_mode[i, m].L, 0))
                 s += w.pff[parent, n, m]
                 w.pff[parent, n, m] = s
                 w.pff[parent, m, n] = s
-            tau_n, f_n = shift_force(tau_n, f_n, r)
+            tau_n, f_n = shift_force((tau_n, f_n), r)
             add3(w.mode[parent, n].pfr, 0, tau_n)
             add3(w.mode[parent, n].pfr, 3, f_n)
         gamma = shift_inertia(gamma, r)
@@ -191,14 +193,15 @@ def _add_force(c, w, z, k, tau, f):
     if i >= 0:
         for n in range(c.body[parent].modes):
             z.mode[parent, n].zf += dot(vec3(w.port_mode[i, n].W, 0), tau) + dot(vec3(w.port_mode[i, n].L, 0), f)
-        tau, f = shift_force(tau, f, vec3(w.port[i].r, 0))
+        tau, f = shift_force((tau, f), vec3(w.port[i].r, 0))
     add3(z.body[parent].force, 0, tau)
     add3(z.body[parent].force, 3, f)
 
 
 @helper
-def modal_accelerations(c, w, k, alpha, a):
+def modal_accelerations(c, w, k, A):
     """Back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
+    alpha, a = A
     for n in range(c.body[k].modes - 1, -1, -1):
         s = w.mode[k, n].zf + dot(vec3(w.mode[k, n].pfr, 0), alpha) + dot(vec3(w.mode[k, n].pfr, 3), a)
         for i in range(n + 1, c.body[k].modes):

@@ -1,8 +1,7 @@
 """What acts on the bodies besides inertia: elasticity, hinge springs and motors, loads at nodes, wheels."""
 
-from flexmb.arrays import FORCE, NODE_AXES
 from flexmb.jain.kinematics import add_force, port_bias, port_velocity
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
 from flexmb.spatial.vector import (
     axpy,
@@ -14,6 +13,7 @@ from flexmb.spatial.vector import (
     times_t,
     vec3,
 )
+from flexmb.tables.arrays import FORCE, NODE_AXES
 
 
 @helper
@@ -52,7 +52,7 @@ def node_loads(c, w, k):
     for i in range(c.body[k].load_start, c.body[k].load_stop):
         port, tau, f = load_vector(c, w, k, i)
         r = vec3(w.port[port].r, 0)
-        add_force(w, k, scale(-1.0, axpy(1.0, cross(r, f), tau)), scale(-1.0, f))
+        add_force(w, k, (scale(-1.0, axpy(1.0, cross(r, f), tau)), scale(-1.0, f)))
         for n in range(c.body[k].modes):
             w.mode[k, n].zf -= dot(vec3(w.port_mode[port, n].W, 0), tau) + dot(vec3(w.port_mode[port, n].L, 0), f)
 
@@ -79,7 +79,7 @@ def wheel_forces(c, w, k):
             torque = axpy(w.speed[j].applied - axial * dot(axis, alpha), axis, gyroscopic)
             _remove_axial_inertia(c, w, k, port, axis, axial)
         zero = (0.0, 0.0, 0.0)
-        add_force(w, k, torque, zero)
+        add_force(w, k, (torque, zero))
         for n in range(c.body[k].modes):
             w.mode[k, n].zf += dot(vec3(w.port_mode[port, n].W, 0), torque)
 

@@ -21,9 +21,9 @@ from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import wheel_forces
 from flexmb.jain.kinematics import carried_acceleration, motion_column, store_origin_acceleration, velocity_sweep
 from flexmb.jain.sweeps import SINGLE, inward
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
-from flexmb.spatial.inertia import shift_force
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, times, vec3
 
 
@@ -59,11 +59,12 @@ def clear_body(c, x, k):
 
 
 @helper
-def push(c, w, x, k, port, tau, f):
+def push(c, w, x, k, port, F):
     """Add a load [tau; f] at a port of body k, body axes: A [tau; f] with A = [Pi'; phi] of (14), (15)."""
+    tau, f = F
     for n in range(c.body[k].modes):
         x.mode[k, n].zf -= dot(vec3(w.port_mode[port, n].W, 0), tau) + dot(vec3(w.port_mode[port, n].L, 0), f)
-    tau, f = shift_force(tau, f, vec3(w.port[port].r, 0))
+    tau, f = shift_force((tau, f), vec3(w.port[port].r, 0))
     add3(x.body[k].force, 0, scale(-1.0, tau))
     add3(x.body[k].force, 3, scale(-1.0, f))
 
@@ -101,7 +102,7 @@ def innovations(c, w, x):
             f = axpy(y, vec3(w.mode[k, n].pfr, 3), f)
         tau, f = _hinge_innovations(c, w, x, k, tau, f)
         if c.body[k].parent >= 0:
-            force_to_parent(c, w, x, k, tau, f)
+            force_to_parent(c, w, x, k, (tau, f))
 
 
 @helper
@@ -119,7 +120,7 @@ def respond(c, w, x):
                 y -= w.pff[k, i, n] * x.mode[k, i].etadd
             x.mode[k, n].etadd = y / w.pff[k, n, n]
             x.speed[start + n].acceleration = x.mode[k, n].etadd
-        store_origin_acceleration(c, w, x, k, alpha, a)
+        store_origin_acceleration(c, w, x, k, (alpha, a))
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
             x.speed[j].acceleration = 0.0
@@ -142,7 +143,7 @@ def excite(c, w, x):
             for i in range(n, nm):
                 y += w.pff[k, i, n] * x.speed[start + i].acceleration
             x.speed[start + n].innovation = y
-        store_origin_acceleration(c, w, x, k, alpha, a)
+        store_origin_acceleration(c, w, x, k, (alpha, a))
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
             x.speed[j].innovation = 0.0
@@ -173,7 +174,7 @@ def synthesise(c, w, x):
             f = axpy(y, vec3(w.mode[k, n].pfr, 3), f)
         tau, f = _hinge_forces(c, w, x, k, tau, f)
         if c.body[k].parent >= 0:
-            force_to_parent(c, w, x, k, tau, f)
+            force_to_parent(c, w, x, k, (tau, f))
 
 
 @helper
@@ -216,7 +217,7 @@ def _force_at_hinge(c, w, x, k):
     tau, f = vec3(x.body[k].force, 0), vec3(x.body[k].force, 3)
     i = c.body[k].outboard_port
     if i >= 0:
-        tau, f = shift_force(tau, f, scale(-1.0, vec3(w.port[i].r, 0)))
+        tau, f = shift_force((tau, f), scale(-1.0, vec3(w.port[i].r, 0)))
         for n in range(c.body[k].modes):
             x.mode[k, n].zf -= dot(vec3(w.port_mode[i, n].W, 0), tau) + dot(vec3(w.port_mode[i, n].L, 0), f)
     return tau, f

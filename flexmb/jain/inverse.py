@@ -15,9 +15,10 @@ from flexmb.jain.kinematics import (
     pose_sweep,
     velocity_sweep,
 )
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
-from flexmb.spatial.inertia import inertia_times, load_inertia, shift_force
+from flexmb.spatial.inertia import inertia_times, load_inertia
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, store3, times, vec3
 
 
@@ -41,7 +42,7 @@ def inverse_dynamics(c, w, tau):
 def _inertial_force(c, w, k, tau):
     """f_m = M_m alpha_m + b_m (36), rigid part into w.body.force, modal part into w.mode.zf; wheels' rows into tau."""
     alpha, a = vec3(w.body[k].accel, 0), vec3(w.body[k].accel, 3)
-    torque, force = inertia_times(load_inertia(w.body[k].inertia, 0), alpha, a)
+    torque, force = inertia_times(load_inertia(w.body[k].inertia, 0), (alpha, a))
     for n in range(c.body[k].modes):
         coupling = w.mode[k, n].pfr
         torque = axpy(w.mode[k, n].etadd, vec3(coupling, 0), torque)
@@ -50,7 +51,7 @@ def _inertial_force(c, w, k, tau):
         for i in range(c.body[k].modes):
             s += w.pff[k, n, i] * w.mode[k, i].etadd
         w.mode[k, n].zf = s
-    add_force(w, k, torque, force)
+    add_force(w, k, (torque, force))
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         port = c.wheel[i].port
         j = c.wheel[i].u_index
@@ -59,7 +60,7 @@ def _inertial_force(c, w, k, tau):
         omega, _ = port_velocity(w, k, port)
         node, _ = port_acceleration(c, w, k, port)
         reaction = axpy(axial * w.speed[j].acceleration, axis, cross(omega, scale(axial * w.u[j], axis)))
-        add_force(w, k, reaction, (0.0, 0.0, 0.0))
+        add_force(w, k, (reaction, (0.0, 0.0, 0.0)))
         for n in range(c.body[k].modes):
             w.mode[k, n].zf += dot(vec3(w.port_mode[port, n].W, 0), reaction)
         tau[j] = axial * (w.speed[j].acceleration + dot(axis, node))
@@ -71,7 +72,7 @@ def _project_force(c, w, k, tau):
     torque, force = vec3(w.body[k].force, 0), vec3(w.body[k].force, 3)
     i = c.body[k].outboard_port
     if i >= 0:
-        torque, force = shift_force(torque, force, scale(-1.0, vec3(w.port[i].r, 0)))
+        torque, force = shift_force((torque, force), scale(-1.0, vec3(w.port[i].r, 0)))
     for n in range(c.body[k].modes):
         row = w.mode[k, n].zf
         if i >= 0:
@@ -83,4 +84,4 @@ def _project_force(c, w, k, tau):
     store3(w.body[k].load, 0, torque)
     store3(w.body[k].load, 3, force)
     if c.body[k].parent >= 0:
-        force_to_parent(c, w, w, k, torque, force)
+        force_to_parent(c, w, w, k, (torque, force))

@@ -4,9 +4,8 @@ Jain & Rodriguez (10), (24), (25) for trees, in body axes. For hinges at deformi
 accelerations are classical (of the hinge point), not spatial; the body order is base to tip.
 """
 
-from flexmb.arrays import RUTHLESS
 from flexmb.hinges import catalogue
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.vector import (
     add,
@@ -23,6 +22,7 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
+from flexmb.tables.arrays import RUTHLESS
 
 
 @helper
@@ -229,7 +229,7 @@ def acceleration_sweep(c, w):
             a = add(a, scale(rate, linear))
         for n in range(c.body[k].modes):
             w.mode[k, n].etadd = w.speed[c.body[k].etad_index + n].acceleration
-        store_body_acceleration(c, w, k, alpha, a)
+        store_body_acceleration(c, w, k, (alpha, a))
 
 
 @helper
@@ -257,16 +257,18 @@ def carried_acceleration(c, w, x, k):
 
 
 @helper
-def store_body_acceleration(c, w, k, alpha, a):
+def store_body_acceleration(c, w, k, A):
     """Keep the acceleration of O (without deformation part) and go on to the body origin."""
+    alpha, a = A
     store3(w.body[k].accel_hinge, 0, alpha)
     store3(w.body[k].accel_hinge, 3, a)
-    store_origin_acceleration(c, w, w, k, alpha, a)
+    store_origin_acceleration(c, w, w, k, (alpha, a))
 
 
 @helper
-def store_origin_acceleration(c, w, x, k, alpha, a):
+def store_origin_acceleration(c, w, x, k, A):
     """From the acceleration of O, without deformation part, to that of the body origin, kept in x."""
+    alpha, a = A
     i = c.body[k].outboard_port
     if i >= 0:
         r = vec3(w.port[i].r, 0)
@@ -279,7 +281,8 @@ def store_origin_acceleration(c, w, x, k, alpha, a):
 
 
 @helper
-def add_force(w, k, tau, f):
+def add_force(w, k, F):
     """Add [tau; f] about the origin to the bias force of body k."""
+    tau, f = F
     add3(w.body[k].force, 0, tau)
     add3(w.body[k].force, 3, f)

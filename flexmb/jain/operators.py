@@ -20,13 +20,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from flexmb import arguments
 from flexmb.dense.profiles import profile
 from flexmb.dense.system import DenseSystem, Snapshot
 from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
 from flexmb.scene import schema as s
+from flexmb.tables import arguments
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 
@@ -51,44 +51,44 @@ class Operators:
     parent: tuple[int, ...]
     columns: tuple[slice, ...]
     rows: tuple[Index, ...]
-    E_Phi: Array
-    H: Array
-    M_m: Array
-    a_m: Array
-    b_m: Array
-    K_m: Array
-    deformation: Array
-    chi: Array
-    V_m: Array
+    E_Phi: Real
+    H: Real
+    M_m: Real
+    a_m: Real
+    b_m: Real
+    K_m: Real
+    deformation: Real
+    chi: Real
+    V_m: Real
 
     # Newton-Euler operators, section II
 
     @cached_property
-    def Phi(self) -> Array:
+    def Phi(self) -> Real:
         """(1 - E_Phi)^-1 (nbar,nbar) (19)."""
         return self._resolvent(self.E_Phi)
 
-    def alpha_m(self, chi_dot: Array) -> Array:
+    def alpha_m(self, chi_dot: Real) -> Real:
         """Modal spatial accelerations (nbar,) (26)."""
         return arguments.representable(self.Phi.T @ (self.H.T @ self._speeds("chi_dot", chi_dot) + self.a_m))
 
-    def f_m(self, chi_dot: Array) -> Array:
+    def f_m(self, chi_dot: Real) -> Real:
         """Modal spatial forces (nbar,) between each body and its parent (40)."""
         forces = self.M_m @ self.alpha_m(chi_dot) + self.b_m + self.K_m @ self.deformation
         return arguments.representable(self.Phi @ forces)
 
-    def inverse_dynamics(self, chi_dot: Array) -> Array:
+    def inverse_dynamics(self, chi_dot: Real) -> Real:
         """T (n,) (41)."""
         return arguments.representable(self.H @ self.f_m(chi_dot))
 
     @cached_property
-    def M(self) -> Array:
+    def M(self) -> Real:
         """Mass matrix (n,n), Newton-Euler factorisation (43)."""
         H_Phi = self.H @ self.Phi
         return H_Phi @ self.M_m @ H_Phi.T
 
     @cached_property
-    def C(self) -> Array:
+    def C(self) -> Real:
         """Coriolis, centrifugal and elastic forces (n,) in M chi_dot + C = T (43)."""
         forces = self.M_m @ (self.Phi.T @ self.a_m) + self.b_m + self.K_m @ self.deformation
         return self.H @ (self.Phi @ forces)
@@ -96,7 +96,7 @@ class Operators:
     # Composite bodies, section IV
 
     @cached_property
-    def R(self) -> Array:
+    def R(self) -> Real:
         """Composite-body inertias (nbar,nbar), block diagonal (47)."""
         R = self.M_m.copy()
         for k in reversed(range(len(self.parent))):
@@ -106,7 +106,7 @@ class Operators:
     # Articulated bodies, section V
 
     @cached_property
-    def _articulated(self) -> tuple[Array, Array, Array]:
+    def _articulated(self) -> tuple[Real, Real, Real]:
         """P (nbar,nbar), D^-1 (n,n) and G (nbar,n) by the recursion (51), tips to base."""
         P, G, D_inverse = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
         for k in reversed(range(len(self.parent))):
@@ -121,57 +121,57 @@ class Operators:
         return P, D_inverse, G
 
     @property
-    def P(self) -> Array:
+    def P(self) -> Real:
         """Articulated-body inertias (nbar,nbar), block diagonal (51). LinAlgError where a D(k) is not definite."""
         return self._articulated[0]
 
     @cached_property
-    def D(self) -> Array:
+    def D(self) -> Real:
         """H P H' (n,n), block diagonal (52)."""
         return self.H @ self.P @ self.H.T
 
     @property
-    def D_inverse(self) -> Array:
+    def D_inverse(self) -> Real:
         """(n,n), block diagonal."""
         return self._articulated[1]
 
     @property
-    def G(self) -> Array:
+    def G(self) -> Real:
         """P H' D^-1 (nbar,n), block diagonal (52)."""
         return self._articulated[2]
 
     @cached_property
-    def K(self) -> Array:
+    def K(self) -> Real:
         """E_Phi G (nbar,n) (52)."""
         return self.E_Phi @ self.G
 
     @cached_property
-    def tau_bar(self) -> Array:
+    def tau_bar(self) -> Real:
         """1 - G H (nbar,nbar), block diagonal (52)."""
         return np.eye(len(self.P)) - self.G @ self.H
 
     @cached_property
-    def E_Psi(self) -> Array:
+    def E_Psi(self) -> Real:
         """E_Phi tau_bar (nbar,nbar) (52)."""
         return self.E_Phi @ self.tau_bar
 
     @cached_property
-    def Psi(self) -> Array:
+    def Psi(self) -> Real:
         """(1 - E_Psi)^-1 (nbar,nbar) (53)."""
         return self._resolvent(self.E_Psi)
 
     @cached_property
-    def innovations(self) -> Array:
+    def innovations(self) -> Real:
         """1 + H Phi K (n,n), unit triangular by blocks: M = (1 + H Phi K) D (1 + H Phi K)' (54)."""
         return np.eye(len(self.H)) + self.H @ self.Phi @ self.K
 
     @cached_property
-    def innovations_inverse(self) -> Array:
+    def innovations_inverse(self) -> Real:
         """1 - H Psi K (n,n), the inverse of `innovations` (55)."""
         return np.eye(len(self.H)) - self.H @ self.Psi @ self.K
 
     @property
-    def M_inverse(self) -> Array:
+    def M_inverse(self) -> Real:
         """(1 - H Psi K)' D^-1 (1 - H Psi K) (n,n) (56)."""
         return self.innovations_inverse.T @ self.D_inverse @ self.innovations_inverse
 
@@ -180,7 +180,7 @@ class Operators:
         """log det M = log det D: the factors beside D (54) are unit triangular."""
         return sum(float(np.linalg.slogdet(self.D[np.ix_(rows, rows)])[1]) for rows in self.rows)
 
-    def accelerations(self, T: Array) -> Array:
+    def accelerations(self, T: Real) -> Real:
         """chi_dot (n,) for generalised forces T (n,), all of them free: Lemma 5 (57)."""
         T = self._speeds("T", T)
         forces = self.K @ T + self.P @ self.a_m + self.b_m + self.K_m @ self.deformation
@@ -188,7 +188,7 @@ class Operators:
         chi_dot = self.innovations_inverse.T @ (self.D_inverse @ innovation)
         return arguments.representable(chi_dot - self.K.T @ (self.Psi.T @ self.a_m))
 
-    def driven(self, prescribed: NDArray[np.bool_], rates: Array) -> Operators:
+    def driven(self, prescribed: NDArray[np.bool_], rates: Real) -> Operators:
         """The same tree with some speeds no longer free but driven at `rates`; both (n,), rates of free ones ignored.
 
         The driven rates join the accelerations a_m. M, C, T and chi_dot are then those of the free speeds; V_m stays.
@@ -205,11 +205,11 @@ class Operators:
             a_m=self.a_m + self.H[prescribed].T @ rates[prescribed],
         )
 
-    def _speeds(self, name: str, values: Array) -> Array:
+    def _speeds(self, name: str, values: Real) -> Real:
         """(n,) finite numbers; ValueError or TypeError for others."""
         return arguments.finite(name, arguments.vector(name, values, len(self.H)))
 
-    def _resolvent(self, E: Array) -> Array:
+    def _resolvent(self, E: Real) -> Real:
         """(1 - E)^-1 = 1 + E + E^2 + ... of a nilpotent E with one block in each body's columns, that of its parent."""
         found = np.eye(len(E))
         for p, columns in zip(self.parent, self.columns, strict=True):
@@ -217,7 +217,7 @@ class Operators:
                 found[:, columns] += found[:, self.columns[p]] @ E[self.columns[p], columns]
         return found
 
-    def _add_to_parent(self, inertia: Array, k: int, own: Array) -> None:
+    def _add_to_parent(self, inertia: Real, k: int, own: Real) -> None:
         """Add Phi(p, k) own Phi'(p, k) to the parent's block, in place."""
         if self.parent[k] >= 0:
             p = self.columns[self.parent[k]]
@@ -232,11 +232,11 @@ class SpatialOperators:
         self._dense = DenseSystem(scene)
         self._bodies = with_wheels(self._dense.tree)
 
-    def configuration(self, t: float, q: Array, u: Array) -> Configuration:
+    def configuration(self, t: float, q: Real, u: Real) -> Configuration:
         """All bodies as inertia sees them: prescribed coordinates on their functions, ruthless bodies undeformed."""
         return Configuration(self._bodies, *undeformed(self._bodies, *self._dense.on_profile(q, u, t)))
 
-    def at(self, t: float, q: Array, u: Array) -> Operators:
+    def at(self, t: float, q: Real, u: Real) -> Operators:
         """The operators at time t, coordinates q (nq,) and speeds u (nu,), all speeds free."""
         now, members = self.configuration(t, q, u), self._bodies.members
         modes = [member.model.mode_count for member in members]
@@ -270,7 +270,7 @@ class SpatialOperators:
             V_m=V_m,
         )
 
-    def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Array) -> tuple[Array, Array]:
+    def _inertia(self, now: Configuration, columns: tuple[slice, ...], V_m: Real) -> tuple[Real, Real]:
         """M_m (nbar,nbar) and b_m (nbar,); level linear cut off after the first order, in its own body's frame."""
         M_m, b_m = np.zeros((len(V_m), len(V_m))), np.zeros(len(V_m))
         tree = self._dense.tree
@@ -284,7 +284,7 @@ class SpatialOperators:
                 M_m[at, at], b_m[at] = body.M_m, body.b_m(V_m[at])
         return M_m, b_m
 
-    def _external(self, now: Configuration, t: float, columns: tuple[slice, ...], M_m: Array) -> Array:
+    def _external(self, now: Configuration, t: float, columns: tuple[slice, ...], M_m: Real) -> Real:
         """Modal forces (nbar,) of gravity and of loads at nodes."""
         fall = np.zeros(len(M_m))
         for at in columns:

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import Constants, Index, Real
-from flexmb.bundle import bundle
+from flexmb.jit.bundle import bundle
+from flexmb.tables.arrays import Constants
+from flexmb.typing import Index, Real
 
 
 @bundle

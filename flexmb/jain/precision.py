@@ -16,7 +16,7 @@ which it is 1 has no inertia but rounding.
 
 from flexmb.jain.innovations import clear_body, innovations, port_response, push, respond
 from flexmb.jain.kinematics import motion_column
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import add, add3, mat3, scale, times, vec3
 
@@ -85,7 +85,7 @@ def _weigh_transfer(c, w, x, k, s):
     if i >= 0:
         angular = add(angular, _lever(vec3(w.port[i].r, 0), linear))
         alpha, a = port_response(c, w, x, p, i)
-        push(c, w, x, p, i, _weighted(angular, alpha), _weighted(linear, a))
+        push(c, w, x, p, i, (_weighted(angular, alpha), _weighted(linear, a)))
     else:
         alpha, a = vec3(x.body[p].accel, 0), vec3(x.body[p].accel, 3)
         add3(x.body[p].force, 0, scale(-1.0, _weighted(angular, alpha)))

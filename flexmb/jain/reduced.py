@@ -6,26 +6,27 @@ there, A the node's acceleration, F its load on the body, modes included: F = Ga
 
 from math import sqrt
 
-from flexmb.kernel import helper
-from flexmb.pivots import SINGULAR
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import (
     inertia_times,
     load_inertia,
     rotate_inertia,
-    shift_force,
     shift_inertia,
     store_inertia,
 )
+from flexmb.spatial.pivots import SINGULAR
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import mat3, store3, times, vec3
 
 
 @helper
-def to_node(c, w, k, p, tau, f):
+def to_node(c, w, k, p, F):
     """Gamma = P_R^+ and z_R^+ of body k about the node of its parent, parent axes."""
+    tau, f = F
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     node = w.node[c.body[c.body[k].parent].reduced, c.body[k].node]
     store_inertia(node.gamma, 0, shift_inertia(rotate_inertia(R, p), arm))
-    tau, f = shift_force(times(R, tau), times(R, f), arm)
+    tau, f = shift_force((times(R, tau), times(R, f)), arm)
     store3(node.force, 0, tau)
     store3(node.force, 3, f)
 
@@ -42,7 +43,7 @@ def node_inertia(w, r, nodes):
     for i in range(nodes):
         gamma = load_inertia(w.node[r, i].gamma, 0)
         for a in range(rank):
-            tau, f = inertia_times(gamma, vec3(root[a], 6 * i), vec3(root[a], 6 * i + 3))
+            tau, f = inertia_times(gamma, (vec3(root[a], 6 * i), vec3(root[a], 6 * i + 3)))
             store3(B[a], 6 * i, tau)
             store3(B[a], 6 * i + 3, f)
     for a in range(rank):

@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import Constants, Real, Record
-from flexmb.bundle import bundle
+from flexmb.jit.bundle import bundle
+from flexmb.tables.arrays import Constants
+from flexmb.typing import Real, Record
 
 BODY_RESPONSE = np.dtype([
     ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes

@@ -5,8 +5,8 @@ tuple or a row of the workspace. Bodies are numbered base to tip, hence the inwa
 enters as acceleration -g of the ground.
 """
 
-from flexmb.coordinates import hinge_forces
 from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
+from flexmb.jain.doubt import note_hinge
 from flexmb.jain.explicit import cholesky
 from flexmb.jain.forces import elastic_forces, node_loads, wheel_forces
 from flexmb.jain.kinematics import (
@@ -17,11 +17,10 @@ from flexmb.jain.kinematics import (
     store_body_acceleration,
     velocity_sweep,
 )
-from flexmb.jain.pivots import note_hinge
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations, to_parent
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.range import is_out_of_range
-from flexmb.pivots import is_rounding, is_small
+from flexmb.motion.coordinates import hinge_forces
 from flexmb.spatial.inertia import (
     inertia_column,
     inertia_times,
@@ -29,8 +28,9 @@ from flexmb.spatial.inertia import (
     outer_inertia,
     sum_inertia,
 )
+from flexmb.spatial.pivots import is_rounding, is_small
 from flexmb.spatial.vector import add, add3, dot, mat3, scale, store3, times, vec3
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 SINGLE = -1  # free_count of a hinge with one free speed along z: no small matrices
 
@@ -88,7 +88,7 @@ def _eliminate_hinge(c, w, k):
     j = c.body[k].u_index
     single = kind in (REVOLUTE, PRISMATIC) and c.body[k].outboard_port < 0
     impose(c, w, k)
-    moved = inertia_times(p, vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3))
+    moved = inertia_times(p, (vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3)))
     tau = add(vec3(w.body[k].hinge_force, 0), moved[0])
     f = add(vec3(w.body[k].hinge_force, 3), moved[1])
     if single and c.speed[j].prescribed < 0:
@@ -109,7 +109,7 @@ def _eliminate_hinge(c, w, k):
         tau = add(tau, scale(epsilon * s, u_angular))
         f = add(f, scale(epsilon * s, u_linear))
         if c.body[k].parent >= 0:
-            to_parent(c, w, k, sum_inertia(p, outer_inertia(u_angular, u_linear, -s)), tau, f)
+            to_parent(c, w, k, sum_inertia(p, outer_inertia(u_angular, u_linear, -s)), (tau, f))
         return True
     return _eliminate_several(c, w, k, p, tau, f)
 
@@ -149,7 +149,7 @@ def _eliminate_several(c, w, k, p, tau, f):
     for a in range(free):
         n = w.body[k].free_speed[a]
         angular, linear = motion_column(c, w, k, n)
-        u_angular, u_linear = inertia_times(p, angular, linear)
+        u_angular, u_linear = inertia_times(p, (angular, linear))
         store3(G[a], 0, u_angular)
         store3(G[a], 3, u_linear)
         w.body[k].hinge_residual[a] = w.speed[j + n].applied - dot(angular, tau) - dot(linear, f)
@@ -173,7 +173,7 @@ def _eliminate_several(c, w, k, p, tau, f):
         tau = add(tau, scale(w.body[k].hinge_residual[a], u_angular))
         f = add(f, scale(w.body[k].hinge_residual[a], u_linear))
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, p, tau, f)
+        to_parent(c, w, k, p, (tau, f))
     return True
 
 
@@ -183,8 +183,8 @@ def outward(c, w):
     for k in range(c.body.shape[0]):
         alpha, a = inboard_acceleration(c, w, k)
         alpha, a = _hinge_acceleration(c, w, k, alpha, a)
-        modal_accelerations(c, w, k, alpha, a)
-        store_body_acceleration(c, w, k, alpha, a)
+        modal_accelerations(c, w, k, (alpha, a))
+        store_body_acceleration(c, w, k, (alpha, a))
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             wheel_acceleration(c, w, k, i)
 

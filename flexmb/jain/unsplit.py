@@ -4,16 +4,16 @@ D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The s
 `flexmb.jain.sweeps` does the same to a smaller matrix after the modes: this one is what it is checked against.
 """
 
-from flexmb.arrays import Real
-from flexmb.bundle import bundle
+from flexmb.jain.doubt import note_hinge, note_modes
 from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
 from flexmb.jain.kinematics import inboard_acceleration, motion_column, store_body_acceleration
-from flexmb.jain.pivots import note_hinge, note_modes
 from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
-from flexmb.kernel import helper
+from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
 from flexmb.spatial.vector import add, dot, scale, store3, vec3
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.typing import Real
 
 
 @bundle
@@ -29,7 +29,7 @@ class Joint:
 def forward_dynamics(c, w, x):
     """Accelerations into w.speed.acceleration; w.body.hinge_inertia, hinge_force, accel_hinge hold P^+, z^+, alpha^+.
 
-    Loads across hinges are f = P^+ alpha^+ + z^+, so that `flexmb.loads` finds them here too. Returns a status code.
+    Loads across hinges are f = P^+ alpha^+ + z^+, so that `jain.loads` finds them here too. Returns a status code.
     """
     status = bodies(c, w)
     if status != OK:
@@ -53,7 +53,7 @@ def _eliminate(c, w, x, k):
     impose(c, w, k)
     p = load_inertia(w.body[k].inertia, 0)
     alpha, a = vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3)
-    moved = inertia_times(p, alpha, a)
+    moved = inertia_times(p, (alpha, a))
     tau, f = add(vec3(w.body[k].force, 0), moved[0]), add(vec3(w.body[k].force, 3), moved[1])
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     for n in range(nm):
@@ -67,7 +67,7 @@ def _eliminate(c, w, x, k):
     for n in range(nm, rows):
         j = w.body[k].free_speed[n - nm]
         angular, linear = motion_column(c, w, k, j)
-        momentum = inertia_times(p, angular, linear)
+        momentum = inertia_times(p, (angular, linear))
         store3(gain[n], 0, momentum[0])
         store3(gain[n], 3, momentum[1])
         residual[n] = w.speed[c.body[k].u_index + j].applied - dot(angular, tau) - dot(linear, f)
@@ -96,7 +96,7 @@ def _eliminate(c, w, x, k):
     store3(w.body[k].hinge_force, 0, tau)
     store3(w.body[k].hinge_force, 3, f)
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), tau, f)
+        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), (tau, f))
     return True
 
 
@@ -123,7 +123,7 @@ def _accelerate(c, w, x, k):
         angular, linear = motion_column(c, w, k, j)
         moved_alpha = add(moved_alpha, scale(residual[n], angular))
         moved_a = add(moved_a, scale(residual[n], linear))
-    store_body_acceleration(c, w, k, moved_alpha, moved_a)
+    store_body_acceleration(c, w, k, (moved_alpha, moved_a))
     store3(w.body[k].accel_hinge, 0, alpha)
     store3(w.body[k].accel_hinge, 3, a)
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):

@@ -3,13 +3,13 @@
 Scenes with other choices have ReducedConstants: the kernels are compiled again for them.
 """
 
-from flexmb.arrays import CONDENSED, EXPLICIT, FULL, RUTHLESS, WOODBURY
 from flexmb.jain import condensed, explicit, woodbury
 from flexmb.jain.reduced import to_node
-from flexmb.kernel import by_bundle, helper
+from flexmb.jit.kernel import by_bundle, helper
 from flexmb.levels import full
 from flexmb.levels.body import body_inertia
 from flexmb.levels.ruthless import rigid_block_and_bias
+from flexmb.tables.arrays import CONDENSED, EXPLICIT, FULL, RUTHLESS, WOODBURY
 
 
 @helper
@@ -32,21 +32,21 @@ def _eliminate_modes(c, w, k):
 
 
 @helper
-def _to_parent(c, w, k, p, tau, f):
+def _to_parent(c, w, k, p, F):
     if c.body[k].node < 0:
-        explicit.to_parent(c, w, k, p, tau, f)
+        explicit.to_parent(c, w, k, p, F)
     else:
-        to_node(c, w, k, p, tau, f)
+        to_node(c, w, k, p, F)
 
 
 @helper
-def _modal_accelerations(c, w, k, alpha, a):
+def _modal_accelerations(c, w, k, A):
     if c.body[k].elimination == CONDENSED:
-        condensed.modal_accelerations(c, w, k, alpha, a)
+        condensed.modal_accelerations(c, w, k, A)
     elif c.body[k].elimination == WOODBURY:
-        woodbury.modal_accelerations(c, w, k, alpha, a)
+        woodbury.modal_accelerations(c, w, k, A)
     else:
-        explicit.modal_accelerations(c, w, k, alpha, a)
+        explicit.modal_accelerations(c, w, k, A)
 
 
 inertia = by_bundle("compliance", _inertia, body_inertia)  # M_m and b_m as far as the variant needs them

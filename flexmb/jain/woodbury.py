@@ -9,8 +9,9 @@ with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4); the res
 
 from flexmb.jain.explicit import refer_coupling, refer_rigid
 from flexmb.jain.reduced import node_inertia
-from flexmb.kernel import helper
-from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_force, shift_inertia
+from flexmb.jit.kernel import helper
+from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_inertia
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import add3, dot, vec3
 
 
@@ -57,13 +58,13 @@ def _load_node(c, w, k, i):
     tau, f = vec3(node.force, 0), vec3(node.force, 3)
     for n in range(c.body[k].modes):
         angular, linear = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)
-        tau_n, f_n = inertia_times(gamma, angular, linear)
-        tau_n, f_n = shift_force(tau_n, f_n, r)
+        tau_n, f_n = inertia_times(gamma, (angular, linear))
+        tau_n, f_n = shift_force((tau_n, f_n), r)
         add3(w.mode[k, n].pfr, 0, tau_n)
         add3(w.mode[k, n].pfr, 3, f_n)
         w.mode[k, n].zf += dot(angular, tau) + dot(linear, f)
     add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
-    tau, f = shift_force(tau, f, r)
+    tau, f = shift_force((tau, f), r)
     add3(w.body[k].force, 0, tau)
     add3(w.body[k].force, 3, f)
 
@@ -93,8 +94,9 @@ def _inverse(c, w, k):
 
 
 @helper
-def modal_accelerations(c, w, k, alpha, a):
+def modal_accelerations(c, w, k, A):
     """etadd = nu_f - g' alpha: outward half of (64)."""
+    alpha, a = A
     r = c.body[k].reduced
     for n in range(c.body[k].modes):
         s = dot(vec3(w.gain[r, n, 0], 0), alpha) + dot(vec3(w.gain[r, n, 0], 3), a)

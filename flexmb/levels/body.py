@@ -1,8 +1,8 @@
 """M_m and b_m of a body, whatever its level."""
 
-from flexmb.arrays import FULL, LINEAR, RUTHLESS, STIFFENED
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels import full, linear, rigid, ruthless, stiffened
+from flexmb.tables.arrays import FULL, LINEAR, RUTHLESS, STIFFENED
 
 
 @helper

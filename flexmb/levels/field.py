@@ -6,7 +6,7 @@ part of second order, 1/2 eta' G eta: their rates are those of the linear field 
 they accelerate by etadot' G etadot at etaddot = 0.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import (
     exponential,
     exponential_coefficients,

@@ -5,7 +5,7 @@ polynomial in eta: it is carried by the integrals P0_n = sum m phi_n x' and P1_n
 points is left. Points with rotating inertia, or with a mass centre off the point, are summed.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.integrals import AXIAL, NUMBERS, sum_integrals, symmetric, vector
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point

@@ -5,7 +5,7 @@ mode i, that of their slopes P1_ni by eta_i. In a block the number varies before
 3x3 matrix sum m a b': [xx yy zz xy xz yz] of its symmetric part, and its axial vector sum m b x a.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 AXIAL = 6  # where the axial vector starts
 NUMBERS = 9

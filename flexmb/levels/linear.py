@@ -11,7 +11,7 @@ Not a kinetic energy's equations: power is balanced to first order only, and M_m
 The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.summed_point import add_point
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym6, sym_axpy, sym_times, vec3

@@ -1,6 +1,6 @@
 """Modal masses that do not change with the deformation."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 
 @helper

@@ -1,7 +1,7 @@
 """How far a modal field means anything."""
 
-from flexmb.arrays import RUTHLESS
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
+from flexmb.tables.arrays import RUTHLESS
 
 RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
 

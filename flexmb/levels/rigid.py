@@ -1,6 +1,6 @@
 """Level rigid: no modes. T = 1/2 m v.v + v.(w x s) + 1/2 w.J w."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import cross, store3, sym6, sym_times, vec3
 

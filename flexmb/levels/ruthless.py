@@ -1,6 +1,6 @@
 """Level ruthless (Jain & Rodriguez, Appendix B): M_m at eta = 0, b_m at eta = etadot = 0."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels import rigid
 from flexmb.levels.masses import modal_masses
 from flexmb.spatial.vector import dot, sym6, sym_times, vec3

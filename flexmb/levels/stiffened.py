@@ -9,7 +9,7 @@ and its acceleration at wdot = vdot = etaddot = 0 is w x (w x rho) + 2 w x rho' 
 are few (`flexmb.modal.equivalent`).
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.summed_point import add_point
 from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3

@@ -3,7 +3,7 @@
 Angular momentum and force follow the point's exact motion; nothing is truncated.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.inertia import add_inertia, rigid_inertia
 from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from flexmb import arguments
-from flexmb.arrays import Real
 from flexmb.linear.model import Complex, LinearModel, Stability
 from flexmb.linear.spin import steady_spin
 from flexmb.scene.schema import Scene
-from flexmb.state import State
-from flexmb.system import System, compile
+from flexmb.system.system import System, compile
+from flexmb.tables import arguments
+from flexmb.tables.state import State
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True, eq=False)

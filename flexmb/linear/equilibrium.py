@@ -13,12 +13,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import solve_triangular
 
-from flexmb.arrays import Index, Real
 from flexmb.linear.linearize import displacement_names
 from flexmb.linear.variations import Equations, Variations, entering
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError, State
-from flexmb.system import System
+from flexmb.system.system import System
+from flexmb.tables.state import DynamicsError, State
+from flexmb.typing import Index, Real
 
 CONVERGED = 1e-12  # last correction, part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
 RESIDUAL = 1e-9  # acceleration left, part of that at the start

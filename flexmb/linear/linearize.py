@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.arrays import Real
 from flexmb.hinges.catalogue import quaternion_offset
-from flexmb.labels import state_names
 from flexmb.linear.model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError, State
-from flexmb.system import System
+from flexmb.system.labels import state_names
+from flexmb.system.system import System
+from flexmb.tables.state import DynamicsError, State
+from flexmb.typing import Real
 
 _ROTATION = tuple((f"rotation.{axis}", "rad") for axis in "xyz")
 _POSITION = tuple((f"position.{axis}", "m") for axis in "xyz")

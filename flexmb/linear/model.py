@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
-from flexmb import arguments
-from flexmb.arrays import Real
-from flexmb.state import State
+from flexmb.tables import arguments
+from flexmb.tables.state import State
+from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
 ROUNDOFF = 2.0**-53

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flexmb.linear.campbell import Campbell
-from flexmb.printable import chart_text
+from flexmb.output.printable import chart_text
 
 _SIZE = (9.0, 7.0)  # inches
 _RESOLUTION = 120  # dots per inch

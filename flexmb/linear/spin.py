@@ -6,14 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb import arguments
 from flexmb.linear.equilibrium import balanced
 from flexmb.linear.linearize import linear_model
 from flexmb.linear.model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Revolute, Scene
-from flexmb.state import State
-from flexmb.system import System
+from flexmb.system.system import System
+from flexmb.tables import arguments
+from flexmb.tables.state import State
 
 DEPENDENT = 1e-9  # change of the accelerations with the angle, part of their derivatives' size
 

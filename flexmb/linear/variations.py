@@ -16,17 +16,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb import dynamics
-from flexmb.arrays import Constants, Index, Real, Record
-from flexmb.closed_system import ClosedSystem
-from flexmb.functions import pack as pack_functions
+from flexmb.entry import articulated
+from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
 from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError, State, pack
-from flexmb.status import OK, Status
-from flexmb.system import System, compile
-from flexmb.tangent import jacobian, tangent_workspace, time_derivative
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.system import System, compile
+from flexmb.tables.arrays import Constants
+from flexmb.tables.functions import pack as pack_functions
+from flexmb.tables.state import DynamicsError, State, pack
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Index, Real, Record
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,12 +90,13 @@ class Equations:
 
     def _constant_functions(self, t: float) -> list[Function]:
         w = self.system.workspace()
-        dynamics.accelerations(t, pack(self.system.initial_state), self.constants, w)  # fills in the functions
+        articulated.accelerations(t, pack(self.system.initial_state), self.constants, w)  # fills in the functions
         return [Constant(value=float(value)) for value in w.function[:, 0]]
 
     def rates(self, state: State) -> Real:
         """udot (n,) of the free speeds; DynamicsError where it does not exist."""
-        self._check(dynamics.accelerations(state.t, pack(state), self.constants, self._real_w), self._real_w.fault[0])
+        status = articulated.accelerations(state.t, pack(state), self.constants, self._real_w)
+        self._check(status, self._real_w.fault[0])
         return self._real_w.speed["acceleration"][self.free]
 
     def mass(self, state: State) -> Real:

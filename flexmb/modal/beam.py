@@ -10,15 +10,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.interpolation import BendingField, LineField, Mesh
 from flexmb.modal.section import SectionTable, section_table
 from flexmb.modal.stations import Lump, Stations, quadrature
 from flexmb.scene.bodies import BeamBody
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # Rows of [ux, uy, uz, rx, ry, rz] that a family moves: translation row, rotation row, sign of the rotation.
 _BENDING_ROWS = {"bending_y": (1, 5, 1.0), "bending_z": (2, 4, -1.0)}
@@ -56,7 +54,7 @@ class BeamElements:
             self.coordinates(name).start + k for name, field in self.fields.items() for k in field.clamped_coordinates
         ]
 
-    def rigid(self) -> Array:
+    def rigid(self) -> Real:
         """Rigid motions (size, r) that the chosen families can make: one of axial and torsion, two of each bending."""
         columns = []
         for name, field in self.fields.items():
@@ -65,7 +63,7 @@ class BeamElements:
             columns.append(motion)
         return np.hstack(columns)
 
-    def motion(self, x: Array, coefficients: Array) -> Array:
+    def motion(self, x: Real, coefficients: Real) -> Real:
         """[displacement; rotation] (n, 6, m) of the axis points x (n,) for coordinate columns (size, m)."""
         x = np.asarray(x, dtype=float)
         moved = np.zeros((len(x), 6, coefficients.shape[1]))
@@ -80,7 +78,7 @@ class BeamElements:
                 moved[:, rotation] = sign * (rows.rotation @ part)
         return moved
 
-    def strain(self, x: Array, coefficients: Array) -> tuple[Array, Array]:
+    def strain(self, x: Real, coefficients: Real) -> tuple[Real, Real]:
         """At x (n,) for coordinate columns (size, m): [stretch; shears] (n,3,m), [twist; curvatures] (n,3,m) 1/m."""
         stretch, turn = np.zeros((2, len(x), 3, coefficients.shape[1]))
         for name, field in self.fields.items():
@@ -94,7 +92,7 @@ class BeamElements:
                 turn[:, rotation - 3] = sign * (rows.curvature @ part)
         return stretch, turn
 
-    def stiffness(self) -> Array:
+    def stiffness(self) -> Real:
         """Stiffness matrix (size, size): the sum of EA e^2, GJ twist^2, EI curvature^2 and GA shear^2 over the beam."""
         x, weight = quadrature(self.mesh, self.table)
         K = np.zeros((self.size, self.size))
@@ -111,7 +109,7 @@ class BeamElements:
                     K[own, own] += _weighted(rows.shear, weight * self.table.at(GA, x))
         return K
 
-    def mass(self, stations: Stations, lumps: tuple[Lump, ...]) -> Array:
+    def mass(self, stations: Stations, lumps: tuple[Lump, ...]) -> Real:
         """Mass matrix (size, size) of the stations and the lumps."""
         M = np.zeros((self.size, self.size))
         turning = {
@@ -151,16 +149,16 @@ def beam_elements(body: BeamBody) -> BeamElements:
     return BeamElements(mesh, table, fields)
 
 
-def lump_mass(lump: Lump) -> Array:
+def lump_mass(lump: Lump) -> Real:
     """Mass matrix (6,6) of a lump for [displacement; rotation] of its axis point."""
     c = cross_matrix(lump.com)
     return np.block([[lump.mass * np.eye(3), -lump.mass * c], [lump.mass * c, lump.inertia - lump.mass * c @ c]])
 
 
-def _plane_stiffness(table: SectionTable, family: str) -> tuple[Array, Array | None]:
+def _plane_stiffness(table: SectionTable, family: str) -> tuple[Real, Real | None]:
     return (table.EIz, table.GAy) if family == "bending_y" else (table.EIy, table.GAz)
 
 
-def _weighted(rows: Array, weight: Array) -> Array:
+def _weighted(rows: Real, weight: Real) -> Real:
     """rows' diag(weight) rows."""
     return rows.T @ (weight[:, None] * rows)

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
-def cross_matrix(a: Array) -> Array:
+def cross_matrix(a: Real) -> Real:
     """Cross-product matrices (..., 3, 3) of vectors (..., 3): cross_matrix(a) b = a x b."""
     x, y, z = a[..., 0], a[..., 1], a[..., 2]
     zero = np.zeros_like(x)

@@ -13,12 +13,10 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
 from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 NEGLIGIBLE = 1e-12
 """What is left of a field of unit size beyond the others is rounding below it."""
@@ -43,10 +41,10 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
     turning = ~still | np.any(model.inertia != 0.0, axis=(1, 2))
     size, none = len(to_points), np.zeros_like
 
-    def joined(new: Array, old: Array) -> Array:
+    def joined(new: Real, old: Real) -> Real:
         return np.concatenate([new, old[turning]])
 
-    def moved(field: Array) -> Array:
+    def moved(field: Real) -> Real:
         return np.tensordot(to_points, field[still], axes=1)
 
     position, translation, G = moved(model.position), moved(model.translation), moved(model.second.translation)
@@ -62,14 +60,14 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
     )
 
 
-def _basis(fields: Array) -> Array:
+def _basis(fields: Real) -> Real:
     """Orthonormal columns that span those of `fields` (points, n), each taken in its own size."""
     size = np.linalg.norm(fields, axis=0)
     Q, R, _ = qr(fields[:, size > 0.0] / size[size > 0.0], mode="economic", pivoting=True)
     return np.asarray(Q[:, np.abs(np.diag(R)) > NEGLIGIBLE])
 
 
-def _equal_masses(basis: Array, m: Array) -> Array:
+def _equal_masses(basis: Real, m: Real) -> Real:
     """Rows (r, points) that take a field times sqrt(m) to its values at r points of mass sum(m) / r.
 
     The field 1 must have equal coefficients: a reflection brings those it has, of the same norm, to these.

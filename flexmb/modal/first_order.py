@@ -16,12 +16,10 @@ from __future__ import annotations
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.model import FlexibleModel
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 TOGETHER = 2**18  # vectors by point and pair of modes in memory at once
 
@@ -42,16 +40,16 @@ class FirstOrder:
     """
 
     mass: float
-    s0: Array
-    J0: Array
-    E: Array
-    C0: Array
-    L0: Array
-    C1: Array
-    L1: Array
-    G: Array
-    M0: Array
-    M1: Array
+    s0: Real
+    J0: Real
+    E: Real
+    C0: Real
+    L0: Real
+    C1: Real
+    L1: Real
+    G: Real
+    M0: Real
+    M1: Real
 
 
 def first_order(model: FlexibleModel) -> FirstOrder:
@@ -96,13 +94,13 @@ def _sums(model: FlexibleModel) -> FirstOrder:
     )
 
 
-def inertia_slope(model: FlexibleModel) -> Array:
+def inertia_slope(model: FlexibleModel) -> Real:
     """E_n = dJ/deta_n at rest shape (m,3,3): twice the symmetric part of sum m (rho.u_n 1 - rho u_n'), plus T_n."""
     rho, u, _ = _mass_centres(model)
     return 2.0 * _steiner(np.einsum("p,pa,pnb->nab", model.mass, rho, u, optimize=True)) + _turning(model).sum(axis=0)
 
 
-def _mass_centres(model: FlexibleModel) -> tuple[Array, Array, Array]:
+def _mass_centres(model: FlexibleModel) -> tuple[Real, Real, Real]:
     """rho (p,3), u (p,m,3) and a (p,m,m,3)."""
     c, psi = model.com_offset[:, None], np.swapaxes(model.rotation, 1, 2)
     swung = np.cross(psi, c)
@@ -111,13 +109,13 @@ def _mass_centres(model: FlexibleModel) -> tuple[Array, Array, Array]:
     return model.position + model.com_offset, u, 0.5 * (a + np.swapaxes(a, 1, 2))
 
 
-def _turning(model: FlexibleModel) -> Array:
+def _turning(model: FlexibleModel) -> Real:
     """T_k = psi_k~ J - J psi_k~ of every point, (p,m,3,3)."""
     turned = cross_matrix(np.swapaxes(model.rotation, 1, 2)) @ model.inertia[:, None]
     return turned + np.swapaxes(turned, -1, -2)
 
 
-def _inertia_curvature(model: FlexibleModel) -> Array:
+def _inertia_curvature(model: FlexibleModel) -> Real:
     """G_nk = 1/2 d2J/(deta_n deta_k): of the mass centres, and of exp(theta~) J exp(-theta~) to second order."""
     rho, u, a = _mass_centres(model)
     places = np.einsum("p,pna,pkb->nkab", model.mass, u, u, optimize=True)
@@ -129,10 +127,10 @@ def _inertia_curvature(model: FlexibleModel) -> Array:
     return _steiner(places) + turned
 
 
-def _steiner(A: Array) -> Array:
+def _steiner(A: Real) -> Real:
     """sum m (a.b 1 - b a') made symmetric, of A = sum m a b' (...,3,3)."""
     return np.trace(A, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - _symmetric(A)
 
 
-def _symmetric(A: Array) -> Array:
+def _symmetric(A: Real) -> Real:
     return 0.5 * (A + np.swapaxes(A, -1, -2))

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
@@ -19,8 +18,7 @@ from flexmb.modal.reduce import beam_modes, damping_matrix
 from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.stations import Lump, Stations, inertia_stations, lumps
 from flexmb.scene.bodies import IDENTITY, BeamBody, ModalBody, Quaternion
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> FlexibleModel:
@@ -71,7 +69,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
 
 
 def _points(
-    body: BeamBody, elements: BeamElements, columns: Array, stations: Stations, rigid_lumps: tuple[Lump, ...]
+    body: BeamBody, elements: BeamElements, columns: Real, stations: Stations, rigid_lumps: tuple[Lump, ...]
 ) -> Points:
     """Stations and lumps in the form that `body.points` asks for."""
     along, at_lump = (section_points, massy_lump) if body.points == "section" else (axis_points, turning_lump)
@@ -79,13 +77,13 @@ def _points(
 
 
 def _second_order(
-    body: BeamBody, elements: BeamElements, columns: Array, x: Array, offset: Array
+    body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real
 ) -> SecondOrder | None:
     """Of points at `offset` (n,3) from the axis points x (n,); as large as all pairs of modes, so only where needed."""
     return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None
 
 
-def _nodes(body: BeamBody, elements: BeamElements, columns: Array) -> dict[str, ModalNode]:
+def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, ModalNode]:
     """Nodes by name: origin, root, tip and the listed ones."""
     modes = columns.shape[1]
     nodes = {"origin": undeforming_node(modes)}

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -31,12 +30,12 @@ class TurningPoints:
     second-order field (k,3,m,m), where the body has one.
     """
 
-    mass: Array
-    position: Array
-    com_offset: Array
-    inertia: Array
-    translation: Array
-    rotation: Array
+    mass: Real
+    position: Real
+    com_offset: Real
+    inertia: Real
+    translation: Real
+    rotation: Real
     second: SecondOrder | None = None
 
 
@@ -60,18 +59,18 @@ class ModalIntegrals:
     """
 
     mass: float
-    s0: Array
-    s1: Array
-    J0: Array
-    J1: Array
-    J2: Array
-    C0: Array
-    C1: Array
-    M_ff: Array
+    s0: Real
+    s1: Real
+    J0: Real
+    J1: Real
+    J2: Real
+    C0: Real
+    C1: Real
+    M_ff: Real
     turning: TurningPoints
-    spatial_mass: Array
-    stiffness: Array
-    damping: Array
+    spatial_mass: Real
+    stiffness: Real
+    damping: Real
 
     @property
     def mode_count(self) -> int:
@@ -115,7 +114,7 @@ def _turning(model: FlexibleModel, offset: NDArray[np.bool_]) -> TurningPoints:
     )
 
 
-def _spatial_mass(model: FlexibleModel) -> Array:
+def _spatial_mass(model: FlexibleModel) -> Real:
     """sum m U'U + W' J W at eta = 0: U = [phi + psi x c, -(r + c)~, 1] and W = [psi, 1, 0] map [etadot; w; v] to the
     mass centre's velocity and the point's angular velocity."""
     count, _, modes = model.translation.shape
@@ -143,7 +142,7 @@ def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoint
 def stacked(first: TurningPoints, then: TurningPoints) -> TurningPoints:
     """Two sets of points as one; both have a second-order field, or none."""
 
-    def along(name: str) -> Array:
+    def along(name: str) -> Real:
         return np.concatenate([getattr(first, name), getattr(then, name)])
 
     names = ("mass", "position", "com_offset", "inertia", "translation", "rotation")

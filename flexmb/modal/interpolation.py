@@ -13,7 +13,7 @@ import numpy as np
 from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 INTERNAL_LINE = 3
 """Internal functions per element of a line field: degree 4."""
@@ -27,8 +27,8 @@ SHEAR_DEFLECTIONS = 4
 class LineValues:
     """Rows of a line field at n positions: value (n, d) and its derivative along x (n, d)."""
 
-    value: Array
-    slope: Array
+    value: Real
+    slope: Real
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class BendingValues:
     deflection v; rotation theta (equal to v' without shear); curvature theta'; shear strain gamma = v' - theta.
     """
 
-    deflection: Array
-    rotation: Array
-    curvature: Array
-    shear: Array
+    deflection: Real
+    rotation: Real
+    curvature: Real
+    shear: Real
 
 
-def integrated_legendre(xi: Array, count: int) -> tuple[Array, Array]:
+def integrated_legendre(xi: Real, count: int) -> tuple[Real, Real]:
     """g_k(xi) = integral_0^xi P_k(2 t - 1) dt for k = 1..count, zero at 0 and 1, and dg_k/dxi; each (n, count)."""
     s = 2.0 * xi - 1.0
     p = legendre.legvander(s, count + 1)
@@ -52,7 +52,7 @@ def integrated_legendre(xi: Array, count: int) -> tuple[Array, Array]:
     return (p[:, 2:] - p[:, :-2]) / (2.0 * (2 * k + 1)), p[:, 1:-1]
 
 
-def line_shapes(xi: Array, h: Array) -> LineValues:
+def line_shapes(xi: Real, h: Real) -> LineValues:
     """Local functions of a line element, columns [value at end 0, value at end 1, internal ...]."""
     g, dg = integrated_legendre(xi, INTERNAL_LINE)
     value = np.column_stack([1.0 - xi, xi, g])
@@ -60,7 +60,7 @@ def line_shapes(xi: Array, h: Array) -> LineValues:
     return LineValues(value, slope)
 
 
-def bending_shapes(xi: Array, h: Array, shear: bool) -> BendingValues:
+def bending_shapes(xi: Real, h: Real, shear: bool) -> BendingValues:
     """Local functions of a bending element, columns [v0, theta0, v1, theta1, internal ...].
 
     Without shear: the cubic Hermite functions and two internal deflections, all with theta = v': every v of degree 5.
@@ -111,13 +111,13 @@ def bending_shapes(xi: Array, h: Array, shear: bool) -> BendingValues:
 class Mesh:
     """Equal elements between x = 0 and the beam's length (m)."""
 
-    nodes: Array
+    nodes: Real
 
     @property
     def elements(self) -> int:
         return len(self.nodes) - 1
 
-    def locate(self, x: Array) -> tuple[NDArray[np.intp], Array, Array]:
+    def locate(self, x: Real) -> tuple[NDArray[np.intp], Real, Real]:
         """Element index, local coordinate in [0, 1] and element length at the positions x (n,)."""
         element = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.elements - 1)
         h = self.nodes[element + 1] - self.nodes[element]
@@ -139,7 +139,7 @@ class LineField:
         """Coordinates that a clamp at x = 0 fixes."""
         return (0,)
 
-    def at(self, x: Array) -> LineValues:
+    def at(self, x: Real) -> LineValues:
         """Rows over all coordinates, (n, size)."""
         element, xi, h = self.mesh.locate(x)
         local = line_shapes(xi, h)
@@ -147,7 +147,7 @@ class LineField:
         columns = np.stack([element, element + 1, *(internal + k for k in range(INTERNAL_LINE))], axis=1)
         return LineValues(_spread(local.value, columns, self.size), _spread(local.slope, columns, self.size))
 
-    def rigid(self) -> Array:
+    def rigid(self) -> Real:
         """Coordinates (size, 1) of the rigid motion of this field: value 1 everywhere."""
         motion = np.zeros((self.size, 1))
         motion[: self.mesh.elements + 1, 0] = 1.0
@@ -177,7 +177,7 @@ class BendingField:
         """Coordinates that a clamp at x = 0 fixes."""
         return (0, 1)
 
-    def at(self, x: Array) -> BendingValues:
+    def at(self, x: Real) -> BendingValues:
         """Rows over all coordinates, (n, size)."""
         element, xi, h = self.mesh.locate(x)
         local = bending_shapes(xi, h, self.shear)
@@ -191,7 +191,7 @@ class BendingField:
             _spread(local.shear, columns, self.size),
         )
 
-    def rigid(self) -> Array:
+    def rigid(self) -> Real:
         """Coordinates (size, 2) of the rigid motions: unit translation, unit rotation about x = 0."""
         motion = np.zeros((self.size, 2))
         nodal = 2 * (self.mesh.elements + 1)
@@ -201,7 +201,7 @@ class BendingField:
         return motion
 
 
-def _spread(local: Array, columns: NDArray[np.intp], size: int) -> Array:
+def _spread(local: Real, columns: NDArray[np.intp], size: int) -> Real:
     """Local values (n, k) into rows over all coordinates (n, size)."""
     rows = np.zeros((len(local), size))
     np.put_along_axis(rows, columns, local, axis=1)

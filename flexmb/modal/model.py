@@ -6,9 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -19,14 +18,14 @@ class SecondOrder:
     rotation vector psi eta. Leading axes: points, or none for a node.
     """
 
-    translation: Array
-    rotation: Array
+    translation: Real
+    rotation: Real
 
-    def turned(self, turn: Array) -> SecondOrder:
+    def turned(self, turn: Real) -> SecondOrder:
         """The same in axes R_new_old = `turn`."""
         return self.map(lambda G: np.einsum("ab,...bmn->...amn", turn, G))
 
-    def map(self, linear: Callable[[Array], Array]) -> SecondOrder:
+    def map(self, linear: Callable[[Real], Real]) -> SecondOrder:
         """The same operation on both fields."""
         return SecondOrder(linear(self.translation), linear(self.rotation))
 
@@ -38,13 +37,13 @@ class ModalNode:
     `second` (3,m,m): its second-order field, where the body has one.
     """
 
-    position: Array
-    rotation: Array
-    translation: Array
-    rotation_modes: Array
+    position: Real
+    rotation: Real
+    translation: Real
+    rotation_modes: Real
     second: SecondOrder | None = None
 
-    def seen_from(self, origin: Array, turn: Array) -> ModalNode:
+    def seen_from(self, origin: Real, turn: Real) -> ModalNode:
         """The same node in axes R_new_old = `turn` about `origin` (3,), old axes."""
         return ModalNode(
             turn @ (self.position - origin),
@@ -71,14 +70,14 @@ class FlexibleModel:
     second-order field of the points (n,3,m,m), of bodies of level `stiffened`.
     """
 
-    mass: Array
-    position: Array
-    com_offset: Array
-    inertia: Array
-    translation: Array
-    rotation: Array
-    stiffness: Array
-    damping: Array
+    mass: Real
+    position: Real
+    com_offset: Real
+    inertia: Real
+    translation: Real
+    rotation: Real
+    stiffness: Real
+    damping: Real
     nodes: dict[str, ModalNode]
     clamped: bool
     second: SecondOrder | None = None

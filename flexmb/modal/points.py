@@ -5,12 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.beam import BeamElements
 from flexmb.modal.stations import Lump, Stations
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -20,13 +18,13 @@ class Points:
     x (n,) m: the axis point with which each moves.
     """
 
-    x: Array
-    mass: Array
-    position: Array
-    com_offset: Array
-    inertia: Array
-    translation: Array
-    rotation: Array
+    x: Real
+    mass: Real
+    position: Real
+    com_offset: Real
+    inertia: Real
+    translation: Real
+    rotation: Real
 
 
 def join(groups: list[Points]) -> Points:
@@ -34,7 +32,7 @@ def join(groups: list[Points]) -> Points:
     return Points(*(np.concatenate([getattr(g, name) for g in groups]) for name in Points.__dataclass_fields__))
 
 
-def axis_points(elements: BeamElements, columns: Array, stations: Stations) -> Points:
+def axis_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
     """One point per station, its section inertia as a tensor that turns with it."""
     moved = elements.motion(stations.x, columns)
     inertia = np.zeros((len(stations.x), 3, 3))
@@ -45,7 +43,7 @@ def axis_points(elements: BeamElements, columns: Array, stations: Stations) -> P
     return Points(stations.x, stations.mass, on_axis(stations.x), offset, inertia, moved[:, :3], moved[:, 3:])
 
 
-def section_points(elements: BeamElements, columns: Array, stations: Stations) -> Points:
+def section_points(elements: BeamElements, columns: Real, stations: Stations) -> Points:
     """Four massy points per station at (+-a, +-b), a^2 = inertia_z / mass, b^2 = inertia_y / mass; none turns.
 
     Their second moments are those of the section, so the mass matrix is that of `axis_points`, while the kinetic energy
@@ -60,7 +58,7 @@ def section_points(elements: BeamElements, columns: Array, stations: Stations) -
     return join([_massy(elements, columns, stations.x, offset, stations.mass / 4.0) for offset in offsets])
 
 
-def turning_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
+def turning_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     """A lump as one point of the axis with mass-centre offset and turning inertia."""
     x = np.array([lump.x])
     moved = elements.motion(x, columns)
@@ -68,7 +66,7 @@ def turning_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
     return Points(x, mass, on_axis(x), lump.com[None], lump.inertia[None], moved[:, :3], moved[:, 3:])
 
 
-def massy_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
+def massy_lump(elements: BeamElements, columns: Real, lump: Lump) -> Points:
     """A lump as six equal masses on its principal axes, at +-sqrt(3 s_k / mass) from the mass centre.
 
     s_k are the eigenvalues of the second-moment tensor S = tr(J)/2 - J, so mass, mass centre and inertia are exact.
@@ -88,7 +86,7 @@ def massy_lump(elements: BeamElements, columns: Array, lump: Lump) -> Points:
     return _massy(elements, columns, np.full(6, lump.x), offset, np.full(6, lump.mass / 6.0))
 
 
-def _massy(elements: BeamElements, columns: Array, x: Array, offset: Array, mass: Array) -> Points:
+def _massy(elements: BeamElements, columns: Real, x: Real, offset: Real, mass: Real) -> Points:
     """Masses (n,) at `offset` (n,3) from the axis points x (n,), displaced by the axis point plus rotation x offset."""
     moved = elements.motion(x, columns)
     translation = moved[:, :3] + np.cross(moved[:, 3:], offset[:, :, None], axis=1)
@@ -96,6 +94,6 @@ def _massy(elements: BeamElements, columns: Array, x: Array, offset: Array, mass
     return Points(x, mass, on_axis(x) + offset, nothing, np.zeros((len(x), 3, 3)), translation, moved[:, 3:])
 
 
-def on_axis(x: Array) -> Array:
+def on_axis(x: Real) -> Real:
     """Positions (n,3) of axis points."""
     return np.column_stack([x, np.zeros_like(x), np.zeros_like(x)])

@@ -6,15 +6,13 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.model import FlexibleModel, ModalNode, undeforming_node
 from flexmb.modal.raw_second_order import node_second_order, second_order
 from flexmb.scene.bodies import ModalBody, Vector
 from flexmb.scene.modal_data import modal_arrays
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
@@ -67,6 +65,6 @@ def _nodes(body: ModalBody, modes: int) -> dict[str, ModalNode]:
     return nodes
 
 
-def _columns(vectors: tuple[Vector, ...]) -> Array:
+def _columns(vectors: tuple[Vector, ...]) -> Real:
     """Mode vectors (m of 3) as columns (3, m)."""
     return np.array(vectors, dtype=float).reshape(-1, 3).T

@@ -9,13 +9,11 @@ coordinates. Every field with these integrals is as good as the true one; the on
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.model import SecondOrder
 from flexmb.scene.bodies import ModalNode
 from flexmb.scene.modal_data import ModalArrays, node_arrays
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 EXTENT = 1e-9  # share of the mass' extent below which points lie in a plane or on a line
 
@@ -44,7 +42,7 @@ def node_second_order(node: ModalNode) -> SecondOrder | None:
     return SecondOrder(translation, given.get("second_rotation", np.zeros((3, m, m)))).map(_symmetric)
 
 
-def _affine(arrays: ModalArrays, Z: Array, X: Array) -> Array:
+def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
     """G (n,3,m,m), affine in the mass centres at rest p, with sum m G_a = Z_a and sum m p_b G_a = X_ab."""
     p = arrays.position + arrays.com_offset
     size = np.max(np.abs(p), initial=0.0) or 1.0
@@ -63,6 +61,6 @@ def _affine(arrays: ModalArrays, Z: Array, X: Array) -> Array:
     return np.einsum("pb,abnk->pank", rows, parameters)
 
 
-def _symmetric(G: Array) -> Array:
+def _symmetric(G: Real) -> Real:
     """The part that acts."""
     return 0.5 * (G + np.swapaxes(G, -1, -2))

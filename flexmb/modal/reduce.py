@@ -11,8 +11,7 @@ from scipy.sparse.csgraph import connected_components
 
 from flexmb.modal.beam import BeamElements
 from flexmb.scene.bodies import Modes
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # A direction whose share of the mass is below this many round-offs of the largest has no inertia: its frequency is
 # infinite, so it is never among the lowest.
@@ -24,8 +23,8 @@ _ROUND_OFF = 64 * np.finfo(float).eps
 class BeamModes:
     """Coordinate columns (size, m) with unit modal mass and angular frequencies (m,) rad/s, ascending."""
 
-    columns: Array
-    frequencies: Array
+    columns: Real
+    frequencies: Real
 
 
 @dataclass(frozen=True)
@@ -37,13 +36,13 @@ class _Part:
     """
 
     index: NDArray[np.intp]
-    rigid: Array
-    A: Array
-    M: Array
-    M_elastic: Array
+    rigid: Real
+    A: Real
+    M: Real
+    M_elastic: Real
 
 
-def beam_modes(elements: BeamElements, K: Array, M: Array, modes: Modes) -> BeamModes:
+def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamModes:
     """The `modes.count` lowest eigenmodes of the chosen families, with attachment modes if `modes.static`.
 
     Families that nothing couples are solved apart, so degenerate bending pairs come out as pure planes; modes are
@@ -52,7 +51,7 @@ def beam_modes(elements: BeamElements, K: Array, M: Array, modes: Modes) -> Beam
     orthogonal to the rigid motions of the chosen families, so their frame is a mean-axis (Buckens) frame of those.
     Raises ValueError if the finite-element model has fewer modes than asked for.
     """
-    found: list[tuple[float, int, Array]] = []
+    found: list[tuple[float, int, Real]] = []
     parts = _parts(elements, K, M, modes.boundary == "clamped-free")
     for rank, part in enumerate(parts):
         found += [(omega, rank, column) for omega, column in _eigenmodes(part, modes.count)]
@@ -76,19 +75,19 @@ def beam_modes(elements: BeamElements, K: Array, M: Array, modes: Modes) -> Beam
     return BeamModes(columns * _tip_signs(elements, columns), np.array([omega for omega, _, _ in chosen]))
 
 
-def damping_matrix(frequencies: Array, ratio: float | tuple[float, ...]) -> Array:
+def damping_matrix(frequencies: Real, ratio: float | tuple[float, ...]) -> Real:
     """Modal damping diag(2 zeta_n omega_n) (m,m) in N s/m for unit modal mass; one ratio for all modes or one each."""
     if isinstance(ratio, tuple) and len(ratio) != len(frequencies):
         raise ValueError(f"damping_ratio has {len(ratio)} entries for {len(frequencies)} modes")
     return np.diag(2.0 * np.broadcast_to(np.asarray(ratio, dtype=float), frequencies.shape) * frequencies)
 
 
-def _order(mode: tuple[float, int, Array]) -> tuple[float, int]:
+def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:
     """Frequencies equal to nine digits count as equal: a degenerate pair keeps the order of its families."""
     return float(f"{mode[0]:.8e}"), mode[1]
 
 
-def _parts(elements: BeamElements, K: Array, M: Array, clamped: bool) -> list[_Part]:
+def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Part]:
     """Groups of families that M couples (K couples none), in order; those without inertia are left out."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
@@ -111,12 +110,12 @@ def _parts(elements: BeamElements, K: Array, M: Array, clamped: bool) -> list[_P
     return parts
 
 
-def _coupled(M_ab: Array, M_aa: Array, M_bb: Array) -> bool:
+def _coupled(M_ab: Real, M_aa: Real, M_bb: Real) -> bool:
     """Whether two blocks of the mass matrix are coupled by more than the round-off of a lump's position."""
     return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
 
 
-def _part(index: NDArray[np.intp], K: Array, M: Array, rigid: Array) -> _Part:
+def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Part:
     """Deflate the rigid motions (n, r): with M-orthonormal R, A = K + s M R R' M and M_elastic = M - M R R' M."""
     if rigid.shape[1] == 0:
         return _Part(index, rigid, K, M, M)
@@ -126,7 +125,7 @@ def _part(index: NDArray[np.intp], K: Array, M: Array, rigid: Array) -> _Part:
     return _Part(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
 
 
-def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Array]]:
+def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Real]]:
     """Lowest eigenpairs from M phi = omega^-2 K phi: accurate for low modes, and massless coordinates do no harm."""
     size = len(part.index)
     wanted = min(count, size)
@@ -137,8 +136,8 @@ def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Array]]:
 
 
 def _with_attachment(
-    elements: BeamElements, part: _Part, eigenmodes: list[tuple[float, Array]]
-) -> list[tuple[float, Array]]:
+    elements: BeamElements, part: _Part, eigenmodes: list[tuple[float, Real]]
+) -> list[tuple[float, Real]]:
     """Eigenmodes and the deflections under unit tip forces and moments, orthonormalised by the reduced eigenproblem.
 
     Free-free: the load is balanced by the inertia of the rigid motion it causes (inertia relief).
@@ -156,7 +155,7 @@ def _with_attachment(
     return eigenmodes + _mass_normalised(compliance[::-1], static @ mix[:, ::-1], part.M)
 
 
-def _mass_normalised(compliance: Array, columns: Array, M: Array) -> list[tuple[float, Array]]:
+def _mass_normalised(compliance: Real, columns: Real, M: Real) -> list[tuple[float, Real]]:
     """(omega, column with unit modal mass) for each compliance 1/omega^2 that is not round-off."""
     kept = compliance > _ROUND_OFF * max(compliance.max(), 0.0)
     columns = columns[:, kept]
@@ -166,7 +165,7 @@ def _mass_normalised(compliance: Array, columns: Array, M: Array) -> list[tuple[
     return [(float(1.0 / np.sqrt(c)), column) for c, column in zip(compliance[kept], columns.T, strict=True)]
 
 
-def _tip_signs(elements: BeamElements, columns: Array) -> Array:
+def _tip_signs(elements: BeamElements, columns: Real) -> Real:
     """Signs (m,) that make the tip's largest displacement positive, or its largest rotation where it only turns."""
     length = elements.mesh.nodes[-1]
     tip = elements.motion(np.array([length]), columns)[0]

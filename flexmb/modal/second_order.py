@@ -16,19 +16,17 @@ too: without that a beam would not buckle laterally. The integrals start at the 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.beam import BeamElements
 from flexmb.modal.model import SecondOrder
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 GAUSS_POINTS = 6
 """Exact to degree 11. Between nodes theta and Gamma are polynomials of degree 4, x theta x theta' of degree 8."""
 _X = np.array([1.0, 0.0, 0.0])
 
 
-def beam_second_order(elements: BeamElements, columns: Array, x: Array, offset: Array) -> SecondOrder:
+def beam_second_order(elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder:
     """Field (n,3,m,m) of points at `offset` (n,3) m from the axis points x (n,), in the sections of these.
 
     `columns` (size,m) are the modes. A point off the axis turns with its section: to second order
@@ -42,7 +40,7 @@ def beam_second_order(elements: BeamElements, columns: Array, x: Array, offset: 
     return SecondOrder(axis.translation + np.moveaxis(swung, -1, 1), axis.rotation)
 
 
-def _axis(elements: BeamElements, columns: Array, x: Array) -> SecondOrder:
+def _axis(elements: BeamElements, columns: Real, x: Real) -> SecondOrder:
     """Field of the axis at ascending x (n,), the first of them 0: integrals added up piece by piece.
 
     int_0^x theta_2 is x int theta_2' - int x theta_2'.
@@ -58,14 +56,14 @@ def _axis(elements: BeamElements, columns: Array, x: Array) -> SecondOrder:
     return SecondOrder(np.moveaxis(translation, -1, 1), np.moveaxis(rotation, -1, 1))
 
 
-def _integrals(elements: BeamElements, columns: Array, x: Array, weight: Array) -> Array:
+def _integrals(elements: BeamElements, columns: Real, x: Real, weight: Real) -> Real:
     """Over the points x of one piece (3,m,m,3): of theta_2', x theta_2', u_2' - theta_2 x e_x."""
     turning, slope = _rates(elements, columns, x)
     sums = (weight, turning), (weight * x, turning), (weight, slope)
     return np.array([np.tensordot(w, rate, axes=1) for w, rate in sums])
 
 
-def _rates(elements: BeamElements, columns: Array, x: Array) -> tuple[Array, Array]:
+def _rates(elements: BeamElements, columns: Real, x: Real) -> tuple[Real, Real]:
     """By pairs of modes (n,m,m,3): theta_2', and u_2' without theta_2 x e_x."""
     theta = np.swapaxes(elements.motion(x, columns)[:, 3:], 1, 2)
     strain, curvature = (np.swapaxes(each, 1, 2) for each in elements.strain(x, columns))
@@ -74,6 +72,6 @@ def _rates(elements: BeamElements, columns: Array, x: Array) -> tuple[Array, Arr
     return turning, tilting + 2.0 * _symmetric(np.cross(theta[:, :, None], strain[:, None]))
 
 
-def _symmetric(product: Array) -> Array:
+def _symmetric(product: Real) -> Real:
     """Half the sum with the modes exchanged, (n,m,m,3)."""
     return 0.5 * (product + np.swapaxes(product, 1, 2))

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.scene.bodies import BeamBody
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -20,18 +18,18 @@ class SectionTable:
     Two stations at the same x make a jump.
     """
 
-    x: Array
-    EA: Array
-    EIy: Array
-    EIz: Array
-    GJ: Array
-    GAy: Array | None
-    GAz: Array | None
-    mass: Array
-    rotary_y: Array
-    rotary_z: Array
+    x: Real
+    EA: Real
+    EIy: Real
+    EIz: Real
+    GJ: Real
+    GAy: Real | None
+    GAz: Real | None
+    mass: Real
+    rotary_y: Real
+    rotary_z: Real
 
-    def at(self, values: Array, x: Array) -> Array:
+    def at(self, values: Real, x: Real) -> Real:
         """One property (a field of this table) at the positions x (n,)."""
         return np.interp(x, self.x, values)
 
@@ -42,10 +40,10 @@ def section_table(body: BeamBody) -> SectionTable:
     if not stations:
         raise ValueError(f"beam '{body.name}': no station; give at least one with the section's stiffness and mass")
 
-    def column(key: str) -> Array:
+    def column(key: str) -> Real:
         return np.array([getattr(station, key) for station in stations], dtype=float)
 
-    shear: list[Array | None] = [None, None]
+    shear: list[Real | None] = [None, None]
     if body.theory == "timoshenko":
         missing = [s.x_m for s in stations if s.GAy_N is None or s.GAz_N is None]
         if missing:

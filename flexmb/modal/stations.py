@@ -9,13 +9,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.modal.interpolation import Mesh
 from flexmb.modal.section import SectionTable
 from flexmb.scene.bodies import BeamBody
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 GAUSS_POINTS = 6
 """Exact to degree 11: quintic deflections squared times a linearly varying section."""
@@ -28,10 +26,10 @@ class Stations:
     The inertia about x is the sum of the two.
     """
 
-    x: Array
-    mass: Array
-    inertia_y: Array
-    inertia_z: Array
+    x: Real
+    mass: Real
+    inertia_y: Real
+    inertia_z: Real
 
 
 @dataclass(frozen=True)
@@ -40,11 +38,11 @@ class Lump:
 
     x: float
     mass: float
-    com: Array
-    inertia: Array
+    com: Real
+    inertia: Real
 
 
-def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Array, Array]:
+def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Real, Real]:
     """Gauss points and weights (n,) on every piece between nodes and section stations, so that kinks cost nothing."""
     inside = table.x[(table.x > mesh.nodes[0]) & (table.x < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))

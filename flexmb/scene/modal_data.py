@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import InertiaPoint, ModalBody, ModalNode
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.npz import read_arrays
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class ModalArrays(NamedTuple):
@@ -22,21 +21,21 @@ class ModalArrays(NamedTuple):
     stiffness under unit loads, gravity_stiffness (3,m,m) and gradient_stiffness (3,3,m,m).
     """
 
-    mass: Array
-    position: Array
-    translation_modes: Array
-    rotation_modes: Array
-    inertia: Array
-    com_offset: Array
-    stiffness: Array
-    damping: Array
-    second_translation: Array | None = None
-    second_rotation: Array | None = None
-    gravity_stiffness: Array | None = None
-    gradient_stiffness: Array | None = None
+    mass: Real
+    position: Real
+    translation_modes: Real
+    rotation_modes: Real
+    inertia: Real
+    com_offset: Real
+    stiffness: Real
+    damping: Real
+    second_translation: Real | None = None
+    second_rotation: Real | None = None
+    gravity_stiffness: Real | None = None
+    gradient_stiffness: Real | None = None
 
     @property
-    def given(self) -> dict[str, Array]:
+    def given(self) -> dict[str, Real]:
         """By name, those that are there."""
         return {name: array for name, array in self._asdict().items() if array is not None}
 
@@ -59,7 +58,7 @@ def modal_arrays(body: ModalBody) -> ModalArrays:
     return _shaped(given)
 
 
-def node_arrays(node: ModalNode) -> dict[str, Array]:
+def node_arrays(node: ModalNode) -> dict[str, Real]:
     """The second-order data that a node has: second_translation, second_rotation (3,m,m), force_stiffness (3,m,m).
 
     ValueError names one with a wrong shape.
@@ -113,7 +112,7 @@ def inertia_points(
     return tuple(points)
 
 
-def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Array]:
+def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Real]:
     if not points:
         return {}
     given = {
@@ -133,7 +132,7 @@ def _from_points(points: tuple[InertiaPoint, ...]) -> dict[str, Array]:
     return given
 
 
-def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> Array:
+def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> Real:
     """Mode shapes listed per point and mode (n,m,3) as (n,3,m)."""
     counts = sorted({len(modes) for modes in listed})
     if len(counts) > 1:
@@ -141,7 +140,7 @@ def _modes(name: str, listed: list[tuple[tuple[float, float, float], ...]]) -> A
     return np.asarray(listed, dtype=np.float64).reshape(len(listed), counts[0], 3).transpose(0, 2, 1)
 
 
-def _array(name: str, value: ArrayLike) -> Array:
+def _array(name: str, value: ArrayLike) -> Real:
     try:
         array = np.asarray(value)
         if not np.iscomplexobj(array):
@@ -151,7 +150,7 @@ def _array(name: str, value: ArrayLike) -> Array:
     raise ValueError(f'"{name}" is complex: give real numbers')
 
 
-def _shaped(given: dict[str, Array]) -> ModalArrays:
+def _shaped(given: dict[str, Real]) -> ModalArrays:
     missing = [name for name in REQUIRED if name not in given]
     if missing:
         raise ValueError(f'"{missing[0]}" is missing')

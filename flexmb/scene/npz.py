@@ -9,11 +9,10 @@ from collections.abc import Collection
 from typing import IO
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.scene.reading import MIB, Unreadable, allowance, regular_size
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 REAL = "fiu"
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 ENCRYPTED = 0x1
@@ -22,7 +21,7 @@ DAMAGED = (zipfile.BadZipFile, zlib.error, EOFError, NotImplementedError, Overfl
 PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
-def read_arrays(file: str, known: Collection[str]) -> dict[str, Array]:
+def read_arrays(file: str, known: Collection[str]) -> dict[str, Real]:
     """Arrays by name as float64. OSError, or ValueError naming the file, the array, and the remedy.
 
     Names not `known`, doubled names, objects, text, complex numbers, and sizes that no such file can hold are refused
@@ -33,7 +32,7 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Array]:
         with open(file, "rb") as stream:
             if stream.read(len(ONE_ARRAY)) == ONE_ARRAY:
                 raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
-        found: dict[str, Array] = {}
+        found: dict[str, Real] = {}
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():
                 name = _name(member, known, found)
@@ -59,7 +58,7 @@ def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str
     return name
 
 
-def _read(stream: IO[bytes], name: str, limit: int) -> Array:
+def _read(stream: IO[bytes], name: str, limit: int) -> Real:
     """One array; Unreadable where its header asks for more than `limit` bytes or is not that of real numbers."""
     version = np.lib.format.read_magic(stream)
     if version not in HEADERS:

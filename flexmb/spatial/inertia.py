@@ -3,11 +3,10 @@
 Stored as 21 numbers: A (6, symmetric), B (9), C (6, symmetric). With V = [w; v] at a point, 2T = V' P V.
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import (
     add,
     add9,
-    cross,
     mat3,
     rotate_mat,
     rotate_sym,
@@ -150,8 +149,9 @@ def shift_inertia(p, d):
 
 
 @helper
-def inertia_times(p, w, v):
+def inertia_times(p, V):
     """P [w; v] as a pair (torque, force)."""
+    w, v = V
     return add(sym_times(p[0], w), times(p[1], v)), add(times_t(p[1], w), sym_times(p[2], v))
 
 
@@ -189,12 +189,6 @@ def add_product(a, i, s, x, y):
     a[i + 18] += s * x[3] * y[4]
     a[i + 19] += s * x[3] * y[5]
     a[i + 20] += s * x[4] * y[5]
-
-
-@helper
-def shift_force(tau, f, d):
-    """phi F: torque about Q of a force known about O, with d from Q to O."""
-    return add(tau, cross(d, f)), f
 
 
 @helper

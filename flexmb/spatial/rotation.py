@@ -1,6 +1,6 @@
 """Rotations: quaternions, rotation vectors, their rates. R_AB maps components in B to components in A."""
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import atan2, cos, sin, sqrt
 from flexmb.spatial.vector import add, cross, dot, scale
 

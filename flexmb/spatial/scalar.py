@@ -7,7 +7,7 @@ step: Squire & Trapp 1998). Comparisons in kernels look at real parts.
 
 import math
 
-from flexmb.kernel import by_number, helper
+from flexmb.jit.kernel import by_number, helper
 
 
 @helper

@@ -4,7 +4,7 @@ Tuples, not arrays: the compiler keeps every component in a register and removes
 equations and cost nothing. A matrix is a 9-tuple, row by row; a symmetric one a 6-tuple (xx, yy, zz, xy, xz, yz).
 """
 
-from flexmb.kernel import helper
+from flexmb.jit.kernel import helper
 
 
 @helper

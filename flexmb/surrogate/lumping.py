@@ -9,13 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Node, RigidBody, TipMass, Vector
 from flexmb.scene.tree import rest_frames
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _GAUSS_POINTS = 3
 """Exact to degree 5: the second moment of a linearly varying section has degree 3."""
@@ -26,8 +24,8 @@ class Inertia:
     """Mass kg, mass centre (3,) m and inertia (3,3) kg m^2 about it, in one frame."""
 
     mass: float
-    com: Array
-    inertia: Array
+    com: Real
+    inertia: Real
 
 
 def combine(parts: Sequence[Inertia]) -> Inertia:
@@ -38,19 +36,19 @@ def combine(parts: Sequence[Inertia]) -> Inertia:
     return Inertia(mass, com, inertia)
 
 
-def steiner(mass: float, offset: Array) -> Array:
+def steiner(mass: float, offset: Real) -> Real:
     """Inertia (3,3) of a point mass at `offset` (3,) about the origin."""
     return mass * (offset @ offset * np.eye(3) - np.outer(offset, offset))
 
 
-def section_properties(body: BeamBody, x: Array, *keys: str) -> tuple[Array, ...]:
+def section_properties(body: BeamBody, x: Real, *keys: str) -> tuple[Real, ...]:
     """Station properties (keys of `BeamStation`) at x (n,): piecewise linear, constant beyond the outer stations."""
     stations = sorted(body.stations, key=lambda station: station.x_m)
     at = [station.x_m for station in stations]
     return tuple(np.interp(x, at, [getattr(station, key) for station in stations]) for key in keys)
 
 
-def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Array, Array]:
+def quadrature(body: BeamBody, cuts: Sequence[float]) -> tuple[Real, Real]:
     """Gauss points and weights (n,) between the cuts (ascending), also broken at the stations, where sections kink."""
     inside = [station.x_m for station in body.stations if cuts[0] < station.x_m < cuts[-1]]
     ends = np.unique([*cuts, *inside])
@@ -128,7 +126,7 @@ def inertia_of(body: RigidBody) -> Inertia:
     return Inertia(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2))
 
 
-def vector(values: Array) -> Vector:
+def vector(values: Real) -> Vector:
     """Three numbers of an array as a scene has them."""
     x, y, z = (float(value) for value in values)
     return x, y, z

@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 from msgspec.structs import replace
-from numpy.typing import NDArray
 
 from flexmb.modal import flexible_model
 from flexmb.modal.model import SecondOrder
@@ -15,8 +14,7 @@ from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import BeamBody, ModalBody, ModalNode, Scene
 from flexmb.scene.tree import rest_frames
 from flexmb.surrogate.lumping import vector
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 def modal_points(scene: Scene) -> Scene:
@@ -62,5 +60,5 @@ def _field(second: SecondOrder | None) -> dict[str, VectorSquare]:
     }
 
 
-def _floats(values: Array) -> tuple[float, ...]:
+def _floats(values: Real) -> tuple[float, ...]:
     return tuple(float(value) for value in values)

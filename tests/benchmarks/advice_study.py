@@ -22,7 +22,7 @@ from time import perf_counter
 
 import numpy as np
 
-from crosscheck.library import shipped_cases
+from crosscheck.library.find import shipped_cases
 from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
@@ -32,8 +32,8 @@ from flexmb.advisor.quantity import error, measured, scales
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
-from flexmb.status import Status
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.tables.status import Status
 
 TOLERANCES = (1e-2, 1e-3)
 PAGE = Path(__file__).parents[2] / "docs" / "advice.md"

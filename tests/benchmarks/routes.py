@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 import flexmb as fm
-from flexmb import composite, dynamics
-from flexmb.counting import Operations, count
+from flexmb.entry import articulated as entry
+from flexmb.entry import composite
 from flexmb.jain.places import matrices
-from flexmb.kernel import kernel
+from flexmb.jit.counting import Operations, count
+from flexmb.jit.kernel import kernel
 
 IN_A_RUN = 100
 
@@ -44,7 +45,7 @@ def articulated(system: fm.System) -> Evaluation:
     """By articulated bodies, their modes eliminated as the system says."""
     written = system.recursion_workspace()
     arguments = 0.0, _start(system), system.recursion_constants, written
-    return Evaluation(dynamics.accelerations, _articulated, arguments)
+    return Evaluation(entry.accelerations, _articulated, arguments)
 
 
 def composite_body(system: fm.System) -> Evaluation:
@@ -63,7 +64,7 @@ def _start(system: fm.System) -> np.ndarray:
 def _articulated(times, t, y, c, w):
     status = 0
     for _ in range(times):
-        status = max(status, dynamics.accelerations(t, y, c, w))
+        status = max(status, entry.accelerations(t, y, c, w))
     return status
 
 

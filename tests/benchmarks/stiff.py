@@ -7,7 +7,7 @@ from time import perf_counter
 import numpy as np
 
 import flexmb as fm
-from crosscheck.library import shipped_folder
+from crosscheck.library.find import shipped_folder
 from flexmb.scene.files import load_scene
 
 CASES = ("beam_with_axial_modes", "stiff_hinge_springs")

@@ -12,9 +12,9 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 
-from crosscheck.records import read
-from crosscheck.results import CaseResults, collect
-from crosscheck.workprecision import WorkPrecision, work_precision
+from crosscheck.judging.results import CaseResults, collect
+from crosscheck.records.records import read
+from crosscheck.report.workprecision import WorkPrecision, work_precision
 from tests.repo.project import ROOT
 
 PICTURES = {"stiff/beam_with_axial_modes": "stiff_beam.png", "stiff/stiff_hinge_springs": "stiff_springs.png"}

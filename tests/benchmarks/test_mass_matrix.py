@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb import composite, consistent, dynamics, factorisation
+from flexmb.entry import articulated as entry
+from flexmb.entry import composite, consistent, factorisation
 from flexmb.jain.places import matrices
 from flexmb.jain.response import response
 from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
@@ -72,7 +73,7 @@ def _call(kernel, bodies, modes):
     held = consistent.held_hinges(c, system.workspace())
     return {
         "accelerations": articulated(system),
-        "inverse": lambda: dynamics.inverse_dynamics(0.0, y, rates, c, w, tau, loads),
+        "inverse": lambda: entry.inverse_dynamics(0.0, y, rates, c, w, tau, loads),
         "consistent": lambda: consistent.consistent_accelerations(0.0, y, rates, c, *held),
         "factorise": lambda: factorisation.factorise(0.0, y, c, c, w),
         "solve": lambda: factorisation.solve(c, w, x, b),
@@ -91,7 +92,7 @@ def test_mass_matrix(benchmark, bodies):
     def native():
         composite.mass_matrix(0.0, y, c, w, m, M)
 
-    times = interleaved(native, lambda: dynamics.inverse_dynamics(0.0, y, tau, c, w, tau, loads))
+    times = interleaved(native, lambda: entry.inverse_dynamics(0.0, y, tau, c, w, tau, loads))
     benchmark.extra_info["speeds"] = system.nu
     benchmark.extra_info["inverse_dynamics"] = round(times[0] / times[1], 1)
     benchmark.pedantic(native, rounds=20)

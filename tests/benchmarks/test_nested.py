@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb import dynamics
+from flexmb.entry import articulated
 from flexmb.frisch import evaluation
 from flexmb.frisch.system import NestedSystem, nested_system
 from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
@@ -16,7 +16,7 @@ from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_c
 def recursion(system: fm.System):
     """The articulated-body accelerations as a call without arguments."""
     y, workspace = _start(system), system.workspace()
-    return lambda: dynamics.accelerations(0.0, y, system.constants, workspace)
+    return lambda: articulated.accelerations(0.0, y, system.constants, workspace)
 
 
 def nested(system: fm.System, route: NestedSystem | None = None):

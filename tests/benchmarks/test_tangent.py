@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import dynamics
-from flexmb.tangent import jacobian, tangent_workspace
+from flexmb.entry import articulated
+from flexmb.entry.tangent import jacobian, tangent_workspace
 from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
 
 SCENES = {"rigid": lambda: rigid_chain(20), "flexible": lambda: flexible_chain(10, 5, "full")}
@@ -29,9 +29,9 @@ def test_jacobian(benchmark, kind):
         for j in complex_w.column:
             moved = y[j]
             y[j] = moved + 1e-6
-            dynamics.rhs(0.0, y, plus, c, w)
+            articulated.rhs(0.0, y, plus, c, w)
             y[j] = moved - 1e-6
-            dynamics.rhs(0.0, y, minus, c, w)
+            articulated.rhs(0.0, y, minus, c, w)
             y[j] = moved
 
     native, rival = interleaved(exact, differences)

@@ -10,12 +10,12 @@ from msgspec.structs import replace
 from scipy.optimize import brentq
 
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
+from crosscheck.library.find import load_case
 from crosscheck.report import write_all
-from crosscheck.sweep import sweep
+from crosscheck.running.sweep import sweep
+from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
-from flexmb.simulation import simulate
 
 CASES = Path(__file__).parents[2] / "cases"
 BOOM = CASES / "deploying_boom"

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from msgspec.structs import replace
 
+from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
-from flexmb.simulation import simulate
 from flexmb.surrogate import substructured
 
 CASE = Path(__file__).parents[2] / "cases" / "large_deflection" / "driven_crank"

@@ -17,16 +17,16 @@ from msgspec.structs import replace
 
 from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
-from crosscheck.plan import variant_scene
+from crosscheck.library.find import load_case
+from crosscheck.running.plan import variant_scene
+from flexmb.integrate.settings import Method
 from flexmb.linear.equilibrium import equilibrium
-from flexmb.methods import Method
+from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamBody, Level, Scene
-from flexmb.simulation import simulate
 from flexmb.surrogate import substructured
-from flexmb.system import System, compile
+from flexmb.system.system import System, compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "large_deflection"
 

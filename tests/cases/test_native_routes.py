@@ -11,11 +11,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from crosscheck.controls import mutate
 from crosscheck.engines.contract import Effort, Run, Trajectory
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
-from crosscheck.plan import variant_scene
+from crosscheck.library.controls import mutate
+from crosscheck.library.find import load_case
+from crosscheck.running.plan import variant_scene
 from flexmb.scene.schema import Scene
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -14,12 +14,12 @@ from scipy.linalg import eigh
 
 from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
+from crosscheck.library.find import load_case
+from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
-from flexmb.simulation import simulate
 from flexmb.surrogate import finite_segments, substructured
-from flexmb.system import compile
+from flexmb.system.system import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "spinning_beam"
 SPIN_UP_S = 15.0

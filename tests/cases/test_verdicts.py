@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from crosscheck.library import Case, shipped_cases
+from crosscheck.library.find import Case, shipped_cases
 from crosscheck.report import write_all
-from crosscheck.sweep import sweep
+from crosscheck.running.sweep import sweep
 
 
 @pytest.mark.slow

@@ -9,15 +9,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
+from crosscheck.library.find import load_case
 from crosscheck.report import write_all
-from crosscheck.sweep import sweep
+from crosscheck.running.sweep import sweep
+from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
-from flexmb.simulation import simulate
-from flexmb.system import compile
+from flexmb.system.system import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "wheel_gyrostat"
 CONSERVATIVE_RTOL = 1e-11  # at which drifts are promised

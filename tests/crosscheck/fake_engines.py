@@ -10,13 +10,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from crosscheck.engines.contract import Effort, EngineMissing, MarkerPath, Run, Snapshot, Support, Trajectory
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 TOLERANCES = tuple(Effort(kind="tolerance", value=10.0**-n, method="dop853") for n in (6, 8, 10, 12))
 STEPS = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(2, 6))
 COARSE = tuple(Effort(kind="step", value=0.05 / 2**n, method="rk4") for n in range(3))
@@ -41,7 +40,7 @@ class Pendulum:
     def warm_up(self) -> None:
         pass
 
-    def rate(self, t: float, y: Array) -> Array:
+    def rate(self, t: float, y: Real) -> Real:
         return np.array([y[1], self.mass * self.gravity * self.arm * np.cos(y[0]) / self.inertia])
 
     def evaluate(self) -> Snapshot:
@@ -62,7 +61,7 @@ class Pendulum:
         states, count = rk4(self.rate, self.start, run.times, effort.value)
         return self.trajectory(run.times, states, 2e-3 / effort.value, count)
 
-    def trajectory(self, times: Array, states: Array, wall: float, evaluations: int) -> Trajectory:
+    def trajectory(self, times: Real, states: Real, wall: float, evaluations: int) -> Trajectory:
         angle, speed = states.T
         zero = np.zeros_like(angle)
         out = np.column_stack([np.cos(angle), np.sin(angle), zero])
@@ -91,7 +90,7 @@ class Pendulum:
         )
 
 
-def rk4(rate: Callable[[float, Array], Array], start: Array, times: Array, step: float) -> tuple[Array, int]:
+def rk4(rate: Callable[[float, Real], Real], start: Real, times: Real, step: float) -> tuple[Real, int]:
     """Classical Runge-Kutta with the step cut to reach every sample time; states (T, n) and evaluations."""
     states, count = [start], 0
     for begin, end in zip(times, times[1:], strict=False):

@@ -7,17 +7,16 @@ from collections.abc import Iterable
 
 import msgspec
 import numpy as np
-from numpy.typing import NDArray
 
-from crosscheck.accepted import Accepted
-from crosscheck.case import RunFile
-from crosscheck.records import CaseRecord, RunRecord, VariantInfo, pack
+from crosscheck.judging.accepted import Accepted
+from crosscheck.judging.results import collect
+from crosscheck.judging.verdict import Verdict
+from crosscheck.library.case import RunFile
+from crosscheck.library.selection import select
+from crosscheck.records.records import CaseRecord, RunRecord, VariantInfo, pack
 from crosscheck.report.outcome import Outcome, conclude
-from crosscheck.results import collect
-from crosscheck.selection import select
-from crosscheck.verdict import Verdict
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 TIMES = np.linspace(0.0, 1.0, 11)
 TIP = "marker:tip.position"
 HEAD = 'title = "made"\nduration_s = 1.0\nsamples = 11\n'
@@ -37,7 +36,7 @@ def run_file(text: str) -> RunFile:
     return msgspec.convert(tomllib.loads(HEAD + text), RunFile)
 
 
-def way(height: float = 1.0, axis: int = 0) -> Array:
+def way(height: float = 1.0, axis: int = 0) -> Real:
     """A signal (T, 3): up and down again along one axis, so that the last sample is where the first was."""
     values = np.zeros((len(TIMES), 3))
     values[:, axis] = height * np.sin(np.pi * TIMES)
@@ -46,7 +45,7 @@ def way(height: float = 1.0, axis: int = 0) -> Array:
 
 
 def ladder(
-    engine: str, signals: dict[str, Array], *, spread: float = 1e-6, variant: str = "rigid", role: str = "main"
+    engine: str, signals: dict[str, Real], *, spread: float = 1e-6, variant: str = "rigid", role: str = "main"
 ) -> list[RunRecord]:
     """Three tolerances of an engine that converge to the signals: off by 100, 10 and 1 times `spread` of them."""
     return [

@@ -5,13 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from crosscheck.library import load_case
-from crosscheck.records import read
+from crosscheck.judging.results import collect
+from crosscheck.judging.verdict import Verdict
+from crosscheck.library.find import load_case
+from crosscheck.records.records import read
+from crosscheck.records.session import last_session
 from crosscheck.report.outcome import Outcome, conclude
-from crosscheck.results import collect
-from crosscheck.session import last_session
-from crosscheck.sweep import sweep
-from crosscheck.verdict import Verdict
+from crosscheck.running.sweep import sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"
 PROVIDER = "tests.crosscheck.fake_engines:engines"

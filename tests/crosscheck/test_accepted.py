@@ -12,15 +12,16 @@ import msgspec
 import pytest
 from typer.testing import CliRunner
 
-from crosscheck import accept, cli
-from crosscheck.accepted import FLOOR, Accepted, Figure, dumps, figures, key, merged, recordable, worse
-from crosscheck.case import CaseError
-from crosscheck.library import load_case, shipped_cases
+from crosscheck import cli
+from crosscheck.judging import accept
+from crosscheck.judging.accepted import FLOOR, Accepted, Figure, dumps, figures, key, merged, recordable, worse
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import load_case, shipped_cases
 from crosscheck.report import outcome as outcome_module
 from crosscheck.report import summary
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.summary import write_junit, write_summary
-from crosscheck.sweep import sweep
+from crosscheck.running.sweep import sweep
 from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
 from tests.crosscheck.sessions import PROVIDER, copy_case
 

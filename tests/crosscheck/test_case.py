@@ -9,12 +9,12 @@ from pathlib import Path
 import msgspec
 import pytest
 
-from crosscheck import case as case_module
-from crosscheck.case import CaseError, Comparison, Refined, RunFile, Side, Variant
-from crosscheck.case_check import check_run_file
-from crosscheck.library import load_case, resolve
-from crosscheck.plan import refine, variant_scene
-from crosscheck.selection import select
+from crosscheck.library.case import CaseError, Comparison, Refined, RunFile, Side, Variant
+from crosscheck.library.case_check import check_run_file
+from crosscheck.library.find import case as case_module
+from crosscheck.library.find import load_case, resolve
+from crosscheck.library.selection import select
+from crosscheck.running.plan import refine, variant_scene
 from tests.crosscheck.sessions import CASE, copy_case
 from tests.flexmb.surrogate.beams import beam_scene
 

@@ -12,14 +12,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck import case as case_module
-from crosscheck.accepted import Figure
-from crosscheck.case import CaseError, RunFile
-from crosscheck.case_check import MOST_SAMPLES, check_accepted, check_run_file
 from crosscheck.engines.contract import MarkerPath, Trajectory
-from crosscheck.library import load_case, shipped_cases
-from crosscheck.patterns import fault
-from flexmb.channels import channels_of, matches
+from crosscheck.judging.accepted import Figure
+from crosscheck.library.case import CaseError, RunFile
+from crosscheck.library.case_check import MOST_SAMPLES, check_accepted, check_run_file
+from crosscheck.library.find import case as case_module
+from crosscheck.library.find import load_case, shipped_cases
+from crosscheck.library.patterns import fault
+from flexmb.run.channels import channels_of, matches
 from tests.crosscheck.sessions import copy_case
 
 EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])

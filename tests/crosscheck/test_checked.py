@@ -9,7 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from crosscheck.checked import (
+from crosscheck.engines.contract import Effort, MarkerPath, Run, Support, Trajectory
+from crosscheck.library.find import load_case
+from crosscheck.running.checked import (
     BrokenContract,
     checked_ladder,
     checked_run,
@@ -17,9 +19,7 @@ from crosscheck.checked import (
     checked_version,
     clean,
 )
-from crosscheck.engines.contract import Effort, MarkerPath, Run, Support, Trajectory
-from crosscheck.library import load_case
-from flexmb.channels import channels_of
+from flexmb.run.channels import channels_of
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
 from tests.crosscheck.sessions import CASE
 

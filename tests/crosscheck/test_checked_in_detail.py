@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from crosscheck.checked import (
+from crosscheck.engines.contract import Effort, MarkerPath, Support, Trajectory
+from crosscheck.running.checked import (
     LARGEST_COUNT,
     LONGEST_TEXT,
     UNIT,
@@ -21,8 +22,7 @@ from crosscheck.checked import (
     checked_version,
     clean,
 )
-from crosscheck.engines.contract import Effort, MarkerPath, Support, Trajectory
-from flexmb.channels import channels_of
+from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
 from tests.crosscheck.fake_engines import STEPS, TOLERANCES, Pendulum
 from tests.crosscheck.test_checked import SCENE as PENDULUM

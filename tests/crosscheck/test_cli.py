@@ -11,11 +11,11 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.engine_list import EngineState
 from crosscheck.engines.contract import Run
-from crosscheck.library import load_case
-from crosscheck.sweep import sweep
-from crosscheck.verify import verify_csv
+from crosscheck.library.find import load_case
+from crosscheck.running.engine_list import EngineState
+from crosscheck.running.sweep import sweep
+from crosscheck.verify.verify import verify_csv
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
 
@@ -148,7 +148,7 @@ def test_a_template_has_the_times_and_columns(runner: CliRunner, tmp_path: Path)
 
 def test_list_shows_the_shipped_cases(runner: CliRunner, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     copy_case(tmp_path)
-    monkeypatch.setattr("crosscheck.library.shipped_folder", lambda: tmp_path)
+    monkeypatch.setattr("crosscheck.library.find.shipped_folder", lambda: tmp_path)
     output = runner.invoke(cli.app, ["list"], env=WIDE).output
     assert "pendulum/single" in output
     assert "fine, stepper" in output

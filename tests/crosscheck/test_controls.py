@@ -5,8 +5,8 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from crosscheck.case import CaseError, MutationKind
-from crosscheck.controls import mutate
+from crosscheck.library.case import CaseError, MutationKind
+from crosscheck.library.controls import mutate
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
 from flexmb.scene.schema import Scene, Wheel

@@ -11,14 +11,14 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck import execute as module
-from crosscheck.checked import LONGEST_TEXT, BrokenContract
 from crosscheck.engines.contract import Effort, EngineMissing, Run, Support, Trajectory
-from crosscheck.execute import describe, execute, find_engine
-from crosscheck.library import load_case
-from crosscheck.plan import Done, Job
-from crosscheck.records import Confirmed, RunRecord, unpack
-from flexmb.channels import channels_of
+from crosscheck.library.find import load_case
+from crosscheck.records.records import Confirmed, RunRecord, unpack
+from crosscheck.running import execute as module
+from crosscheck.running.checked import LONGEST_TEXT, BrokenContract
+from crosscheck.running.execute import describe, execute, find_engine
+from crosscheck.running.plan import Done, Job
+from flexmb.run.channels import channels_of
 from tests.crosscheck.fake_engines import Fake, Pendulum
 from tests.crosscheck.sessions import CASE
 

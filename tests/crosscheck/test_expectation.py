@@ -8,11 +8,11 @@ import math
 import msgspec
 import pytest
 
-from crosscheck.case import Comparison, Conservation
-from crosscheck.expectation import outside
-from crosscheck.records import pack
+from crosscheck.judging.expectation import outside
+from crosscheck.judging.verdict import Ending, Finding
+from crosscheck.library.case import Comparison, Conservation
+from crosscheck.records.records import pack
 from crosscheck.report.outcome import Outcome
-from crosscheck.verdict import Ending, Finding
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, single, way
 
 ODD = (None, -math.inf, -1.0, 0.0, 5e-324, 1e308, math.inf, math.nan)

@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.records import RunStatus, pack
+from crosscheck.judging.results import RUNGS
+from crosscheck.judging.verdict import GRAVITY, STATUSES
+from crosscheck.records.records import RunStatus, pack
 from crosscheck.report.views import SYMBOLS
-from crosscheck.results import RUNGS
-from crosscheck.verdict import GRAVITY, STATUSES
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 ENDINGS = [status for status in GRAVITY if status not in ("agree", "differ", "unresolved")]

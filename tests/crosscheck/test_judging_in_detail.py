@@ -6,13 +6,13 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.accepted import Figure, dumps, figures, recordable
-from crosscheck.judge import judge
-from crosscheck.records import CaseRecord, VariantInfo
+from crosscheck.judging.accepted import Figure, dumps, figures, recordable
+from crosscheck.judging.judge import judge
+from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.uncertainty import Uncertainty, spatial
+from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
+from crosscheck.records.records import CaseRecord, VariantInfo
 from crosscheck.report.outcome import Outcome
-from crosscheck.results import CaseResults, Result, collect
-from crosscheck.uncertainty import Uncertainty, spatial
-from crosscheck.verdict import Finding, Signal, Verdict, compare, conserve
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, judged, ladder, run_file, single, way
 
 FORCE = "load:pivot.force"

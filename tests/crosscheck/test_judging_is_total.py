@@ -12,13 +12,11 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from crosscheck.uncertainty import Rung, Uncertainty, estimate, observed_order, roundoff_floor, spatial
-from crosscheck.verdict import STATUSES, Finding, Signal, compare, conserve
-from flexmb.channels import distance, magnitude, signal_range
+from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, observed_order, roundoff_floor, spatial
+from crosscheck.judging.verdict import STATUSES, Finding, Signal, compare, conserve
+from flexmb.run.channels import distance, magnitude, signal_range
 
-Array = NDArray[np.float64]
 ODD = (-math.inf, -1.0, 0.0, 5e-324, 1.0, 1e308, math.inf, math.nan)
 GIVEN_OR_NOT = (None, *ODD)
 CHANNELS = ("load:pivot.force", "marker:tip.position", "marker:tip.orientation", "energy.total")

@@ -7,10 +7,10 @@ import io
 import numpy as np
 from rich.console import Console
 
-from crosscheck.live import LiveProgress
-from crosscheck.plan import MAIN, Job
-from crosscheck.pool import Event
-from crosscheck.records import RunRecord
+from crosscheck.records.records import RunRecord
+from crosscheck.running.live import LiveProgress
+from crosscheck.running.plan import MAIN, Job
+from crosscheck.running.pool import Event
 
 
 def lasting_line(message: str) -> str:

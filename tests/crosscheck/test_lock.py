@@ -11,10 +11,10 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.lock import FolderInUseError, locked
+from crosscheck.records.lock import FolderInUseError, locked
 from tests.crosscheck.sessions import CASE
 
-HOLD = "import sys; from pathlib import Path; from crosscheck.lock import locked\nwith locked(Path(sys.argv[1])):\n print('in', flush=True); sys.stdin.read()"  # fmt: skip  # noqa: E501
+HOLD = "import sys; from pathlib import Path; from crosscheck.records.lock import locked\nwith locked(Path(sys.argv[1])):\n print('in', flush=True); sys.stdin.read()"  # fmt: skip  # noqa: E501
 
 
 @pytest.fixture

@@ -13,18 +13,18 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck import made_by as keys
 from crosscheck.engines.contract import Effort
 from crosscheck.engines.registry import engine, home
-from crosscheck.execute import execute
-from crosscheck.library import load_case, shipped_folder
-from crosscheck.made_by import RECORDING, made_by
-from crosscheck.plan import plan, scene_identity
-from crosscheck.records import Confirmed, Environment, RunRecord, read
-from crosscheck.results import collect
-from crosscheck.session import last_session, standing
-from crosscheck.sources import sources
-from crosscheck.sweep import PROVIDER, sweep
+from crosscheck.judging.results import collect
+from crosscheck.library.find import load_case, shipped_folder
+from crosscheck.records.made_by import RECORDING, made_by
+from crosscheck.records.records import Confirmed, Environment, RunRecord, read
+from crosscheck.records.records import made_by as keys
+from crosscheck.records.session import last_session, standing
+from crosscheck.records.sources import sources
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import plan, scene_identity
+from crosscheck.running.sweep import PROVIDER, sweep
 from tests.crosscheck.sessions import CASE, copy_case
 
 # Loaded in a run of an engine, yet without a part in its numbers.
@@ -33,19 +33,19 @@ WITHOUT_PART = {
     "crosscheck.engines.pinocchio": "another engine, which the registry can load",
     "crosscheck.engines.mujoco": "another engine",
     "crosscheck.engines.exudyn": "another engine",
-    "crosscheck.plan": "makes the scene, which is in the record's own key",
-    "crosscheck.case": "as plan",
-    "crosscheck.controls": "as plan",
-    "crosscheck.selection": "as plan",
-    "crosscheck.library": "as plan",
-    "crosscheck.drawing": "draws",
-    "crosscheck.accepted": "judges what is recorded",
-    "crosscheck.patterns": "judges what is recorded",
-    "flexmb.writing": "says what is wrong with a folder",
-    "crosscheck.pool": "hands out jobs",
-    "crosscheck.processes": "ends processes",
-    "crosscheck.made_by": "makes the key",
-    "crosscheck.sources": "makes the key",
+    "crosscheck.running.plan": "makes the scene, which is in the record's own key",
+    "crosscheck.library.case": "as plan",
+    "crosscheck.library.controls": "as plan",
+    "crosscheck.library.selection": "as plan",
+    "crosscheck.library.find": "as plan",
+    "crosscheck.records.drawing": "draws",
+    "crosscheck.judging.accepted": "judges what is recorded",
+    "crosscheck.library.patterns": "judges what is recorded",
+    "flexmb.output.writing": "says what is wrong with a folder",
+    "crosscheck.running.pool": "hands out jobs",
+    "crosscheck.running.processes": "ends processes",
+    "crosscheck.records.made_by": "makes the key",
+    "crosscheck.records.sources": "makes the key",
     "flexmb.surrogate": "makes scenes, as plan",
     "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes",
@@ -152,10 +152,10 @@ def test_an_earlier_result_counts_only_where_the_last_session_confirmed_it(edite
 NATIVE_RUN = """
 import sys
 import numpy as np
-import crosscheck.execute as execute
+import crosscheck.running.execute as execute
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.library import load_case
+from crosscheck.library.find import load_case
 from pathlib import Path
 case = load_case(Path(sys.argv[2]))
 scene = case.scene(case.run.variants[0])
@@ -207,7 +207,7 @@ def test_every_file_of_ours_that_a_peer_runs_through_is_in_its_key(name: str) ->
     covered = sources({type(found).__module__, home(name)}, RECORDING).files.keys()
     missed = {each for each in ours - covered if not each.startswith(tuple(WITHOUT_PART))}
     assert not missed
-    assert {"crosscheck.checked", "flexmb.channels", f"crosscheck.engines.{name}.engine"} <= ours
+    assert {"crosscheck.running.checked", "flexmb.run.channels", f"crosscheck.engines.{name}.engine"} <= ours
 
 
 def test_a_key_holds_libraries_platform_and_compiler(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -19,21 +19,21 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
-from crosscheck.case import Comparison, Side
-from crosscheck.engine_list import EngineState
-from crosscheck.library import load_case
-from crosscheck.live import LiveProgress
-from crosscheck.plan import plan
-from crosscheck.pool import Event
-from crosscheck.records import Archive, BrokenLine, RunRecord, environment, read
+from crosscheck.judging.results import collect
+from crosscheck.judging.verdict import Verdict
+from crosscheck.library.case import Comparison, Side
+from crosscheck.library.find import load_case
+from crosscheck.records.records import Archive, BrokenLine, RunRecord, environment, read
 from crosscheck.report import write_all
 from crosscheck.report.console import cases_table, engines_table, print_outcome
 from crosscheck.report.html import embedded
 from crosscheck.report.outcome import Absence, Outcome, conclude
 from crosscheck.report.summary import write_junit, write_summary
-from crosscheck.results import collect
-from crosscheck.verdict import Verdict
-from flexmb.printable import chart_text, printable
+from crosscheck.running.engine_list import EngineState
+from crosscheck.running.live import LiveProgress
+from crosscheck.running.plan import plan
+from crosscheck.running.pool import Event
+from flexmb.output.printable import chart_text, printable
 from tests.crosscheck.sessions import CASE, PROVIDER
 
 NASTY = (
@@ -240,8 +240,8 @@ def written(write: object, name: str) -> str:
 
 
 def test_csv_headers_come_back(tmp_path: Path) -> None:
-    from flexmb.status import Status
-    from flexmb.trajectory import MarkerPath, Statistics, Trajectory
+    from flexmb.run.trajectory import MarkerPath, Statistics, Trajectory
+    from flexmb.tables.status import Status
 
     t, three, six = np.zeros(2), np.zeros((2, 3)), np.zeros((2, 6))
     markers = {name: MarkerPath(three, np.zeros((2, 4)), six, six) for name in NASTY}

@@ -12,12 +12,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from crosscheck import cli, records
-from crosscheck.records import Archive, RunRecord, read
+from crosscheck import cli
+from crosscheck.records.records import Archive, RunRecord, read, records
 from crosscheck.report import summary
-from crosscheck.sweep import sweep
+from crosscheck.running.sweep import sweep
 from flexmb import cli as flexmb_cli
-from flexmb.writing import check_folder
+from flexmb.output.writing import check_folder
 from tests.crosscheck.sessions import CASE, PROVIDER
 from tests.repo.project import ROOT
 
@@ -138,7 +138,7 @@ def test_a_broken_record_is_named_and_run_again(runner: CliRunner, tmp_path: Pat
 
 def test_a_full_disk_takes_the_files_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The summary of a simulation is printed before it is written."""
-    from flexmb.trajectory import Trajectory
+    from flexmb.run.trajectory import Trajectory
 
     def full(self: Trajectory, path: Path) -> None:
         shutil.copyfile(SCENE, path)

@@ -11,8 +11,8 @@ from pathlib import Path
 import psutil
 import pytest
 
-from crosscheck.pool import LOG_LIMIT_BYTES, TICK_S, Event, run_jobs
-from crosscheck.processes import memory_limit
+from crosscheck.running.pool import LOG_LIMIT_BYTES, TICK_S, Event, run_jobs
+from crosscheck.running.processes import memory_limit
 
 
 def work(job: str, emit: Callable[[object], None]) -> None:

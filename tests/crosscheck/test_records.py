@@ -16,10 +16,19 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck import records
-from crosscheck.records import Archive, BrokenRecords, Packed, RunRecord, environment, pack, read, unpack
+from crosscheck.judging.verdict import Verdict
+from crosscheck.records.records import (
+    Archive,
+    BrokenRecords,
+    Packed,
+    RunRecord,
+    environment,
+    pack,
+    read,
+    records,
+    unpack,
+)
 from crosscheck.report.outcome import Outcome
-from crosscheck.verdict import Verdict
 
 
 def record(effort: str) -> RunRecord:

@@ -12,13 +12,13 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
-from crosscheck.case import Transform, Variant
-from crosscheck.library import load_case, resolve
-from crosscheck.plan import plan
+from crosscheck.library.case import Transform, Variant
+from crosscheck.library.find import load_case, resolve
 from crosscheck.report import Outcome, write_all
 from crosscheck.report.html import _code, _transformation
 from crosscheck.report.store import SAMPLES, Store
-from crosscheck.sweep import sweep
+from crosscheck.running.plan import plan
+from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
 
 MIXED = """

@@ -8,10 +8,10 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.judge import drift_of
-from crosscheck.records import BrokenLine, CaseRecord, RunRecord, VariantInfo, environment, pack
-from crosscheck.results import CaseResults, Result, Session, collect
-from crosscheck.verdict import conserve
+from crosscheck.judging.judge import drift_of
+from crosscheck.judging.results import CaseResults, Result, Session, collect
+from crosscheck.judging.verdict import conserve
+from crosscheck.records.records import BrokenLine, CaseRecord, RunRecord, VariantInfo, environment, pack
 from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, ladder, run_file, way
 
 FORCE = "load:pivot.force"

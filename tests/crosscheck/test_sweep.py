@@ -5,9 +5,9 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from crosscheck.records import RunRecord, read
+from crosscheck.judging.results import collect
+from crosscheck.records.records import RunRecord, read
 from crosscheck.report.outcome import Outcome, conclude
-from crosscheck.results import collect
 from tests.crosscheck.sessions import CASE, compare_engines, copy_case, only, run_case
 
 GOALS = '"marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6'

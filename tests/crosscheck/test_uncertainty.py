@@ -6,21 +6,20 @@ from collections.abc import Callable
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from crosscheck.uncertainty import Rung, estimate, observed_order, spatial
+from crosscheck.judging.uncertainty import Rung, estimate, observed_order, spatial
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 CHANNEL = "marker:tip.velocity"
 SAMPLES = 200
 COVERAGE = 0.95  # the share of problems whose error U must bound
-METHODS: dict[str, tuple[int, Callable[..., Array]]] = {}
+METHODS: dict[str, tuple[int, Callable[..., Real]]] = {}
 
 
-def method(order: int) -> Callable[[Callable[..., Array]], Callable[..., Array]]:
-    def register(step: Callable[..., Array]) -> Callable[..., Array]:
+def method(order: int) -> Callable[[Callable[..., Real]], Callable[..., Real]]:
+    def register(step: Callable[..., Real]) -> Callable[..., Real]:
         METHODS[step.__name__] = (order, step)
         return step
 
@@ -28,24 +27,24 @@ def method(order: int) -> Callable[[Callable[..., Array]], Callable[..., Array]]
 
 
 @method(1)
-def euler(rate: Callable[[Array], Array], y: Array, h: float) -> Array:
+def euler(rate: Callable[[Real], Real], y: Real, h: float) -> Real:
     return y + h * rate(y)
 
 
 @method(2)
-def midpoint(rate: Callable[[Array], Array], y: Array, h: float) -> Array:
+def midpoint(rate: Callable[[Real], Real], y: Real, h: float) -> Real:
     return y + h * rate(y + 0.5 * h * rate(y))
 
 
 @method(3)
-def kutta(rate: Callable[[Array], Array], y: Array, h: float) -> Array:
+def kutta(rate: Callable[[Real], Real], y: Real, h: float) -> Real:
     k1 = rate(y)
     k2 = rate(y + 0.5 * h * k1)
     return y + h / 6.0 * (k1 + 4.0 * k2 + rate(y + h * (2.0 * k2 - k1)))
 
 
 @method(4)
-def runge_kutta(rate: Callable[[Array], Array], y: Array, h: float) -> Array:
+def runge_kutta(rate: Callable[[Real], Real], y: Real, h: float) -> Real:
     k1 = rate(y)
     k2 = rate(y + 0.5 * h * k1)
     k3 = rate(y + 0.5 * h * k2)
@@ -59,10 +58,10 @@ class Oscillator:
         self.frequency, self.damping = random.uniform(0.5, 4.0), random.uniform(0.0, 0.3)
         self.start = random.normal(size=2)
 
-    def rate(self, y: Array) -> Array:
+    def rate(self, y: Real) -> Real:
         return np.array([y[1], -(self.frequency**2) * y[0] - 2.0 * self.damping * self.frequency * y[1]])
 
-    def solution(self, t: Array) -> Array:
+    def solution(self, t: Real) -> Real:
         decay, turn = self.damping * self.frequency, self.frequency * np.sqrt(1.0 - self.damping**2)
         x, v = self.start
         sine = (v + decay * x) / turn
@@ -78,10 +77,10 @@ class Logistic:
     def __init__(self, random: np.random.Generator) -> None:
         self.growth, self.start = random.uniform(0.5, 3.0), random.uniform(0.01, 0.9, size=1)
 
-    def rate(self, y: Array) -> Array:
+    def rate(self, y: Real) -> Real:
         return self.growth * y * (1.0 - y)
 
-    def solution(self, t: Array) -> Array:
+    def solution(self, t: Real) -> Real:
         return (1.0 / (1.0 + (1.0 / self.start - 1.0) * np.exp(-self.growth * t)))[:, None]
 
 
@@ -92,10 +91,10 @@ class Pendulum:
         self.frequency, self.angle = random.uniform(0.7, 3.0), random.uniform(0.3, 2.9)
         self.start = np.array([self.angle, 0.0])
 
-    def rate(self, y: Array) -> Array:
+    def rate(self, y: Real) -> Real:
         return np.array([y[1], -(self.frequency**2) * np.sin(y[0])])
 
-    def solution(self, t: Array) -> Array:
+    def solution(self, t: Real) -> Real:
         modulus = np.sin(self.angle / 2.0) ** 2
         sn, cn, dn, _ = ellipj(ellipk(modulus) - self.frequency * t, modulus)
         half = np.sqrt(modulus) * sn
@@ -106,7 +105,7 @@ PROBLEMS = (Oscillator, Logistic, Pendulum)
 TIMES = np.linspace(0.0, 6.0, 61)
 
 
-def march(problem: Oscillator | Logistic | Pendulum, step: Callable[..., Array], per_sample: int) -> Array:
+def march(problem: Oscillator | Logistic | Pendulum, step: Callable[..., Real], per_sample: int) -> Real:
     h, y = (TIMES[1] - TIMES[0]) / per_sample, np.array(problem.start)
     states = [y]
     for _ in TIMES[1:]:
@@ -143,7 +142,7 @@ def ratio(kind: str, rungs: list[Rung], evaluations: int, problem: Oscillator | 
 
 
 @pytest.fixture(scope="module")
-def ratios() -> dict[str, Array]:
+def ratios() -> dict[str, Real]:
     """U / error of random problems by kind of ladder."""
     random = np.random.default_rng(20240607)
     fixed, tolerances = [], []
@@ -157,12 +156,12 @@ def ratios() -> dict[str, Array]:
 
 
 @pytest.mark.parametrize("kind", ["step", "tolerance"])
-def test_uncertainty_bounds_the_true_error(ratios: dict[str, Array], kind: str) -> None:
+def test_uncertainty_bounds_the_true_error(ratios: dict[str, Real], kind: str) -> None:
     assert np.mean(ratios[kind] >= 1.0) >= COVERAGE
 
 
 @pytest.mark.parametrize(("kind", "idle"), [("step", 4.0), ("tolerance", 100.0)])
-def test_uncertainty_is_not_idle_caution(ratios: dict[str, Array], kind: str, idle: float) -> None:
+def test_uncertainty_is_not_idle_caution(ratios: dict[str, Real], kind: str, idle: float) -> None:
     """Half of the estimates are within a factor: for steps the safety factors' own range, for tolerances two ladders'.
 
     Steps: 1.25 where Richardson holds, 3 where it does not. Tolerances: the difference measures the error one effort
@@ -187,7 +186,7 @@ def test_order_with_unequal_ratios() -> None:
     assert order == pytest.approx(3.0, abs=1e-9)
 
 
-def signal(size: float) -> Array:
+def signal(size: float) -> Real:
     return size * np.ones((5, 3)) * np.linspace(0.0, 1.0, 5)[:, None]
 
 

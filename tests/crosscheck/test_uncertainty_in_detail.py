@@ -7,8 +7,8 @@ import warnings
 import numpy as np
 import pytest
 
-from crosscheck.uncertainty import Rung, estimate, observed_order, roundoff_floor, spatial, unknown
-from crosscheck.verdict import conserve
+from crosscheck.judging.uncertainty import Rung, estimate, observed_order, roundoff_floor, spatial, unknown
+from crosscheck.judging.verdict import conserve
 
 FORCE = "load:pivot.force"
 

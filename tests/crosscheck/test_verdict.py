@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from crosscheck.uncertainty import Uncertainty
-from crosscheck.verdict import Signal, Verdict, compare, conserve
+from crosscheck.judging.uncertainty import Uncertainty
+from crosscheck.judging.verdict import Signal, Verdict, compare, conserve
 
 TIMES = np.linspace(0.0, 1.0, 11)
 CHANNEL = "load:pivot.force"

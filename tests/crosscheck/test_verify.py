@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
-from crosscheck.causes import likely_cause
-from crosscheck.columns import VerifyError, read_columns
-from crosscheck.library import load_case
-from crosscheck.verify import verify_csv
+from crosscheck.library.find import load_case
+from crosscheck.verify.causes import likely_cause
+from crosscheck.verify.columns import VerifyError, read_columns
+from crosscheck.verify.verify import verify_csv
+from flexmb.typing import Real
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
 from tests.crosscheck.sessions import CASE, PROVIDER
 
-Array = NDArray[np.float64]
 TIMES = np.linspace(0.0, 1.0, 5)
 ALLOWED = 1e-6
 
@@ -29,7 +28,7 @@ def write(path: Path, text: str | bytes) -> Path:
     return path
 
 
-def table(head: str, *cells: str, times: Array = TIMES, separator: str = ",") -> str:
+def table(head: str, *cells: str, times: Real = TIMES, separator: str = ",") -> str:
     return "\n".join([head, *(separator.join([repr(float(t)), *cells]) for t in times), ""])
 
 
@@ -134,7 +133,7 @@ def test_flexmbs_own_trajectory_agrees(tmp_path: Path) -> None:
     assert "the components are in the order y, x, z?" in differing.reason
 
 
-def motion(seed: int = 0, samples: int = 60) -> tuple[Array, Array]:
+def motion(seed: int = 0, samples: int = 60) -> tuple[Real, Real]:
     """A smooth vector (T,3) of size 1 and a smooth turning (T,4)."""
     random, t = np.random.default_rng(seed), np.linspace(0.0, 3.0, samples)
     waves = random.normal(size=(7, 3)) @ np.array([np.ones_like(t), np.sin(t), np.cos(1.7 * t)])
@@ -142,7 +141,7 @@ def motion(seed: int = 0, samples: int = 60) -> tuple[Array, Array]:
     return waves[4:].T, orientation / np.linalg.norm(orientation, axis=1)[:, None]
 
 
-def to_body(orientation: Array, vectors: Array) -> Array:
+def to_body(orientation: Real, vectors: Real) -> Real:
     w, x, y, z = orientation.T
     R = np.array([
         [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],

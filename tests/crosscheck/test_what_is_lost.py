@@ -8,10 +8,10 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-from crosscheck.accepted import Figure, key
+from crosscheck.judging.accepted import Figure, key
+from crosscheck.judging.verdict import GRAVITY
 from crosscheck.report.outcome import Outcome
 from crosscheck.report.summary import write_junit
-from crosscheck.verdict import GRAVITY
 from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
 
 BESIDE = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one", "two"]\nalso = ["three"]', 1)

@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from msgspec.structs import replace
 
-from crosscheck.library import load_case
-from crosscheck.records import Record, RunRecord, read
-from crosscheck.results import collect
-from crosscheck.sweep import sweep
-from crosscheck.workprecision import WorkPrecision, work_precision
+from crosscheck.judging.results import collect
+from crosscheck.library.find import load_case
+from crosscheck.records.records import Record, RunRecord, read
+from crosscheck.report.workprecision import WorkPrecision, work_precision
+from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import PROVIDER, copy_case
 
 RUN_FILE = """

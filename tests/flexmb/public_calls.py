@@ -20,12 +20,12 @@ import msgspec
 import numpy as np
 
 import flexmb as fm
-from flexmb.closed_system import ClosedSystem
-from flexmb.factors import MassMatrixFactors
 from flexmb.frisch.system import NestedSystem
 from flexmb.jain.operators import Operators
 from flexmb.scene import schema
 from flexmb.scene.shapes import beam_section
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.factors import MassMatrixFactors
 
 # SceneError, ClosureError, LinAlgError are among the former; KeyError is of names that do not exist.
 DOCUMENTED = (ValueError, TypeError, KeyError, ArithmeticError, NotImplementedError)

@@ -9,24 +9,23 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from flexmb.typing import Real
 from tests.bounds import gamma
-
-Array = NDArray[np.float64]
 
 POINTS = 17
 MIDDLE = POINTS // 2
 
 
-def times(span: float) -> Array:
+def times(span: float) -> Real:
     """The points in [-span, span], the middle one 0."""
     x = np.cos(np.pi * np.arange(POINTS) / (POINTS - 1))
     x[MIDDLE] = 0.0
     return span * x
 
 
-def matrix(span: float) -> Array:
+def matrix(span: float) -> Real:
     """D (17,17): derivatives of the interpolant at the points from its values there."""
     x = times(span)
     c = np.ones(POINTS)
@@ -37,7 +36,7 @@ def matrix(span: float) -> Array:
     return D - np.diag(np.sum(D, axis=1))
 
 
-def at_zero(values: Array, span: float) -> tuple[Array, Array]:
+def at_zero(values: Real, span: float) -> tuple[Real, Real]:
     """First and second derivative at 0 of the values (17,...) at `times(span)`."""
     D = matrix(span)
     return np.tensordot(D[MIDDLE], values, 1), np.tensordot((D @ D)[MIDDLE], values, 1)
@@ -53,6 +52,6 @@ def rounding(span: float, order: int, size: ArrayLike, digits: float = 0.0) -> f
     return float(np.sum(rows) * (gamma(POINTS**2) + digits) * np.max(np.abs(size)))
 
 
-def along(f: Callable[[float], ArrayLike], span: float) -> Array:
+def along(f: Callable[[float], ArrayLike], span: float) -> Real:
     """Values (17,...) of f at the points."""
     return np.array([f(t) for t in times(span)], dtype=float)

@@ -16,7 +16,7 @@ import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.profiles import profile
 from flexmb.scene import schema as s
-from flexmb.system import Evaluation, System
+from flexmb.system.system import Evaluation, System
 from tests import trees
 from tests.bounds import algebra, observed_order
 from tests.flexmb import spectral

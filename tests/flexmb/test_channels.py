@@ -7,7 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.contract import MarkerPath, Trajectory
-from flexmb.channels import channels_of, distance, family, matches, signal_range
+from flexmb.run.channels import channels_of, distance, family, matches, signal_range
 
 T = 5
 

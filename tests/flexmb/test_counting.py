@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import dynamics
-from flexmb.counting import Counted, Operations, count
-from flexmb.functions import evaluate
+from flexmb.entry import articulated
 from flexmb.jain.explicit import cholesky
-from flexmb.spatial.inertia import inertia_times, outer_inertia, shift_force
+from flexmb.jit.counting import Counted, Operations, count
+from flexmb.spatial.inertia import inertia_times, outer_inertia
 from flexmb.spatial.rotation import rotation_z
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import axpy, cross, matmul, sym_times, times, transpose
+from flexmb.tables.functions import evaluate
 from tests import trees
 from tests.bounds import algebra, backward_error
 
@@ -34,9 +35,9 @@ def of(kernel, *arguments) -> Operations:
         (sym_times, (SYM, VECTOR), 9, 6),
         (matmul, (MATRIX, MATRIX), 27, 18),
         (transpose, (MATRIX,), 0, 0),
-        (shift_force, (VECTOR, VECTOR, VECTOR), 6, 6),
+        (shift_force, ((VECTOR, VECTOR), VECTOR), 6, 6),
         # four blocks of 3x3 times a vector, two sums of the halves
-        (inertia_times, (np.array([SYM, MATRIX, SYM], object), VECTOR, VECTOR), 36, 30),
+        (inertia_times, (np.array([SYM, MATRIX, SYM], object), (VECTOR, VECTOR)), 36, 30),
         # 21 products of pairs, each scaled
         (outer_inertia, (VECTOR, VECTOR, -1.0), 42, 0),
     ],
@@ -103,7 +104,7 @@ def counted_accelerations(scene) -> tuple[flexmb.System, np.ndarray, Counted]:
     system = flexmb.compile(scene)
     state = system.initial_state
     y = np.concatenate([state.q, state.u, [0.0]])
-    return system, y, count(dynamics.accelerations, 0.0, y, system.constants, system.workspace())
+    return system, y, count(articulated.accelerations, 0.0, y, system.constants, system.workspace())
 
 
 @pytest.mark.parametrize("seed", [0, 2])
@@ -127,6 +128,6 @@ def test_the_arguments_stay_as_they_were():
     state, workspace = system.initial_state, system.workspace()
     y = np.concatenate([state.q, state.u, [0.0]])
     before = workspace.body.copy()
-    first, second = (count(dynamics.accelerations, 0.0, y, system.constants, workspace).operations for _ in range(2))
+    first, second = (count(articulated.accelerations, 0.0, y, system.constants, workspace).operations for _ in range(2))
     assert first == second
     assert np.array_equal(workspace.body, before)

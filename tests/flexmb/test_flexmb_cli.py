@@ -7,8 +7,8 @@ from typer.testing import CliRunner
 
 import flexmb as fm
 from flexmb.cli import app
+from flexmb.run.warm_up import pendulum
 from flexmb.scene.shapes import beam_section
-from flexmb.warmup import pendulum
 
 
 @pytest.fixture

@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from scipy.interpolate import make_interp_spline
 
-from flexmb.functions import evaluate, pack
-from flexmb.kernel import kernel
+from flexmb.jit.kernel import kernel
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.tables.functions import evaluate, pack
 from tests.bounds import gamma
 from tests.flexmb import spectral
 

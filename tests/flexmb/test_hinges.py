@@ -6,9 +6,9 @@ import pytest
 import flexmb
 from flexmb.hinges import catalogue
 from flexmb.hinges.catalogue import FREE, GIMBAL2, GIMBAL3, KINDS, SPHERICAL
-from flexmb.kernel import kernel
+from flexmb.jit.kernel import kernel
 from flexmb.scene.build import SceneBuilder, angular
-from flexmb.state import DynamicsError
+from flexmb.tables.state import DynamicsError
 from tests.bounds import gamma
 from tests.flexmb import spectral
 

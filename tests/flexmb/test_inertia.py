@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexmb.kernel import kernel
+from flexmb.jit.kernel import kernel
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_column,
@@ -13,11 +13,11 @@ from flexmb.spatial.inertia import (
     outer_inertia,
     rigid_inertia,
     rotate_inertia,
-    shift_force,
     shift_inertia,
     store_inertia,
     sum_inertia,
 )
+from flexmb.spatial.spatial_vector import shift_force
 from flexmb.spatial.vector import mat3, sym6, vec3
 from tests.bounds import gamma
 from tests.trees import inertia, vector
@@ -38,7 +38,7 @@ def rotated(a, R, out):
 
 @kernel
 def times(a, V):
-    return inertia_times(load_inertia(a, 0), vec3(V, 0), vec3(V, 3))
+    return inertia_times(load_inertia(a, 0), (vec3(V, 0), vec3(V, 3)))
 
 
 @kernel
@@ -58,7 +58,7 @@ def rigid(m, s, j, out):
 
 @kernel
 def moved_force(F, d):
-    return shift_force(vec3(F, 0), vec3(F, 3), vec3(d, 0))
+    return shift_force((vec3(F, 0), vec3(F, 3)), vec3(d, 0))
 
 
 @kernel

@@ -13,9 +13,9 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.interruption import interruptible
-from flexmb.status import Status
-from flexmb.warmup import pendulum
+from flexmb.run.interruption import interruptible
+from flexmb.run.warm_up import pendulum
+from flexmb.tables.status import Status
 
 ROOT = Path(__file__).parents[2]
 LIMIT_S = 600.0  # with cold kernels on a busy machine
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX 
 PRESSED = """
 import os, signal, sys, threading, time
 import flexmb as fm
-import flexmb.simulation as simulation
-from flexmb.warmup import pendulum
+import flexmb.run.simulate as simulation
+from flexmb.run.warm_up import pendulum
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs tests in the background ignores Ctrl-C
 

@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import flexmb.kernel
-from flexmb.bundle import AnyBundle, bundle
-from flexmb.kernel import _imported, helper, kernel, source_hash
-from flexmb.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
+import flexmb.jit.kernel
+from flexmb.jit.bundle import AnyBundle, bundle
+from flexmb.jit.kernel import _imported, helper, kernel, source_hash
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
 
 
 @bundle
@@ -125,20 +125,20 @@ def test_bundles_refuse_arrays_they_cannot_describe():
 def test_the_hash_follows_imports_through_the_package(tmp_path):
     """Two probes outside the package: one imports the dynamics, one only a file that imports nothing."""
     far, near = tmp_path / "far.py", tmp_path / "near.py"
-    far.write_text("from flexmb.dynamics import rhs\n")
-    near.write_text("from flexmb.status import OK\n")
+    far.write_text("from flexmb.entry.articulated import rhs\n")
+    near.write_text("from flexmb.tables.status import OK\n")
     assert source_hash(far) == source_hash(far)
     before = source_hash(near)
-    near.write_text("from flexmb.status import OK, NONFINITE\n")
+    near.write_text("from flexmb.tables.status import OK, NONFINITE\n")
     assert source_hash(near) != before
-    package = Path(flexmb.kernel.__file__).parent
-    assert {package / "status.py"} == _imported(near)
-    assert package / "dynamics.py" in _imported(far)
-    assert package / "jain" / "sweeps.py" in _imported(package / "dynamics.py")
+    package = Path(flexmb.jit.kernel.__file__).parents[1]
+    assert {package / "tables" / "status.py"} == _imported(near)
+    assert package / "entry" / "articulated.py" in _imported(far)
+    assert package / "jain" / "sweeps.py" in _imported(package / "entry" / "articulated.py")
 
 
 def test_the_imports_found_are_those_that_python_sees():
-    package = Path(flexmb.kernel.__file__).parent
+    package = Path(flexmb.jit.kernel.__file__).parents[1]
     for source in package.rglob("*.py"):
         seen = set()
         for node in ast.walk(ast.parse(source.read_bytes())):
@@ -157,18 +157,17 @@ PROBE = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache
 
 def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached(tmp_path):
     package = tmp_path / "flexmb"
-    package.mkdir()
+    shutil.copytree(Path(flexmb.jit.kernel.__file__).parent, package / "jit")
     (package / "__init__.py").write_text("")
-    for name in ("kernel.py", "kernel_cache.py", "parts.py"):
-        shutil.copy(Path(flexmb.kernel.__file__).with_name(name), package / name)
     (package / "entry.py").write_text(
-        "from flexmb.kernel import kernel\nfrom flexmb.part import part\n@kernel\ndef entry(x):\n    return part(x)\n"
+        "from flexmb.jit.kernel import kernel\nfrom flexmb.part import part\n\n\n"
+        "@kernel\ndef entry(x):\n    return part(x)\n"
     )
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
 
     def run(factor: float) -> str:
         (package / "part.py").write_text(
-            f"from flexmb.kernel import helper\n@helper\ndef part(x):\n    return {factor} * x\n"
+            f"from flexmb.jit.kernel import helper\n@helper\ndef part(x):\n    return {factor} * x\n"
         )
         done = subprocess.run(
             [sys.executable, "-c", PROBE], env=environment, cwd=tmp_path, capture_output=True, text=True, check=True
@@ -181,8 +180,8 @@ def test_an_edited_helper_in_another_file_is_seen_and_an_unchanged_one_is_cached
 
 
 def test_folders_left_out_of_the_cache_key_hold_no_kernels():
-    package = Path(flexmb.kernel.__file__).parent
-    for folder in flexmb.kernel.WITHOUT_KERNELS:
+    package = Path(flexmb.jit.kernel.__file__).parents[1]
+    for folder in flexmb.jit.kernel.WITHOUT_KERNELS:
         sources = list((package / folder).rglob("*.py"))
         assert sources, f"{folder} is not a folder of the package"
-        assert not [source for source in sources if "flexmb.kernel" in source.read_text(encoding="utf-8")]
+        assert not [source for source in sources if "flexmb.jit.kernel" in source.read_text(encoding="utf-8")]

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import flexmb.kernel
-from flexmb.kernel_cache import warn_once
+import flexmb.jit.kernel
+from flexmb.jit.cache import warn_once
 
 ROOT = Path(__file__).parents[2]
 TINY = """
-from flexmb.soundness import unsound as kernel
+from flexmb.tables.soundness import unsound as kernel
 import numpy as np
 result = kernel(np.array([1.0, np.nan]), np.zeros(0, np.int64)), kernel(np.ones(2), np.zeros(0, np.int64))
 assert result == (1, 0), result
@@ -80,9 +80,9 @@ def weighted(values, weight):
 
 def hits(cache: Path, monkeypatch) -> int:
     """Versions of the kernel that were found in a cache: of two."""
-    monkeypatch.setattr(flexmb.kernel, "cache_directory", lambda source: str(cache / "sources"))
+    monkeypatch.setattr(flexmb.jit.kernel, "cache_directory", lambda source: str(cache / "sources"))
     warn_once.cache_clear()
-    fresh = flexmb.kernel.kernel(weighted)
+    fresh = flexmb.jit.kernel.kernel(weighted)
     assert fresh(np.arange(4), 2.0) == 12.0
     assert fresh(np.array([0.5, 0.25]), 2.0) == 1.5
     return sum(fresh.stats.cache_hits.values())
@@ -150,12 +150,12 @@ def test_a_kernel_that_cannot_be_kept_runs_with_one_warning(tmp_path, monkeypatc
 
 
 def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
-    monkeypatch.setattr(flexmb.kernel.config, "CACHE_DIR", str(tmp_path))
-    source = Path(flexmb.kernel.__file__)
-    folder = flexmb.kernel.cache_directory.__wrapped__(source)
+    monkeypatch.setattr(flexmb.jit.kernel.config, "CACHE_DIR", str(tmp_path))
+    source = Path(flexmb.jit.kernel.__file__)
+    folder = flexmb.jit.kernel.cache_directory.__wrapped__(source)
     Path(folder).rmdir()
     Path(folder).write_text("no folder")
-    assert flexmb.kernel.cache_directory.__wrapped__(source) == folder
+    assert flexmb.jit.kernel.cache_directory.__wrapped__(source) == folder
     assert Path(folder).is_dir()
 
 

@@ -11,10 +11,10 @@ import pytest
 from numpy.random import Generator
 
 import flexmb
-from flexmb.factors import ROUNDING
-from flexmb.mechanics import FEW_DIGITS
 from flexmb.scene import schema as s
-from flexmb.state import PrecisionWarning
+from flexmb.system.factors import ROUNDING
+from flexmb.system.mechanics import FEW_DIGITS
+from flexmb.tables.state import PrecisionWarning
 from tests import trees
 from tests.flexmb import extended
 from tests.flexmb.singular import FAMILIES

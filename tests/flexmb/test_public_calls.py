@@ -60,9 +60,9 @@ def test_numbers_written_into_a_state_are_seen():
 
 @pytest.mark.parametrize("t", [0, 1])
 def test_an_integer_time_compiles_nothing(t):
-    from flexmb import dynamics
+    from flexmb.entry import articulated
 
     W.tree.evaluate(0.0, W.state.q, W.state.u)
-    versions = len(dynamics.observe.signatures)
+    versions = len(articulated.observe.signatures)
     W.tree.evaluate(t, W.state.q, W.state.u)
-    assert len(dynamics.observe.signatures) == versions
+    assert len(articulated.observe.signatures) == versions

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from flexmb.kernel import kernel
+from flexmb.jit.kernel import kernel
 from flexmb.spatial import rotation
 from flexmb.spatial.rotation import (
     exponential,

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.simulation import sample_bytes, switch_times
-from flexmb.status import Status
+from flexmb.run.simulate import sample_bytes, switch_times
+from flexmb.tables.status import Status
 from tests.trees import random_scene
 
 EPS = np.finfo(float).eps

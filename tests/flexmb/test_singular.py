@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.mechanics import Mechanics
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError, PrecisionWarning, State
-from flexmb.system import Algorithm, System
+from flexmb.system.mechanics import Mechanics
+from flexmb.system.system import Algorithm, System
+from flexmb.tables.state import DynamicsError, PrecisionWarning, State
 from tests.bounds import gamma
 from tests.flexmb import extended
 from tests.flexmb.singular import FAMILIES, state
@@ -105,7 +105,7 @@ def refused(system: System, at: State) -> bool:
 
 
 @pytest.mark.skipif(np.finfo(float).nmant >= extended.BITS, reason="long doubles are doubles here")
-@pytest.mark.filterwarnings("ignore::flexmb.state.PrecisionWarning")
+@pytest.mark.filterwarnings("ignore::flexmb.tables.state.PrecisionWarning")
 @pytest.mark.parametrize("share", SHARES)
 @pytest.mark.parametrize("name", FAMILIES)
 def test_a_nearly_singular_mass_matrix_costs_its_condition(name, share):

@@ -8,7 +8,7 @@ import pytest
 import flexmb as fm
 from flexmb.scene.schema import Modes
 from flexmb.scene.shapes import beam_section
-from flexmb.status import Status
+from flexmb.tables.status import Status
 from tests.bounds import observed_order
 from tests.flexmb.test_simulate import driven_arm, tumbling_pair
 from tests.trees import FULL, random_scene

@@ -6,21 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.entry.tangent import jacobian, tangent_workspace
 from flexmb.modal.flexible import beam_model
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
-from flexmb.state import pack
-from flexmb.tangent import jacobian, tangent_workspace
+from flexmb.tables.state import pack
+from flexmb.typing import Real
 from tests import trees
 from tests.bounds import algebra, observed_order, relative
-
-Array = NDArray[np.float64]
 
 EULER = np.pi**2 / 4.0  # tip load, EI / L^2
 GREENHILL = 7.837347438  # own weight per length, EI / L^3: first zero of J_-1/3
@@ -51,7 +49,7 @@ def cantilever(
     )  # fmt: skip
 
 
-def stiffness(system: flexmb.System, speed: float = 0.0) -> Array:
+def stiffness(system: flexmb.System, speed: float = 0.0) -> Real:
     """d(bias)/d(eta) of the straight beam with the first hinge turning at `speed`.
 
     The bias of masses that do not turn is a cubic polynomial in eta, for which the five-point formula is exact.
@@ -69,7 +67,7 @@ def stiffness(system: flexmb.System, speed: float = 0.0) -> Array:
     return np.array(columns).T
 
 
-def clamped(beam: SceneBuilder) -> Array:
+def clamped(beam: SceneBuilder) -> Real:
     """Stiffness of the beam with its root welded to the ground."""
     return stiffness(flexmb.compile(beam.weld("clamp", "ground", "beam").scene()))
 
@@ -126,7 +124,7 @@ def spinning(modes: int, elements: int, plane: str, level: s.Level = "stiffened"
     return flexmb.compile(beam.revolute("hub", "ground", "beam", axis=(0.0, 0.0, 1.0)).scene())
 
 
-def frequencies(system: flexmb.System, speed: float) -> Array:
+def frequencies(system: flexmb.System, speed: float) -> Real:
     """Of the modes at prescribed spin. One plane has no gyroscopic coupling; modal masses are 1."""
     return np.sqrt(eigh(stiffness(system, speed), eigvals_only=True)[:3])
 
@@ -198,7 +196,7 @@ def test_half_of_a_free_beam_is_a_hinged_one():
         assert np.min(np.abs(odd - omega)) < 2e-4 * omega
 
 
-def oscillations(scene: SceneBuilder) -> Array:
+def oscillations(scene: SceneBuilder) -> Real:
     """Angular frequencies above zero of motions about the steady one, which place and attitude do not matter to."""
     system = flexmb.compile(scene.scene())
     state, n = system.initial_state, system.nq + system.nu + 1

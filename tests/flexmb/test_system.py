@@ -15,7 +15,7 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
-from flexmb.system import System
+from flexmb.system.system import System
 from tests import trees
 from tests.bounds import algebra, relative
 
@@ -138,7 +138,7 @@ from dataclasses import fields
 from types import SimpleNamespace
 import numba
 import numpy as np
-import flexmb.kernel
+import flexmb.jit.kernel
 
 numba.config.DISABLE_JIT = 1  # from here on: the package refuses to be without its compiler
 import flexmb

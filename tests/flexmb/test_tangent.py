@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import dynamics
 from flexmb.dense import DenseSystem
+from flexmb.entry import articulated
+from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.status import Status
-from flexmb.tangent import jacobian, tangent_workspace, time_derivative
+from flexmb.tables.status import Status
 from tests import trees
 from tests.bounds import UNIT_ROUNDOFF, algebra
 
@@ -47,7 +47,7 @@ def linearised(scene, t: float = 0.0) -> Linearised:
 
 def right_side(system: flexmb.System, t: float, y: np.ndarray) -> np.ndarray:
     dy = np.empty_like(y)
-    assert dynamics.rhs(t, y, dy, system.constants, system.workspace()) == Status.OK
+    assert articulated.rhs(t, y, dy, system.constants, system.workspace()) == Status.OK
     return dy
 
 

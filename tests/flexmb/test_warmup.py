@@ -5,13 +5,13 @@ import sys
 
 import pytest
 
-from flexmb.warmup import main, warm_up
+from flexmb.run.warm_up import main, warm_up
 
 # Compiled versions of every function of the package, before and after the scenes of the tests are run.
 PROBE = """
 import gc, sys
 import flexmb as fm
-from flexmb.warmup import main
+from flexmb.run.warm_up import main
 from tests.flexmb.warmed import SCENES
 
 def compiled():

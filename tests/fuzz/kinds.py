@@ -21,17 +21,17 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from crosscheck.case import CaseError
-from crosscheck.columns import VerifyError, read_columns
-from crosscheck.execute import execute
-from crosscheck.library import load_case
-from crosscheck.plan import plan
-from crosscheck.records import Packed, RunRecord, environment, read
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import load_case
+from crosscheck.records.records import Packed, RunRecord, environment, read
 from crosscheck.report import write_all
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import plan
 from crosscheck.stability import records as maps
 from crosscheck.stability.console import read_verdicts
 from crosscheck.stability.judge import MapVerdict
 from crosscheck.stability.map import Axis
+from crosscheck.verify.columns import VerifyError, read_columns
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import dumps, load_scene, loads
 from flexmb.scene.modal_data import modal_arrays

@@ -12,7 +12,7 @@ import msgspec
 import numpy as np
 import pytest
 
-from crosscheck.columns import Columns
+from crosscheck.verify.columns import Columns
 from tests.fuzz import kinds as subject
 from tests.fuzz.campaign import campaign, table
 from tests.fuzz.worker import BAD, content, read

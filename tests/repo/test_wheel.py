@@ -16,7 +16,7 @@ import pathlib, sys
 wheel = pathlib.Path(sys.argv[1])
 sys.path.insert(0, str(wheel))
 import crosscheck.cli, flexmb
-from crosscheck.library import shipped_cases, shipped_folder
+from crosscheck.library.find import shipped_cases, shipped_folder
 assert pathlib.Path(flexmb.__file__).is_relative_to(wheel), flexmb.__file__
 assert shipped_folder().is_relative_to(wheel), shipped_folder()
 print(*sorted(case.name for case in shipped_cases()))

@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import Frame, frame, rotation_matrix
 from crosscheck.engines.exudyn import joints
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
@@ -32,6 +31,7 @@ from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
+from flexmb.typing import Real
 
 X, Y, Z = np.eye(3)
 CROSS_ARM = 0.01
@@ -48,10 +48,10 @@ class Placed:
     body: Body
     carrier: Carrier
     motion: Motion
-    eta: Array = field(default_factory=lambda: np.zeros(0))
-    rate: Array = field(default_factory=lambda: np.zeros(0))
+    eta: Real = field(default_factory=lambda: np.zeros(0))
+    rate: Real = field(default_factory=lambda: np.zeros(0))
     crosses: dict[str, list[int]] = field(default_factory=dict)
-    reach: Array = field(default_factory=lambda: np.zeros(0))
+    reach: Real = field(default_factory=lambda: np.zeros(0))
 
     def shape(self, node: str) -> NodeShape:
         """A node in Exudyn axes."""
@@ -87,7 +87,7 @@ class Assembly:
         stages = [stage for link in self.links.values() for stage in link.stages]
         return [(stage.constraint, stage.prescribed) for stage in stages if stage.constraint is not None]
 
-    def deflection_measures(self) -> list[tuple[slice, Array]]:
+    def deflection_measures(self) -> list[tuple[slice, Real]]:
         """Where the modal coordinates are among the coordinates, and how far each reaches, for every flexible body."""
         found = []
         for placed in self.bodies.values():
@@ -192,7 +192,7 @@ def _attach(
     return link, found[0]
 
 
-def _steps(hinge: Hinge) -> list[tuple[Array, joints.Coordinate]]:
+def _steps(hinge: Hinge) -> list[tuple[Real, joints.Coordinate]]:
     """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
     match hinge:
         case Revolute() | Prismatic() | Cylindrical():
@@ -207,7 +207,7 @@ def _steps(hinge: Hinge) -> list[tuple[Array, joints.Coordinate]]:
 
 
 def _place(
-    shop: Workshop, scene: Scene, body: Body, hinge: Hinge, hinge_motion: Motion, zero: Array, held: set[str]
+    shop: Workshop, scene: Scene, body: Body, hinge: Hinge, hinge_motion: Motion, zero: Real, held: set[str]
 ) -> Placed:
     """The carrier of a body, from the motion of its outboard hinge frame."""
     fixed = frame(hinge.child_position_m, hinge.child_quaternion).inverse()
@@ -228,13 +228,13 @@ def _place(
     return Placed(body, carrier, motion, eta, rate, crosses, _reach(body))
 
 
-def _reach(body: ModalBody) -> Array:
+def _reach(body: ModalBody) -> Real:
     arrays = modal_arrays(body)
     length = np.linalg.norm(np.ptp(arrays.position, axis=0))
     return np.linalg.norm(arrays.translation_modes, axis=1).max(axis=0) / length
 
 
-def _modal_state(scene: Scene, body: ModalBody) -> tuple[Array, Array]:
+def _modal_state(scene: Scene, body: ModalBody) -> tuple[Real, Real]:
     count = modal_arrays(body).translation_modes.shape[2]
     for state in scene.modal_states:
         if state.body == body.name:
@@ -242,7 +242,7 @@ def _modal_state(scene: Scene, body: ModalBody) -> tuple[Array, Array]:
     return np.zeros(count), np.zeros(count)
 
 
-def _cross(shape: NodeShape) -> list[Array]:
+def _cross(shape: NodeShape) -> list[Real]:
     """Four mesh points [position, modes] (3, 1+m) about a node, in its y-z plane, moving as its section does."""
     found = []
     for arm in (Y, Z, -Y, -Z):
@@ -344,6 +344,6 @@ def _load(shop: Workshop, parent: Placed, load: Load) -> None:
     )  # fmt: skip
 
 
-def _unit(axis: tuple[float, float, float]) -> Array:
+def _unit(axis: tuple[float, float, float]) -> Real:
     vector = np.array(axis)
     return vector / np.linalg.norm(vector)

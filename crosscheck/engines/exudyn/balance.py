@@ -5,18 +5,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.carriers import Carrier
 from crosscheck.engines.exudyn.joints import Stage
 from crosscheck.engines.exudyn.motion import initial
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
+from flexmb.typing import Real
 
 Paths = dict[int, CarrierPath]
 
 
-def energy_and_momentum(assembly: Assembly, states: States, paths: Paths) -> tuple[dict[str, Array], Array]:
+def energy_and_momentum(assembly: Assembly, states: States, paths: Paths) -> tuple[dict[str, Real], Real]:
     """Energies (T,) of each kind, and momentum (T,6) [angular about the World origin; linear]."""
     T = len(states.times)
     energy = {kind: np.zeros(T) for kind in ("kinetic", "strain", "spring", "gravity")}
@@ -43,7 +43,7 @@ def energy_and_momentum(assembly: Assembly, states: States, paths: Paths) -> tup
     return energy, momentum
 
 
-def coordinate(stage: Stage, paths: Paths) -> Array:
+def coordinate(stage: Stage, paths: Paths) -> Real:
     """(T,) value of a scalar joint coordinate; an angle is continued from its value at t = 0."""
     a, b = paths[stage.inboard.key], paths[stage.outboard.key]
     if not stage.angular:
@@ -53,11 +53,11 @@ def coordinate(stage: Stage, paths: Paths) -> Array:
     return np.unwrap(np.concatenate([[initial(stage.coordinate)[0]], vector]))[1:]
 
 
-def _relative(a: CarrierPath, b: CarrierPath) -> Array:
+def _relative(a: CarrierPath, b: CarrierPath) -> Real:
     return np.einsum("tji,tjk->tik", a.rotation, b.rotation)
 
 
-def _rigid(carrier: Carrier, path: CarrierPath) -> tuple[Array, Array, Array, Array]:
+def _rigid(carrier: Carrier, path: CarrierPath) -> tuple[Real, Real, Real, Real]:
     """Kinetic energy (T,), linear momentum (T,3), angular momentum about the origin (T,3), mass times centre (T,3)."""
     m, J = carrier.inertia.mass, carrier.inertia.inertia
     arm = path.rotation @ carrier.inertia.com
@@ -67,7 +67,7 @@ def _rigid(carrier: Carrier, path: CarrierPath) -> tuple[Array, Array, Array, Ar
     return kinetic, m * velocity, spin + np.cross(arm, m * velocity), m * (path.position + arm)
 
 
-def _flexible(assembly: Assembly, carrier: Carrier, path: CarrierPath, states: States) -> tuple[Array, ...]:
+def _flexible(assembly: Assembly, carrier: Carrier, path: CarrierPath, states: States) -> tuple[Real, ...]:
     """The same for a floating frame, with the conjugate momenta p = M v of Exudyn's mass matrix."""
     mbs, kind = assembly.shop.mbs, assembly.shop.exu.ComputeItemType.MassMatrix
     columns = np.array(mbs.systemData.GetObjectLTGODE2(carrier.flexible))

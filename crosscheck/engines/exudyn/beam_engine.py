@@ -6,17 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from crosscheck.engines.contract import (
-    Array,
-    Effort,
-    MarkerPath,
-    MarkerSnapshot,
-    Model,
-    Run,
-    Snapshot,
-    Support,
-    Trajectory,
-)
+from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Model, Run, Snapshot, Support, Trajectory
 from crosscheck.engines.exudyn import library
 from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign, root_frame
 from crosscheck.engines.exudyn.kkt import initial_state
@@ -25,6 +15,7 @@ from crosscheck.engines.exudyn.state import States
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
+from flexmb.typing import Real
 
 STEPS = (1e-2, 5e-3, 2.5e-3)
 """Steps (s) that follow the bending of a boom turning at a few rad/s; its axial vibrations are stepped over."""
@@ -138,23 +129,23 @@ class BeamModel:
             evaluations=solution.evaluations,
         )  # fmt: skip
 
-    def _multiplier(self, states: States, hold: int) -> Array:
+    def _multiplier(self, states: States, hold: int) -> Real:
         return states.multipliers[:, self.beam.shop.mbs.systemData.GetObjectLTGAE(self.beam.holds[hold])[0]]
 
-    def _loads(self, states: States) -> dict[str, Array]:
+    def _loads(self, states: States) -> dict[str, Real]:
         """(T,6) [torque; force] on the beam about the hinge point: what holds the massless hub."""
         load = np.zeros((len(states.times), 6))
         for hold, column in zip(range(len(self.beam.holds)), (3, 4, 2), strict=False):
             load[:, column] = -self._multiplier(states, hold)
         return {self.beam.scene.hinges[0].name: load}
 
-    def _drives(self, states: States) -> dict[str, Array]:
+    def _drives(self, states: States) -> dict[str, Real]:
         hinge = self.beam.scene.hinges[0]
         if not self.beam.prescribed:
             return {}
         return {hinge.name: -axis_sign(hinge) * self._multiplier(states, 2)[:, None]}
 
-    def _marker(self, marker: Marker, states: States) -> tuple[MarkerPath, Array]:
+    def _marker(self, marker: Marker, states: States) -> tuple[MarkerPath, Real]:
         """Motion of a section plus offset, and its spatial acceleration (T,6), zeros where the states have none."""
         beam, T = self.beam, len(states.times)
         rest = node_frame(beam.scene.bodies[0], marker.node)
@@ -183,7 +174,7 @@ class BeamModel:
         quaternion = np.column_stack([np.cos(angle / 2.0), zero, zero, np.sin(angle / 2.0)])
         return MarkerPath(position, quaternion, velocity), acceleration
 
-    def _turn(self, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+    def _turn(self, q: Real, v: Real, a: Real) -> tuple[Real, Real, Real]:
         """Angle of the section (rad), its rate and acceleration."""
         if self.beam.sheared:
             return q[:, 2], v[:, 2], a[:, 2]
@@ -194,6 +185,6 @@ class BeamModel:
         return np.unwrap(np.arctan2(s[:, 1], s[:, 0])), rate, second
 
 
-def _cross(a: Array, b: Array) -> Array:
+def _cross(a: Real, b: Real) -> Real:
     """z component of a x b for (T,2) vectors."""
     return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]

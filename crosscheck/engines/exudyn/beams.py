@@ -13,7 +13,6 @@ from math import cos, sin
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import Frame, frame
 from crosscheck.engines.exudyn.carriers import Workshop
 from crosscheck.engines.exudyn.motion import initial
@@ -22,6 +21,7 @@ from flexmb.scene.functions import Function
 from flexmb.scene.hinges import Hinge, Planar, Revolute
 from flexmb.scene.schema import BeamBody, Load, Scene
 from flexmb.scene.tree import node_frame
+from flexmb.typing import Real
 
 SECTION_KEYS = ("EA_N", "EIz_Nm2", "mass_per_length_kg_m", "rotary_z_kg_m")
 JUMP_WINDOW = 1e-9
@@ -38,14 +38,14 @@ class PlanarBeam:
     scene: Scene
     shop: Workshop
     sheared: bool
-    stations: Array
+    stations: Real
     nodes: tuple[int, ...]
     holds: tuple[int, ...]
     prescribed: list[tuple[int, Callable[[float], Profile]]]
     height: float
     sampler: int
 
-    def deflection_measures(self) -> list[tuple[slice, Array]]:
+    def deflection_measures(self) -> list[tuple[slice, Real]]:
         """Large deflections are what these elements are for."""
         return []
 
@@ -81,12 +81,12 @@ def root_frame(beam: BeamBody, hinge: Hinge) -> Frame:
 class _Root:
     """The root at t = 0: position (3,) m, velocity (2,) m/s, angle (rad) of the axis against World x, its rate."""
 
-    position: Array
-    velocity: Array
+    position: Real
+    velocity: Real
     angle: float
     rate: float
 
-    def moved(self, x: float) -> tuple[Array, Array, Array, Array]:
+    def moved(self, x: float) -> tuple[Real, Real, Real, Real]:
         """Position, velocity, axis and rate of the axis, each (2,), of the section at x (m) of the straight beam."""
         along, across = np.array([cos(self.angle), sin(self.angle)]), np.array([-sin(self.angle), cos(self.angle)])
         return (
@@ -187,12 +187,12 @@ def _halved_at_jumps(function: Function) -> Callable[[float], float]:
     return value
 
 
-def _nearest(stations: Array, beam: BeamBody, node: str) -> int:
+def _nearest(stations: Real, beam: BeamBody, node: str) -> int:
     """The station (number) of a node of the beam."""
     return int(np.argmin(np.abs(stations - node_frame(beam, node).position[0])))
 
 
-def _stations(scene: Scene, beam: BeamBody, elements: int) -> Array:
+def _stations(scene: Scene, beam: BeamBody, elements: int) -> Real:
     """Ends of the elements: a uniform grid, and wherever a marker or a load is."""
     marked = [node_frame(beam, item.node).position[0] for item in (*scene.markers, *scene.loads)]
     grid = np.linspace(0.0, beam.length_m, elements + 1)
@@ -205,7 +205,7 @@ def section(beam: BeamBody, x: float, key: str) -> float:
     return float(np.interp(x, [s.x_m for s in beam.stations], [getattr(s, key) for s in beam.stations]))
 
 
-def _cable(shop: Workshop, beam: BeamBody, stations: Array, root: _Root) -> tuple[int, ...]:
+def _cable(shop: Workshop, beam: BeamBody, stations: Real, root: _Root) -> tuple[int, ...]:
     nodes = []
     for x in stations:
         position, velocity, along, turning = root.moved(x)
@@ -227,7 +227,7 @@ def _cable(shop: Workshop, beam: BeamBody, stations: Array, root: _Root) -> tupl
     return tuple(nodes)
 
 
-def _geometrically_exact(shop: Workshop, beam: BeamBody, stations: Array, root: _Root) -> tuple[int, ...]:
+def _geometrically_exact(shop: Workshop, beam: BeamBody, stations: Real, root: _Root) -> tuple[int, ...]:
     def node(x: float) -> int:
         position, velocity, _, _ = root.moved(x)
         return shop.mbs.AddNode(

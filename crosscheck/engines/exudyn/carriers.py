@@ -13,13 +13,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.exudyn.library import load, matrix
 from crosscheck.engines.exudyn.modal import ModalIntegrals, gravity_force
 from crosscheck.engines.exudyn.motion import Motion
 from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, turn_and_rate_map
 from flexmb.surrogate.lumping import Inertia, steiner
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class Carrier:
 
     item: int
     node: int
-    zero: Array
+    zero: Real
     inertia: Inertia | None = None
     flexible: int | None = None
     modes: int | None = None
@@ -51,7 +51,7 @@ class Workshop:
     Gravity acts on every carrier with mass as it is added.
     """
 
-    gravity: Array
+    gravity: Real
     explicit: bool
     exu: Any = field(init=False)
     items: Any = field(init=False)
@@ -69,7 +69,7 @@ class Workshop:
             self.items.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(self.items.NodePointGround()), coordinate=0)
         )
 
-    def rigid(self, motion: Motion, zero: Array, inertia: Inertia | None) -> Carrier:
+    def rigid(self, motion: Motion, zero: Real, inertia: Inertia | None) -> Carrier:
         """A rigid body, or a massless frame; `motion` of its scene frame, `inertia` in scene body axes."""
         node = self._node(motion, zero)
         if inertia is None:
@@ -88,7 +88,7 @@ class Workshop:
         return Carrier(item, node, zero, own)
 
     def flexible(
-        self, motion: Motion, zero: Array, data: ModalIntegrals, eta: Array, rate: Array, crosses: list[Array]
+        self, motion: Motion, zero: Real, data: ModalIntegrals, eta: Real, rate: Real, crosses: list[Real]
     ) -> Carrier:
         """A floating frame with modal coordinates, and a massless rigid body on the same node for joints to hold.
 
@@ -119,7 +119,7 @@ class Workshop:
             held = self.mbs.AddObject(self.items.ObjectRigidBody(nodeNumber=node, mass=0.0, inertia=[0.0] * 6))
         return Carrier(held, node, zero, None, item, modes, data)
 
-    def marker(self, carrier: Carrier, position: Array, rotation: Array | None = None) -> int:
+    def marker(self, carrier: Carrier, position: Real, rotation: Real | None = None) -> int:
         """A marker at `position` on a carrier, its axes turned by `rotation` (both in Exudyn axes)."""
         turned = np.eye(3) if rotation is None else rotation
         frame = self.exu.HT(rotation=turned, translation=position)
@@ -131,7 +131,7 @@ class Workshop:
             self.items.NodeGenericData(initialCoordinates=[angle], numberOfDataCoordinates=1)
         )
 
-    def _node(self, motion: Motion, zero: Array) -> int:
+    def _node(self, motion: Motion, zero: Real) -> int:
         A = motion.rotation @ zero.T
         local = A.T @ motion.angular
         if self.explicit:
@@ -171,6 +171,6 @@ class Workshop:
         return weight
 
 
-def _six(J: Array) -> list[float]:
+def _six(J: Real) -> list[float]:
     """Exudyn's order [xx, yy, zz, yz, xz, xy] of a symmetric tensor."""
     return [J[0, 0], J[1, 1], J[2, 2], J[1, 2], J[0, 2], J[0, 1]]

@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.motion import Motion, across, across_quaternion, initial
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Spherical
+from flexmb.typing import Real
 
 Coordinate = AngularCoordinate | LinearCoordinate
 Outboard = Callable[[Motion], Carrier]
@@ -27,8 +27,8 @@ class Port:
     """An inboard hinge frame: `position` (3,) on its carrier in Exudyn axes, `zero` (3,3) hinge -> Exudyn axes."""
 
     carrier: Carrier
-    position: Array
-    zero: Array
+    position: Real
+    zero: Real
     motion: Motion
 
 
@@ -40,11 +40,11 @@ class Stage:
     """
 
     angular: bool
-    axis: Array
+    axis: Real
     inboard: Carrier
-    inboard_point: Array
+    inboard_point: Real
     outboard: Carrier
-    outboard_point: Array
+    outboard_point: Real
     coordinate: Coordinate
     motor: Callable[[float], Profile] | None
     prescribed: Callable[[float], Profile] | None
@@ -79,7 +79,7 @@ def free(name: str) -> Link:
     return Link(name, (), (), None)
 
 
-def weld(shop: Workshop, name: str, port: Port, make: Outboard, point: Array) -> tuple[Link, Carrier]:
+def weld(shop: Workshop, name: str, port: Port, make: Outboard, point: Real) -> tuple[Link, Carrier]:
     """Rigid connection; `point` (3,) is the hinge point on the outboard carrier, in Exudyn axes."""
     carrier = make(port.motion)
     markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
@@ -87,7 +87,7 @@ def weld(shop: Workshop, name: str, port: Port, make: Outboard, point: Array) ->
     return Link(name, (), ((joint, True),), markers[1]), carrier
 
 
-def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, point: Array) -> tuple[Link, Carrier]:
+def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, point: Real) -> tuple[Link, Carrier]:
     """Ball joint, with the isotropic spring and damper of the scene."""
     carrier = make(across_quaternion(port.motion, hinge))
     markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
@@ -114,7 +114,7 @@ CONSTRAINED = {
 """Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
 
 
-def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: Array) -> Link:
+def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: Real) -> Link:
     """A joint of some kind between two ports; `axis` (3,) has the same components in both frames."""
     turn = np.eye(3) if kind in ("universal", "planar", "weld", "spherical") else _axes_with(axis, 2)
     markers = [shop.marker(port.carrier, port.position, port.zero @ turn) for port in ports]
@@ -129,7 +129,7 @@ def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: A
 
 
 def chain(
-    shop: Workshop, name: str, port: Port, steps: Sequence[tuple[Array, Coordinate]], make: Outboard, point: Array
+    shop: Workshop, name: str, port: Port, steps: Sequence[tuple[Real, Coordinate]], make: Outboard, point: Real
 ) -> tuple[Link, Carrier]:
     """One joint for each (axis in the hinge frame, coordinate), in order from the inboard side."""
     stages, connectors, markers = [], [], [0, 0]
@@ -155,7 +155,7 @@ def chain(
     return Link(name, tuple(stages), tuple(connectors), markers[1]), inboard
 
 
-def _markers(shop: Workshop, a: Carrier, p: Array, b: Carrier, q: Array, axis: Array, coordinate: Coordinate) -> list:
+def _markers(shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate) -> list:
     """Markers on both sides with the axis along z (revolute) or x (prismatic), as Exudyn's joints want it."""
     axes = _axes_with(axis, 2 if isinstance(coordinate, AngularCoordinate) else 0)
     return [shop.marker(a, p, axes), shop.marker(b, q, axes)]
@@ -200,7 +200,7 @@ def _motor(shop: Workshop, markers: list[int], coordinate: Coordinate) -> Callab
 
 
 def _prescribed(
-    shop: Workshop, a: Carrier, p: Array, b: Carrier, q: Array, axis: Array, coordinate: Coordinate
+    shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate
 ) -> tuple[Callable[[float], Profile] | None, int | None]:
     """A constraint that makes the relative coordinate follow its function of time."""
     angular = isinstance(coordinate, AngularCoordinate)
@@ -221,7 +221,7 @@ def _prescribed(
     return f, shop.mbs.AddObject(constraint)
 
 
-def _axes_with(axis: Array, column: int) -> Array:
+def _axes_with(axis: Real, column: int) -> Real:
     """A rotation (3,3) with `axis` as its column number `column`."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     second = np.cross(axis, helper)

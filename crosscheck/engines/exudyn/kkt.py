@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
 from crosscheck.engines.exudyn.rotations import local_rate_map
 from crosscheck.engines.exudyn.state import States
+from flexmb.typing import Real
 
 _DISTANCE = 1e-3
 """Largest change of a coordinate in the differences along the velocity.
@@ -42,7 +42,7 @@ def initial_state(assembly: Assembly | PlanarBeam) -> States:
     solver.ComputeODE2RHS(mbs)
     f = np.array(solver.GetSystemResidual())[:n]
 
-    def jacobian(at: Array) -> Array:
+    def jacobian(at: Real) -> Real:
         data.SetODE2Coordinates(at)
         solver.SetSystemJacobian(np.zeros((n + k, n + k)))
         solver.ComputeJacobianAE(mbs, velocityLevel=False)
@@ -64,7 +64,7 @@ def initial_state(assembly: Assembly | PlanarBeam) -> States:
     return States(np.zeros(1), q[None], v[None], a[None], multipliers[None], stored[None])
 
 
-def _prescribed_accelerations(assembly: Assembly | PlanarBeam, size: int) -> Array:
+def _prescribed_accelerations(assembly: Assembly | PlanarBeam, size: int) -> Real:
     """Second derivatives of the offsets in the rows of their constraints (coordinate - offset = 0)."""
     found = np.zeros(size)
     for constraint, profile in assembly.prescribed:
@@ -72,7 +72,7 @@ def _prescribed_accelerations(assembly: Assembly | PlanarBeam, size: int) -> Arr
     return found
 
 
-def body_mass_matrix(assembly: Assembly, body: str) -> Array:
+def body_mass_matrix(assembly: Assembly, body: str) -> Real:
     """Mass matrix (m+6, m+6) of a flexible body in its initial state, [modes; angular; linear] in scene body axes.
 
     Exudyn's matrix for [World position, rotation coordinates, modes] by congruence with the map from these speeds.

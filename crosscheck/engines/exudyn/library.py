@@ -9,7 +9,8 @@ from types import ModuleType
 
 import numpy as np
 
-from crosscheck.engines.contract import Array, EngineMissing
+from crosscheck.engines.contract import EngineMissing
+from flexmb.typing import Real
 
 REMEDY = "Exudyn is not installed: `pip install flexmb[peers]`"
 
@@ -36,7 +37,7 @@ def version() -> str:
         raise EngineMissing(REMEDY) from error
 
 
-def matrix(values: Array):
+def matrix(values: Real):
     """A dense matrix as Exudyn's MatrixContainer."""
     container = load().MatrixContainer()
     container.SetWithDenseMatrix(np.asarray(values, dtype=float), useDenseMatrix=True)

@@ -4,25 +4,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.contract import Array, MarkerPath, MarkerSnapshot
+from crosscheck.engines.contract import MarkerPath, MarkerSnapshot
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.rotations import exponential, left_jacobian, left_jacobian_rate, quaternions
 from crosscheck.engines.exudyn.state import CarrierPath
+from flexmb.typing import Real
 
 
-def marker_path(path: CarrierPath, shape: NodeShape, offset: Array) -> MarkerPath:
+def marker_path(path: CarrierPath, shape: NodeShape, offset: Real) -> MarkerPath:
     """The frame at a node (in Exudyn axes) plus `offset` (3,) in node axes, over all samples."""
     position, rotation, velocity, _ = _motion(path, shape, offset)
     return MarkerPath(position, quaternions(rotation), velocity)
 
 
-def marker_snapshot(path: CarrierPath, shape: NodeShape, offset: Array) -> MarkerSnapshot:
+def marker_snapshot(path: CarrierPath, shape: NodeShape, offset: Real) -> MarkerSnapshot:
     """The same at the first sample, with accelerations."""
     position, rotation, velocity, acceleration = _motion(path, shape, offset)
     return MarkerSnapshot(position[0], quaternions(rotation)[0], velocity[0], acceleration[0])
 
 
-def _motion(path: CarrierPath, shape: NodeShape, offset: Array) -> tuple[Array, Array, Array, Array | None]:
+def _motion(path: CarrierPath, shape: NodeShape, offset: Real) -> tuple[Real, Real, Real, Real | None]:
     A, w = path.rotation, path.omega
     theta, theta_rate = path.eta @ shape.rotation_modes.T, path.eta_rate @ shape.rotation_modes.T
     E, J = exponential(theta), left_jacobian(theta)
@@ -51,6 +52,6 @@ def _motion(path: CarrierPath, shape: NodeShape, offset: Array) -> tuple[Array, 
     return position, A @ E @ shape.rotation, velocity, np.concatenate([angular, classical], axis=1)
 
 
-def _times(A: Array, b: Array) -> Array:
+def _times(A: Real, b: Real) -> Real:
     """(T,3,3) times (T,3)."""
     return np.einsum("tij,tj->ti", A, b)

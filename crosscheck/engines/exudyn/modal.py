@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import cross_matrix, rotation_matrix
 from crosscheck.engines.exudyn.rotations import cross_matrices
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import ModalBody
 from flexmb.scene.tree import node_frame
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
 class NodeShape:
     """A node in some body axes: `position` (3,) m, `rotation` (3,3) node -> body at rest, mode shapes (3, m)."""
 
-    position: Array
-    rotation: Array
-    translation: Array
-    rotation_modes: Array
+    position: Real
+    rotation: Real
+    translation: Real
+    rotation_modes: Real
 
     @property
     def deforms(self) -> bool:
@@ -29,7 +29,7 @@ class NodeShape:
         return bool(np.any(self.translation) or np.any(self.rotation_modes))
 
 
-def node_shape(body: ModalBody, name: str, axes: Array) -> NodeShape:
+def node_shape(body: ModalBody, name: str, axes: Real) -> NodeShape:
     """Node `name` in the axes `axes` @ (body axes). The implicit origin of a clamped body has zero shapes."""
     rest = node_frame(body, name)
     translation = rotation = np.zeros((3, modal_arrays(body).translation_modes.shape[2]))
@@ -52,20 +52,20 @@ class ModalIntegrals:
     """
 
     mass: float
-    first: Array
-    inertia: Array
-    shape: Array
-    shape_cross: Array
-    position_shape: Array
-    position_cross: Array
-    cross_shape: Array
-    cross_cross: Array
-    modal: Array
-    stiffness: Array
-    damping: Array
+    first: Real
+    inertia: Real
+    shape: Real
+    shape_cross: Real
+    position_shape: Real
+    position_cross: Real
+    cross_shape: Real
+    cross_cross: Real
+    modal: Real
+    stiffness: Real
+    damping: Real
 
 
-def integrals(body: ModalBody, axes: Array) -> ModalIntegrals:
+def integrals(body: ModalBody, axes: Real) -> ModalIntegrals:
     """Integrals of a body without rotary inertia of its points, in the axes `axes` @ (body axes)."""
     arrays = modal_arrays(body)
     m, r = arrays.mass, arrays.position @ axes.T
@@ -74,7 +74,7 @@ def integrals(body: ModalBody, axes: Array) -> ModalIntegrals:
     crosses = np.moveaxis(cross_matrices(np.moveaxis(Phi, 2, 1)), 1, 2)  # (points, 3, modes, 3)
     row = crosses.reshape(len(m), 3, -1)
 
-    def total(a: Array, b: Array) -> Array:
+    def total(a: Real, b: Real) -> Real:
         """sum m a'b."""
         return np.einsum("p,pki,pkj->ij", m, a, b)
 
@@ -87,7 +87,7 @@ def integrals(body: ModalBody, axes: Array) -> ModalIntegrals:
     )  # fmt: skip
 
 
-def gravity_force(data: ModalIntegrals, g: Array, A: Array, rate_map: Array, eta: Array) -> Array:
+def gravity_force(data: ModalIntegrals, g: Real, A: Real, rate_map: Real, eta: Real) -> Real:
     """Generalised weight [World force; rotation coordinates; modes] of the deformed body.
 
     Exudyn's own mass-proportional load leaves out the moment of the deformation, A skew(shape eta) G, so that energy

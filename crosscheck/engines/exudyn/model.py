@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.contract import Array, Effort, Run, Snapshot, Trajectory
+from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
@@ -14,6 +14,7 @@ from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import CarrierPath, States, carrier_path
 from crosscheck.engines.exudyn.wrench import drives, link_wrenches
 from flexmb.scene.schema import Marker, Scene
+from flexmb.typing import Real
 
 
 class ExudynModel:
@@ -68,7 +69,7 @@ class ExudynModel:
         """Hinges and closures, whose loads are outputs."""
         return [*self.assembly.hinges, *self.assembly.closures]
 
-    def mass_matrix(self, body: str | None = None) -> Array:
+    def mass_matrix(self, body: str | None = None) -> Real:
         """(m+6, m+6) of a flexible body, [modes; angular; linear] in its body axes; of the only one by default."""
         bending = [name for name, placed in self.assembly.bodies.items() if placed.carrier.flexible is not None]
         return body_mass_matrix(self.assembly, body or bending[0])
@@ -87,6 +88,6 @@ class ExudynModel:
 
     def _loads_and_balance(
         self, states: States, paths: dict[int, CarrierPath]
-    ) -> tuple[dict[str, Array], dict[str, Array], Array]:
+    ) -> tuple[dict[str, Real], dict[str, Real], Real]:
         loads = link_wrenches(self.assembly, states, paths)
         return loads, *energy_and_momentum(self.assembly, states, paths)

@@ -6,47 +6,47 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.conventions import axis_rotation, rotation_matrix
 from crosscheck.engines.exudyn.modal import NodeShape
 from crosscheck.engines.exudyn.rotations import exponential, left_jacobian
 from crosscheck.engines.functions_of_time import profile
 from flexmb.scene.hinges import AngularCoordinate, Free, LinearCoordinate, Spherical
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
 class Motion:
     """A frame in World: `position` (3,) m, `rotation` (3,3) to World; `angular` rad/s, `linear` m/s in World axes."""
 
-    position: Array
-    rotation: Array
-    angular: Array
-    linear: Array
+    position: Real
+    rotation: Real
+    angular: Real
+    linear: Real
 
-    def offset(self, position: Array, rotation: Array) -> Motion:
+    def offset(self, position: Real, rotation: Real) -> Motion:
         """A frame fixed in this one."""
         arm = self.rotation @ position
         return Motion(
             self.position + arm, self.rotation @ rotation, self.angular, self.linear + np.cross(self.angular, arm)
         )
 
-    def turned(self, axis: Array, angle: float, rate: float) -> Motion:
+    def turned(self, axis: Real, angle: float, rate: float) -> Motion:
         """This frame turned about its own unit `axis`."""
         spin = rate * (self.rotation @ axis)
         return Motion(self.position, self.rotation @ axis_rotation(axis, angle), self.angular + spin, self.linear)
 
-    def moved(self, displacement: Array, rate: Array) -> Motion:
+    def moved(self, displacement: Real, rate: Real) -> Motion:
         """This frame displaced by a vector in its own axes that changes at `rate`."""
         arm = self.rotation @ displacement
         velocity = self.linear + np.cross(self.angular, arm) + self.rotation @ rate
         return Motion(self.position + arm, self.rotation, self.angular, velocity)
 
-    def spherical(self, quaternion: Array, rate: Array) -> Motion:
+    def spherical(self, quaternion: Real, rate: Real) -> Motion:
         """This frame turned by `quaternion`, with the relative angular velocity `rate` in the turned axes."""
         rotation = self.rotation @ rotation_matrix(quaternion)
         return Motion(self.position, rotation, self.angular + rotation @ rate, self.linear)
 
-    def node(self, shape: NodeShape, eta: Array, rate: Array) -> Motion:
+    def node(self, shape: NodeShape, eta: Real, rate: Real) -> Motion:
         """A node of a flexible body whose frame this is; the node turns by exp(rotation_modes eta)."""
         theta, theta_rate = shape.rotation_modes @ eta, shape.rotation_modes @ rate
         moved = self.moved(shape.position + shape.translation @ eta, shape.translation @ rate)
@@ -78,7 +78,7 @@ def initial(coordinate: AngularCoordinate | LinearCoordinate) -> tuple[float, fl
             return start.value, start.rate
 
 
-def across(inboard: Motion, axis: Array, coordinate: AngularCoordinate | LinearCoordinate) -> Motion:
+def across(inboard: Motion, axis: Real, coordinate: AngularCoordinate | LinearCoordinate) -> Motion:
     """The frame beyond one scalar coordinate about or along `axis` (in the inboard frame)."""
     value, rate = initial(coordinate)
     if isinstance(coordinate, AngularCoordinate):

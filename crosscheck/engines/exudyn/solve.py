@@ -7,10 +7,11 @@ from time import perf_counter
 
 import numpy as np
 
-from crosscheck.engines.contract import Array, Effort, Status
+from crosscheck.engines.contract import Effort, Status
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.beams import PlanarBeam
 from crosscheck.engines.exudyn.state import States
+from flexmb.typing import Real
 
 IMPLICIT = ("TrapezoidalIndex2", "GeneralizedAlpha")
 EXPLICIT = "DOPRI5"
@@ -51,7 +52,7 @@ class Recorder:
 
     def __init__(self, assembly: Assembly | PlanarBeam) -> None:
         self.data = assembly.shop.mbs.systemData
-        self.rows: list[tuple[float, Array, Array, Array, Array]] = []
+        self.rows: list[tuple[float, Real, Real, Real, Real]] = []
 
     def take(self, t: float) -> None:
         data = self.data
@@ -70,7 +71,7 @@ class Recorder:
         return States(times, q, v, None, multipliers.reshape(count, -1), stored.reshape(count, -1))
 
 
-def integrate(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> Solution:
+def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> Solution:
     """Integrate from 0 through `times`; uniform sampling for the implicit solvers."""
     run = _fixed if effort.method in IMPLICIT + FIXED_EXPLICIT else _explicit
     start = perf_counter()
@@ -91,7 +92,7 @@ def _settings(assembly: Assembly | PlanarBeam):
     return settings
 
 
-def steps_between_samples(times: Array, step: float) -> int:
+def steps_between_samples(times: Real, step: float) -> int:
     """Number of steps between two samples: the power of two that makes them at most `step`.
 
     Powers of two keep the ratio of the real steps of two efforts at what their values say. ValueError where the samples
@@ -103,7 +104,7 @@ def steps_between_samples(times: Array, step: float) -> int:
     return 2 ** max(0, int(np.ceil(np.log2(gaps[0] / step) - 1e-9)))
 
 
-def _fixed(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
+def _fixed(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, int]:
     """A fixed-step run; a sensor takes the samples, which fall on steps."""
     for tolerance in NEWTON_TOLERANCES if effort.method in IMPLICIT else NEWTON_TOLERANCES[:1]:
         states, evaluations = _fixed_steps(assembly, times, effort, tolerance)
@@ -113,7 +114,7 @@ def _fixed(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tup
 
 
 def _fixed_steps(
-    assembly: Assembly | PlanarBeam, times: Array, effort: Effort, tolerance: float
+    assembly: Assembly | PlanarBeam, times: Real, effort: Effort, tolerance: float
 ) -> tuple[States, int]:
     shop = assembly.shop
     settings = _settings(assembly)
@@ -148,7 +149,7 @@ def _run(assembly: Assembly | PlanarBeam, settings, update: bool = False) -> boo
         return False
 
 
-def _explicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> tuple[States, int]:
+def _explicit(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> tuple[States, int]:
     """Error-controlled steps, restarted at every sample: the solver does not stop at output times by itself."""
     shop = assembly.shop
     data, initial = shop.mbs.systemData, shop.exu.ConfigurationType.Initial
@@ -178,7 +179,7 @@ def _explicit(assembly: Assembly | PlanarBeam, times: Array, effort: Effort) -> 
     return recorder.states(), 6 * steps
 
 
-def _good_samples(assembly: Assembly | PlanarBeam, states: States, times: Array) -> int:
+def _good_samples(assembly: Assembly | PlanarBeam, states: States, times: Real) -> int:
     """How many samples to keep: in time, finite, and with deflections that still mean something."""
     count = min(len(states.times), len(times))
     good = np.abs(states.times[:count] - times[:count]) < 1e-6 * times[-1]

@@ -6,22 +6,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.carriers import Carrier
 from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, matrices
+from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
 class States:
     """T samples: times (T,), coordinates, velocities and accelerations (T,n), multipliers (T,k), data coordinates."""
 
-    times: Array
-    q: Array
-    v: Array
-    a: Array | None
-    multipliers: Array
-    data: Array
+    times: Real
+    q: Real
+    v: Real
+    a: Real | None
+    multipliers: Real
+    data: Real
 
     def cut(self, count: int) -> States:
         """The first `count` samples."""
@@ -50,15 +50,15 @@ class CarrierPath:
     position, velocity, acceleration (T,3); rotation (T,3,3) to World; omega, alpha (T,3).
     """
 
-    position: Array
-    rotation: Array
-    velocity: Array
-    omega: Array
-    acceleration: Array | None
-    alpha: Array | None
-    eta: Array
-    eta_rate: Array
-    eta_acceleration: Array | None
+    position: Real
+    rotation: Real
+    velocity: Real
+    omega: Real
+    acceleration: Real | None
+    alpha: Real | None
+    eta: Real
+    eta_rate: Real
+    eta_acceleration: Real | None
 
 
 def carrier_path(assembly: Assembly, carrier: Carrier, states: States) -> CarrierPath:
@@ -91,13 +91,13 @@ def carrier_path(assembly: Assembly, carrier: Carrier, states: States) -> Carrie
     )  # fmt: skip
 
 
-def _modal(mbs, carrier: Carrier, values: Array, T: int) -> Array:
+def _modal(mbs, carrier: Carrier, values: Real, T: int) -> Real:
     if carrier.modes is None:
         return np.zeros((T, 0))
     first = mbs.GetNodeODE2Index(carrier.modes)
     return values[:, first : first + carrier.data.shape.shape[1]]
 
 
-def _turn(A: Array, local: Array) -> Array:
+def _turn(A: Real, local: Real) -> Real:
     """World components (T,3) of vectors in the axes A (T,3,3)."""
     return np.einsum("tij,tj->ti", A, local)

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.engines.contract import Array
 from crosscheck.engines.exudyn.assembly import Assembly
 from crosscheck.engines.exudyn.joints import Link, Stage
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
+from flexmb.typing import Real
 
 
-def link_wrenches(assembly: Assembly, states: States, paths: dict[int, CarrierPath]) -> dict[str, Array]:
+def link_wrenches(assembly: Assembly, states: States, paths: dict[int, CarrierPath]) -> dict[str, Real]:
     """(T,6) [torque; force] of every link on its outboard body about the hinge point, in World axes."""
     mbs, links = assembly.shop.mbs, assembly.links
     loads = {name: np.zeros((len(states.times), 6)) for name in links}
@@ -30,7 +30,7 @@ def link_wrenches(assembly: Assembly, states: States, paths: dict[int, CarrierPa
     return loads
 
 
-def drives(assembly: Assembly, states: States) -> dict[str, Array]:
+def drives(assembly: Assembly, states: States) -> dict[str, Real]:
     """(T,n) generalised load of every prescribed coordinate, by hinge, wheel or point mass."""
     data = assembly.shop.mbs.systemData
     found = {}
@@ -42,7 +42,7 @@ def drives(assembly: Assembly, states: States) -> dict[str, Array]:
     return found
 
 
-def _connector_wrench(assembly: Assembly, link: Link) -> Array:
+def _connector_wrench(assembly: Assembly, link: Link) -> Real:
     """[torque; force] at the link's outboard marker: least-squares solution of J' [force; torque] = -C' multiplier."""
     mbs, kinds = assembly.shop.mbs, assembly.shop.exu.ComputeItemType
     J = np.vstack(
@@ -57,7 +57,7 @@ def _connector_wrench(assembly: Assembly, link: Link) -> Array:
     return np.roll(force_torque, 3)
 
 
-def _motor_wrench(stage: Stage, states: States, paths: dict[int, CarrierPath]) -> Array:
+def _motor_wrench(stage: Stage, states: States, paths: dict[int, CarrierPath]) -> Real:
     """(T,6) of the motor on the outboard side."""
     values = np.array([stage.motor(t).value for t in states.times])
     along = values[:, None] * (paths[stage.outboard.key].rotation @ stage.axis)

@@ -7,15 +7,13 @@ from contextlib import contextmanager
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
 from crosscheck.engines.mujoco.tree import ARMATURE, Slot, Tree
 from flexmb.scene.schema import Load, Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class Forces:
@@ -50,7 +48,7 @@ class Forces:
         for q, v, motion in self._motions:
             data.qpos[q], data.qvel[v], _ = motion(t)
 
-    def spring_energy(self, q: Array) -> float:
+    def spring_energy(self, q: Real) -> float:
         energy = 0.0
         for slot in self._tree.slots:
             match slot.freedom:

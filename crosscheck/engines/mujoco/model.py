@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
@@ -22,8 +21,7 @@ from crosscheck.engines.mujoco.observer import Observer
 from crosscheck.engines.mujoco.tree import Closed, build_tree, initial_state
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _INTEGRATORS = {  # by an effort's method: MuJoCo's number, and evaluations a step
     "RK4": (mujoco.mjtIntegrator.mjINT_RK4, 4),
@@ -109,7 +107,7 @@ class MujocoModel:
         data.qpos[:], data.qvel[:] = initial_state(self._tree)
         return data
 
-    def _integrate(self, times: Array, longest: float) -> tuple[list[tuple[Array, Array]], int, str]:
+    def _integrate(self, times: Real, longest: float) -> tuple[list[tuple[Real, Real]], int, str]:
         """(qpos, qvel) at the sample times reached, steps made, and why it stopped early.
 
         Samples and breaks of the functions of time cut the run into stretches of whole equal steps <= `longest`. At the

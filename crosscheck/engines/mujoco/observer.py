@@ -12,8 +12,7 @@ from crosscheck.engines.links import Attachment, attachment
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.tree import Closed, Tree
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class Observer:
@@ -54,16 +53,16 @@ class Observer:
             momentum=momentum,
         )
 
-    def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Array:
+    def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Real:
         """The points about which MuJoCo's spatial vectors of bodies are given."""
         return data.subtree_com[self._tree.model.body_rootid[bodies]]
 
-    def _loads(self, data: mujoco.MjData) -> Array:
+    def _loads(self, data: mujoco.MjData) -> Real:
         """[torque; force] (links, 6) on each link about its frame's origin, which is the outboard hinge point."""
         bodies = self._tree.bodies
         return shift_wrench(data.cfrc_int[bodies], self._pole(bodies, data) - data.xpos[bodies])
 
-    def _closed(self, data: mujoco.MjData) -> dict[str, Array]:
+    def _closed(self, data: mujoco.MjData) -> dict[str, Real]:
         """[torque; force] of every closure on body_b about frame B: along World's axes, of A less B."""
         rows = data.efc_type[: data.nefc] == mujoco.mjtConstraint.mjCNSTR_EQUALITY
         forces = data.efc_force[: data.nefc][rows].reshape(-1, 3)
@@ -88,7 +87,7 @@ class Observer:
             acceleration=np.concatenate([alpha, a]),
         )
 
-    def _motion(self, data: mujoco.MjData) -> tuple[float, Array]:
+    def _motion(self, data: mujoco.MjData) -> tuple[float, Real]:
         """Kinetic energy and momentum by summing bodies: MuJoCo's own energy would count the drives' armature."""
         model = self._tree.model
         pole = self._pole(np.arange(model.nbody), data)
@@ -101,7 +100,7 @@ class Observer:
         kinetic = 0.5 * (np.sum(p * v) + np.sum(model.body_inertia * spin**2))
         return float(kinetic), np.concatenate([np.sum(about_com + cross(data.xipos, p), axis=0), p.sum(axis=0)])
 
-    def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Array]) -> dict[str, Array]:
+    def _drives(self, data: mujoco.MjData, loads: dict[tuple[str, str], Real]) -> dict[str, Real]:
         """Load across the joint along the prescribed axis, less what spring and damper already give."""
         named: dict[str, list[float]] = {}
         for slot in self._forces.driven:

@@ -20,8 +20,7 @@ from numpy.typing import NDArray
 from crosscheck.engines.conventions import quaternion_of, rotation_matrix
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 ARMATURE = 1e20
 LEAST_INERTIA = 1e-14
@@ -58,7 +57,7 @@ class Tree:
     slots: tuple[Slot, ...]
 
 
-def build_tree(links: tuple[Link, ...], gravity: Array, closures: tuple[Closed, ...] = ()) -> Tree:
+def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[Closed, ...] = ()) -> Tree:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -86,7 +85,7 @@ def build_tree(links: tuple[Link, ...], gravity: Array, closures: tuple[Closed, 
     return Tree(model, links, ids, _slots(model, links, ids))
 
 
-def initial_state(tree: Tree) -> tuple[Array, Array]:
+def initial_state(tree: Tree) -> tuple[Real, Real]:
     """qpos and qvel at t = 0."""
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
@@ -150,7 +149,7 @@ def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.in
     return tuple(slots)
 
 
-def _principal(inertia: Array) -> tuple[Array, Array]:
+def _principal(inertia: Real) -> tuple[Real, Real]:
     """Principal moments (3,), none below `LEAST_INERTIA`, and right-handed axes (3,3) as columns."""
     moments, axes = np.linalg.eigh(inertia)
     axes[:, 2] *= np.sign(np.linalg.det(axes))

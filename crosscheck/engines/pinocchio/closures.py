@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import cross
 from crosscheck.engines.links import closed_frames
 from crosscheck.engines.pinocchio.tree import Tree, placement
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # Proximal iterations stop at a residual: absolute, relative, regularisation, the most iterations. Regularised by 1e-12,
 # loops without redundant closures converge in two or three.
@@ -43,14 +41,14 @@ class Closures:
     def __bool__(self) -> bool:
         return bool(self._names)
 
-    def solve(self, q: Array, v: Array, tau: Array) -> Array:
+    def solve(self, q: Real, v: Real, tau: Real) -> Real:
         """Accelerations (nv,) that keep the closures closed under generalised forces tau (nv,)."""
         found = pin.constraintDynamics(
             self._model, self._data, q, v, tau, self._constraints, self._found, self._settings
         )
         return np.array(found)
 
-    def loads(self) -> dict[str, Array]:
+    def loads(self) -> dict[str, Real]:
         """[torque; force] (6,) on body_b about frame B, World axes, of the state solved last."""
         return {name: np.concatenate(load) for name, (load, _) in zip(self._names, self._in_world(), strict=True)}
 
@@ -68,7 +66,7 @@ class Closures:
                 total[joint] = total[joint] + pin.Force(pose.rotation.T @ force, pose.rotation.T @ torque)
         return total
 
-    def _in_world(self) -> list[tuple[tuple[Array, Array], Array]]:
+    def _in_world(self) -> list[tuple[tuple[Real, Real], Real]]:
         """By closure (torque, force) on B, and where B is; Pinocchio's force is that on A, in its axes."""
         found = []
         for each in self._found:

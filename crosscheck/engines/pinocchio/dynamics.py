@@ -11,7 +11,6 @@ from typing import NamedTuple
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
 from crosscheck.engines.functions_of_time import profile
@@ -20,8 +19,7 @@ from crosscheck.engines.pinocchio.closures import Closures
 from crosscheck.engines.pinocchio.forces import JointForces, NodeLoads
 from crosscheck.engines.pinocchio.tree import Slot, Tree, initial_state
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 BALLAST = 1e20
 """kg m^2 or kg: so large that drive loads of any scene, divided by it, are below round-off of the accelerations."""
@@ -30,17 +28,17 @@ BALLAST = 1e20
 class Solution(NamedTuple):
     """Accelerations (nv,), loads of the driven coordinates (d,), power of drives, motors, dampers and loads (W)."""
 
-    acceleration: Array
-    drive: Array
+    acceleration: Real
+    drive: Real
     power: float
 
 
 class State(NamedTuple):
     """q (nq,) with unit quaternions, v (nv,), driven accelerations (d,)."""
 
-    q: Array
-    v: Array
-    driven: Array
+    q: Real
+    v: Real
+    driven: Real
 
 
 class Dynamics:
@@ -64,11 +62,11 @@ class Dynamics:
         self._scalar_v = np.array([slot.v for slot in scalars], dtype=np.intp)
         self._turning = [slot for slot in tree.slots if not isinstance(slot.freedom, Scalar)]
 
-    def initial(self) -> Array:
+    def initial(self) -> Real:
         q, v = initial_state(self.tree)
         return np.concatenate([q[self._free_q], v[self._free_v], [0.0]])
 
-    def state(self, t: float, y: Array) -> State:
+    def state(self, t: float, y: Real) -> State:
         q, v = np.empty(self.tree.model.nq), np.empty(self.tree.model.nv)
         split = len(self._free_q)
         q[self._free_q], v[self._free_v] = y[:split], y[split:-1]
@@ -104,17 +102,17 @@ class Dynamics:
             power += self.loads.power(t, self.data)
         return Solution(a, drive, float(power))
 
-    def inverse(self, state: State, acceleration: Array, wrenches: pin.StdVec_Force | None) -> Array:
+    def inverse(self, state: State, acceleration: Real, wrenches: pin.StdVec_Force | None) -> Real:
         """Generalised forces of the whole motion; leaves the joint wrenches in `data.f`."""
         extra = () if wrenches is None else (wrenches,)
         return pin.rnea(self.tree.model, self.data, state.q, state.v, acceleration, *extra)
 
-    def resolve_loads(self, t: float, state: State, acceleration: Array) -> None:
+    def resolve_loads(self, t: float, state: State, acceleration: Real) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
         wrenches = self.closures.on_joints() if self.closures else self._wrenches(t, state)
         self.inverse(state, acceleration, wrenches)
 
-    def rate(self, t: float, y: Array) -> Array:
+    def rate(self, t: float, y: Real) -> Real:
         """dy/dt."""
         state = self.state(t, y)
         solution = self.solve(t, state)
@@ -124,7 +122,7 @@ class Dynamics:
             self._turning_rate(slot, y, state, qdot)
         return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
 
-    def _turning_rate(self, slot: Slot, y: Array, state: State, qdot: Array) -> None:
+    def _turning_rate(self, slot: Slot, y: Real, state: State, qdot: Real) -> None:
         """Rates of ball and free-flyer coordinates; the quaternion's own (not normalised) value enters its rate."""
         start = _quaternion_start(slot)
         own = y[np.searchsorted(self._free_q, start) :][:4]

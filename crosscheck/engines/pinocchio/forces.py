@@ -11,8 +11,7 @@ from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
 from crosscheck.engines.pinocchio.tree import Slot, Tree
 from flexmb.scene.schema import Load, Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class JointForces:
@@ -35,14 +34,14 @@ class JointForces:
             if isinstance(slot.freedom, Ball) and (slot.freedom.stiffness or slot.freedom.damping)
         ]
 
-    def springs(self, q: Array) -> Array:
+    def springs(self, q: Real) -> Real:
         tau = np.zeros(self._nv)
         tau[self._spring_v] = -self._stiffness * (q[self._spring_q] - self._rest)
         for slot in self._balls:
             tau[slot.v : slot.v + 3] = -slot.freedom.stiffness * _turn(slot, q)
         return tau
 
-    def dampers_and_motors(self, t: float, v: Array) -> Array:
+    def dampers_and_motors(self, t: float, v: Real) -> Real:
         tau = np.zeros(self._nv)
         tau[self._damper_v] = -self._damping * v[self._damper_v]
         for slot in self._balls:
@@ -51,7 +50,7 @@ class JointForces:
             tau[index] += motor(t).value
         return tau
 
-    def spring_energy(self, q: Array) -> float:
+    def spring_energy(self, q: Real) -> float:
         energy = 0.5 * self._stiffness @ (q[self._spring_q] - self._rest) ** 2
         for slot in self._balls:
             turn = _turn(slot, q)
@@ -103,5 +102,5 @@ def _indices(slots: list[Slot]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.array([slot.q for slot in slots], dtype=np.intp), np.array([slot.v for slot in slots], dtype=np.intp)
 
 
-def _turn(slot: Slot, q: Array) -> Array:
+def _turn(slot: Slot, q: Real) -> Real:
     return rotation_vector(scalar_first(q[slot.q : slot.q + 4]))

@@ -6,7 +6,6 @@ import time
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
@@ -17,8 +16,7 @@ from crosscheck.engines.pinocchio.observer import Observer
 from crosscheck.engines.pinocchio.tree import build_tree
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 # Angles of elastic chains are a thousandth of a radian: coarser absolute tolerances let their fastest modes ring.
 _SMALL = 1e-3
@@ -51,7 +49,7 @@ class PinocchioModel:
         work = np.array([y[-1] for y in states])
         return stack(reached, samples, status=status, message=message, wall_s=wall, evaluations=evaluations, work=work)
 
-    def _integrate(self, times: Array, effort: Effort) -> tuple[list[Array], int, str]:
+    def _integrate(self, times: Real, effort: Effort) -> tuple[list[Real], int, str]:
         """States at the sample times reached, evaluations of the right-hand side, and why it stopped early.
 
         It restarts wherever a function of time is not smooth, so that the error control never steps over a kink; the

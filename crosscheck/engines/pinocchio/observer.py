@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import angular_first, cross, quaternion_of, rotate_spatial
@@ -12,8 +11,7 @@ from crosscheck.engines.links import attachment
 from crosscheck.engines.pinocchio.dynamics import Dynamics, State
 from crosscheck.engines.pinocchio.tree import placement
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 
 class Observer:
@@ -70,7 +68,7 @@ class Observer:
             acceleration=angular_first(pin.getFrameClassicalAcceleration(model, data, frame, world).vector),
         )
 
-    def _drives(self, drive: Array) -> dict[str, Array]:
+    def _drives(self, drive: Real) -> dict[str, Real]:
         """Loads of the prescribed coordinates by joint name; what holds a weld is no drive."""
         named: dict[str, list[float]] = {}
         for slot, load in zip(self._dynamics.driven, drive, strict=True):

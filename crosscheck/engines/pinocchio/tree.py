@@ -10,14 +10,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
 from crosscheck.engines.conventions import Frame, scalar_last
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
 from flexmb.scene.functions import Constant
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _HELD = Scalar(True, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, None, Constant(value=0.0))
 
@@ -47,7 +45,7 @@ def placement(frame: Frame) -> pin.SE3:
     return pin.SE3(frame.rotation, frame.position)
 
 
-def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
+def build_tree(links: tuple[Link, ...], gravity: Real) -> Tree:
     """Links come depth-first, as Pinocchio needs them: `crba` is silently wrong otherwise, hence the check."""
     model = pin.Model()
     model.gravity.linear = gravity
@@ -68,7 +66,7 @@ def build_tree(links: tuple[Link, ...], gravity: Array) -> Tree:
     return Tree(model, links, tuple(joints), tuple(slots))
 
 
-def initial_state(tree: Tree) -> tuple[Array, Array]:
+def initial_state(tree: Tree) -> tuple[Real, Real]:
     """Coordinates (nq,) and speeds (nv,) at t = 0."""
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:

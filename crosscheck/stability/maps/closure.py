@@ -8,12 +8,13 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, digit_kinds, growth_kinds
-from flexmb.closed_system import ClosedSystem
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds, growth_kinds
+from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.simulation import simulate
-from flexmb.system import System, compile
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.system import System, compile
+from flexmb.typing import Real
 
 CRANK, COUPLER, ROCKER, GROUND = 0.3, 0.8, 0.7, 1.0  # m
 SIZE = GROUND
@@ -67,7 +68,7 @@ def gap(step: float, time: float, rate: float) -> Outcome:
     return opening(done.markers["a"].position, done.markers["b"].position)
 
 
-def opening(a: Array, b: Array) -> Outcome:
+def opening(a: Real, b: Real) -> Outcome:
     """log10 of the largest distance of the joined points over the size of the loop, in the second half of a run."""
     distance = np.linalg.norm(a - b, axis=1)[SAMPLES // 2 :]
     return Outcome(float(np.log10(np.max(distance) / SIZE + LEAST)))
@@ -83,7 +84,7 @@ def measure_stability(scene: Scene, step: float, rate: float) -> Outcome:
     return gap(step, STEPS * step, rate)
 
 
-def beyond_real_interval(step: Array, rate: Array) -> Array:
+def beyond_real_interval(step: Real, rate: Real) -> Real:
     """Positive where the double root -rate of g'' + 2 rate g' + rate^2 g = 0 is outside RK4's stability interval."""
     return np.asarray(step * rate / REAL_RK4 - 1.0)
 
@@ -152,7 +153,7 @@ def pulled_apart() -> float:
     return largest
 
 
-def drift(step: Array, kept: Array) -> Array:
+def drift(step: Real, kept: Real) -> Real:
     """log10 of the opening: where projection stops, fourth order in the step, and the yield of a soft constraint.
 
     MuJoCo's constraint is a critically damped spring of its time constant T, not shorter than two steps, whose force is

@@ -8,14 +8,15 @@ import msgspec
 import numpy as np
 from scipy.linalg import eigh
 
-from crosscheck.stability.map import STABLE, UNSTABLE, Array, Axis, Kind, Outcome, Overlay, StabilityMap
+from crosscheck.stability.map import STABLE, UNSTABLE, Axis, Kind, Outcome, Overlay, StabilityMap
 from flexmb.dense import DenseSystem
 from flexmb.modal.flexible import beam_model
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import BeamStation, ModalState, Modes, Scene
-from flexmb.state import DynamicsError
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
 
 LENGTH, MASS, STIFFNESS = 1.0, 1.0, 1.0  # m, kg/m, N m^2
 KNOTS = 25  # radii of gyration at which the overlay is found; between them it is as good as a power law
@@ -64,7 +65,7 @@ def measure(scene: Scene, deflection: float, gyration: float) -> Outcome:
 
 
 @cache
-def limits() -> tuple[Array, Array]:
+def limits() -> tuple[Real, Real]:
     """Radii of gyration, and the deflections where the mass matrix of the dense route becomes singular.
 
     It is M0 + deflection M1: singular where -1/deflection is an eigenvalue of M1 with respect to M0.
@@ -82,7 +83,7 @@ def limits() -> tuple[Array, Array]:
     return radii, np.array(found)
 
 
-def excess(deflection: Array, gyration: Array) -> Array:
+def excess(deflection: Real, gyration: Real) -> Real:
     """Positive beyond the deflection at which the dense route's mass matrix is singular."""
     radii, found = limits()
     limit = np.exp(np.interp(np.log(gyration), np.log(radii), np.log(found)))

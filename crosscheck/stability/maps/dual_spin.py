@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.schema import Scene
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 SPIN, TRANSVERSE = 1.0, 1.0  # rad/s, kg m^2
 MASS, ARM = 1e-3, 0.5  # kg, m of each of four dampers
@@ -53,7 +54,7 @@ def measure(scene: Scene, inertia: float, momentum: float) -> Outcome:
     return Outcome(growth_rate(system, places) / SPIN)
 
 
-def energy_sink(inertia: Array, momentum: Array) -> Array:
+def energy_sink(inertia: Real, momentum: Real) -> Real:
     """Positive where nutation grows: the nutation as the damped body sees it turns against its spin."""
     return np.asarray(1.0 - inertia - momentum)
 

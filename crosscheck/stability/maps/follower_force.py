@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 from scipy.linalg import eigvals
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import BeamStation, Modes, Scene, TipMass
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 LENGTH, STIFFNESS, MASS = 1.0, 1.0, 1.0  # m, N m^2, kg/m: loads are P L^2/EI, times sqrt(mass L^4/EI)
 MODES, ELEMENTS = 6, 12
@@ -53,7 +54,7 @@ def measure(scene: Scene, load: float, other: float) -> Outcome:
 
 
 @cache
-def matrices() -> tuple[Array, Array, Array, Array]:
+def matrices() -> tuple[Real, Real, Real, Real]:
     """M, K, the geometric stiffness of a unit compression and the follower's part of it, of Hermitian elements."""
     n = 2 * (ELEMENTS + 1)
     M, K, G, F = np.zeros((4, n, n))
@@ -81,7 +82,7 @@ def undamped_frequencies(tip_mass: float) -> tuple[float, ...]:
     return tuple(np.sort(np.sqrt(eigvals(K, _with_tip(M, tip_mass)).real)))
 
 
-def _with_tip(M: Array, tip_mass: float) -> Array:
+def _with_tip(M: Real, tip_mass: float) -> Real:
     loaded = M.copy()
     loaded[-2, -2] += tip_mass * MASS * LENGTH
     return loaded
@@ -109,10 +110,10 @@ def critical_load(tip_mass: float, damping: float) -> float:
     return 0.5 * (low + high)
 
 
-def excess(axis: Axis, critical: Callable[[float], float]) -> Callable[[Array, Array], Array]:
+def excess(axis: Axis, critical: Callable[[float], float]) -> Callable[[Real, Real], Real]:
     """Positive beyond the critical load, found at `KNOTS` values of the other parameter."""
 
-    def predict(load: Array, other: Array) -> Array:
+    def predict(load: Real, other: Real) -> Real:
         knots = axis.values(np.linspace(0.0, 1.0, KNOTS))
         scale = np.log if axis.log else np.asarray
         return np.asarray(load - np.interp(scale(other), scale(knots), [critical(float(knot)) for knot in knots]))

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 SPIN = 1.0  # rad/s
 NEUTRAL = 1e-7  # of the spin: neutral motions come out at rounding, or its square root
@@ -29,7 +30,7 @@ def measure(scene: Scene, first: float, second: float) -> Outcome:
     return Outcome(growth_rate(system, [start, start + 1]) / SPIN)
 
 
-def intermediate(first: Array, second: Array) -> Array:
+def intermediate(first: Real, second: Real) -> Real:
     """Positive where the third moment lies between the two others."""
     return -(1.0 - first) * (1.0 - second)
 

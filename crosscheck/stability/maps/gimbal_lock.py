@@ -8,11 +8,12 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
 
 HINGES = ("gimbal xyz", "gimbal zxz", "quaternion")
 LOCK = {"gimbal xyz": 0.5 * np.pi, "gimbal zxz": 0.0}  # second angle, rad
@@ -28,7 +29,7 @@ class Body(NamedTuple):
 
     outer: float
     inner: float
-    velocity: Array
+    velocity: Real
 
 
 @cache
@@ -67,7 +68,7 @@ def measure(scene: Scene, distance: float, hinge: float) -> Outcome:
     return Outcome(float(np.log10(max(max(errors), ROUNDING))))
 
 
-def _coordinates(name: str, distance: float, body: Body) -> tuple[Array, Array]:
+def _coordinates(name: str, distance: float, body: Body) -> tuple[Real, Real]:
     """q and u; gimbal rates H^-1 w."""
     if name == "quaternion":
         turn = Rotation.from_euler("XYZ", [body.outer, 0.5 * np.pi - distance, body.inner])
@@ -76,14 +77,14 @@ def _coordinates(name: str, distance: float, body: Body) -> tuple[Array, Array]:
     return q, np.linalg.solve(hinge_map(name.split()[1], q), body.velocity)
 
 
-def hinge_map(sequence: str, q: Array) -> Array:
+def hinge_map(sequence: str, q: Real) -> Real:
     """H (3,3) of a gimbal in body axes: columns are its axes as the body sees them."""
     axes = np.eye(3)[["xyz".index(letter) for letter in sequence]]
     second, third = (Rotation.from_rotvec(-q[k] * axes[k]).as_matrix() for k in (1, 2))
     return np.array([third @ second @ axes[0], third @ axes[1], axes[2]]).T
 
 
-def predicted(distance: Array, hinge: Array) -> Array:
+def predicted(distance: Real, hinge: Real) -> Real:
     """log10 of the error of Cholesky's method, u cond(D) |udot|, as H shows it along the lost axis; least: rounding.
 
     D = H'JH has the condition 1/distance^2, udot grows as 1/distance^2, and H is of the size of the distance there:

@@ -10,12 +10,13 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
-from flexmb.methods import Method as MethodName
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from flexmb.integrate.settings import Method as MethodName
+from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import InertiaPoint, ModalNode, Scene
-from flexmb.simulation import simulate
-from flexmb.status import Status
+from flexmb.tables.status import Status
+from flexmb.typing import Real
 
 STEPS, PARTS = 4096, 64  # of a run: 1000 periods and more where step x frequency is 1.54 and more
 GROWTH = 2e-5  # of the amplitude's logarithm in a step; beats of a bounded motion stay a hundred times below
@@ -24,7 +25,7 @@ START = 1e-3  # m
 UNLIMITED, NEVER = np.inf, 0.0
 IMAGINARY_RK4 = 2.0 * np.sqrt(2.0)  # |R(iz)|^2 = 1 - z^6/72 + z^8/576 passes 1 there
 
-Signals = tuple[Array, Array, str]  # displacement and velocity of the fast mass (T,), why the run ended early
+Signals = tuple[Real, Real, str]  # displacement and velocity of the fast mass (T,), why the run ended early
 
 
 @dataclass(frozen=True)
@@ -108,7 +109,7 @@ def step_map(method: Method) -> StabilityMap:
     if method.limit not in (NEVER, UNLIMITED):
         limit = f"step x frequency = {method.limit:.4g}"
 
-    def excess(step: Array, frequency: Array) -> Array:
+    def excess(step: Real, frequency: Real) -> Real:
         return np.asarray(np.clip(step * frequency, 1e-300, 1e300) / np.clip(method.limit, 1e-300, 1e290) - 1.0)
 
     return StabilityMap(
@@ -128,7 +129,7 @@ def step_map(method: Method) -> StabilityMap:
     )
 
 
-def _triple(values: Array) -> tuple[float, float, float]:
+def _triple(values: Real) -> tuple[float, float, float]:
     return (float(values[0]), float(values[1]), float(values[2]))
 
 

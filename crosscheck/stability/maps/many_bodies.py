@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.system import Algorithm, compile
+from flexmb.system.system import Algorithm, compile
+from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")
 MOST = {"articulated": 20_000, "composite": 1_500, "frisch": 150}  # what takes less than a minute
@@ -51,7 +52,7 @@ def measure(scene: Scene, bodies: float, algorithm: float) -> Outcome:
     return Outcome(float(np.log10(max(error, ROUNDING))))
 
 
-def rounding(bodies: Array, algorithm: Array) -> Array:
+def rounding(bodies: Real, algorithm: Real) -> Real:
     """log10 of gamma(n), n the roundings in a row: of a factorisation of n speeds and of two sweeps over n bodies."""
     return np.asarray(np.log10((1 + PRODUCTS) * bodies * ROUNDING))
 

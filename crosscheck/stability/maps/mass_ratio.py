@@ -8,11 +8,12 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.state import DynamicsError
-from flexmb.system import Algorithm, compile
+from flexmb.system.system import Algorithm, compile
+from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")
 GRAVITY, LENGTH, CENTRE, INERTIA = 9.81, 1.3, 0.47, 0.1  # m/s^2, m, m, kg m^2 of the inner body of 1 kg
@@ -27,8 +28,8 @@ class Inputs(NamedTuple):
     The chain is stretched: bent, the outer mass would have its own inertia about the first hinge, and all be well.
     """
 
-    angles: Array
-    rates: Array
+    angles: Real
+    rates: Real
 
 
 @cache
@@ -51,7 +52,7 @@ def scene(ratio: float, slender: float) -> Scene:
     )
 
 
-def exact(ratio: float, slender: float, at: Inputs) -> tuple[Array, Array]:
+def exact(ratio: float, slender: float, at: Inputs) -> tuple[Real, Real]:
     """M (2,2) and the accelerations (2,) of Lagrange's equations, in fractions; sines and cosines in long doubles."""
     m, l, c = Fraction(ratio), Fraction(LENGTH), Fraction(CENTRE)
     inertia = Fraction(slender * ratio * CENTRE**2)
@@ -91,21 +92,21 @@ def measure(algorithm: Algorithm, ratio: float, slender: float) -> Outcome:
     return Outcome(float(np.log10(max(max(errors), ROUNDING))))
 
 
-def left_over(ratio: Array, slender: Array) -> tuple[Array, Array]:
+def left_over(ratio: Real, slender: Real) -> tuple[Real, Real]:
     """Determinant of M over M22, and M11: what the first hinge has to move, outer body yielding and not."""
     own = slender * ratio * CENTRE**2
     inner, M22 = INERTIA + CENTRE**2, own + ratio * CENTRE**2
     return inner + ratio * LENGTH**2 * own / M22, inner + own + ratio * (LENGTH + CENTRE) ** 2
 
 
-def scaled_condition(ratio: Array, slender: Array) -> Array:
+def scaled_condition(ratio: Real, slender: Real) -> Real:
     """log10 of u cond(H); H is M scaled to a unit diagonal, its determinant found without cancellation."""
     left, M11 = left_over(ratio, slender)
     rho = np.sqrt(1.0 - np.minimum(left / M11, 1.0))
     return np.asarray(np.log10(ROUNDING * (1.0 + rho) ** 2 * M11 / left))
 
 
-def cancellation(ratio: Array, slender: Array) -> Array:
+def cancellation(ratio: Real, slender: Real) -> Real:
     """log10 of the rounding of the outer mass over what is left of it: P - P H D^-1 H' P cancels at the hinge.
 
     A bound: where what is left is the outer body's, forces and inertia have the same error, and it cancels again.

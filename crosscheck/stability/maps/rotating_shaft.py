@@ -5,11 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 MASS, OMEGA = 1.0, 1.0  # kg, rad/s: the disc and its critical speed
 INTERNAL = 0.02  # N s/m
@@ -49,7 +50,7 @@ def measure(scene: Scene, speed: float, ratio: float) -> Outcome:
     return Outcome(growth_rate(system, [q, q + 1, u, u + 1, drag, drag + 1], 2.0 * np.pi / (speed * OMEGA)) / OMEGA)
 
 
-def excess(speed: Array, ratio: Array) -> Array:
+def excess(speed: Real, ratio: Real) -> Real:
     """Positive above the speed at which both dampings balance for the whirl at the critical speed."""
     return np.asarray(speed - (1.0 + ratio))
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamStation, Modes, Scene
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 LEVELS = ("ruthless", "linear", "full", "stiffened")
 LENGTH, STIFFNESS, MASS = 8.0, 566.6, 0.2019  # m, N m^2, kg/m: beam K of Kane, Ryan and Banerjee (1987)
@@ -39,7 +40,7 @@ def measure(scene: Scene, spin: float, level: float) -> Outcome:
     return Outcome(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])) / OMEGA_1)
 
 
-def softening(spin: Array, level: Array) -> Array:
+def softening(spin: Real, level: Real) -> Real:
     """Positive where the centrifugal force (spin rate squared) exceeds the first mode's stiffness and acts on it."""
     acts = np.isin(np.round(level), [LEVELS.index("linear"), LEVELS.index("full")])
     return np.where(acts, spin - 1.0, -1.0)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.simulation import simulate
+from flexmb.typing import Real
 
 SOFT = 1.0  # N m/rad, the first hinge's spring
 MASS, LENGTH, CENTRE, INERTIA = 1.0, 1.0, 0.5, 0.1  # of both bodies: kg, m, m, kg m^2 about the mass centre
@@ -18,7 +19,7 @@ GROWTH = 1e-5  # of the amplitude's logarithm in a step
 RK4 = (1.0 / 24.0, 1.0 / 6.0, 0.5, 1.0, 1.0)  # amplification R(z), highest power first
 
 
-def mass_matrix() -> Array:
+def mass_matrix() -> Real:
     """(2,2) of the straight chain in its hinge angles."""
     outer = INERTIA + MASS * CENTRE**2
     coupling = INERTIA + MASS * CENTRE * (LENGTH + CENTRE)
@@ -26,7 +27,7 @@ def mass_matrix() -> Array:
     return np.array([[inner, coupling], [coupling, outer]])
 
 
-def damping(stiffness: Array | float) -> Array:
+def damping(stiffness: Real | float) -> Real:
     """Coefficient (N m s/rad) that gives the stiff mode its damping ratio; its inertia is 1/(M^-1)_22."""
     inertia = 1.0 / np.linalg.inv(mass_matrix())[1, 1]
     return np.asarray(2.0 * DAMPING_RATIO * np.sqrt(np.asarray(stiffness) * inertia))
@@ -56,7 +57,7 @@ def measure(scene: Scene, step: float, stiffness: float) -> Outcome:
     return Outcome(float(np.log(np.max(size[PARTS // 2 :]) / np.max(size[: PARTS // 2])) / (STEPS / 2)))
 
 
-def amplification(step: Array, stiffness: Array) -> Array:
+def amplification(step: Real, stiffness: Real) -> Real:
     """log of the largest |R(h lambda)| over the eigenvalues of the linear chain; the slow ones, of |R| = 1, as zero."""
     M, k = np.linalg.inv(mass_matrix()), np.ravel(stiffness)
     A = np.zeros((k.size, 4, 4))

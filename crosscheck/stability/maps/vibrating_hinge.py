@@ -6,12 +6,13 @@ import numpy as np
 from scipy.special import mathieu_a, mathieu_b
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
 from flexmb.scene.schema import Scene
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.typing import Real
 
 GRAVITY, LENGTH = 9.81, 1.0
 OMEGA_0 = np.sqrt(GRAVITY / LENGTH)
@@ -39,7 +40,7 @@ def measure(scene: Scene, frequency: float, amplitude: float) -> Outcome:
     return Outcome(growth_rate(system, places, 2.0 * np.pi / drive) / drive)
 
 
-def outside_mathieu(frequency: Array, amplitude: Array) -> Array:
+def outside_mathieu(frequency: Real, amplitude: Real) -> Real:
     """Positive where x'' + (a - 2 q cos 2 tau) x = 0, a = -4 (omega_0/drive)^2, q = 2 amplitude/length, is unstable.
 
     It is stable between the characteristic values a_0(q) and b_1(q).

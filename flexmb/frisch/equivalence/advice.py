@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence.mode_count import Direction, directions
 from flexmb.frisch.equivalence.relations import Fit, best_hinge, fit_at, modal_effective_inertia
-
-Array = NDArray[np.float64]
 
 AT_CLAMP, BEST, GIVEN = "hinge at the clamp", "best hinge", "given hinge"
 

@@ -18,8 +18,8 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 DEFAULT_MODES = 40
 _POINT_ARRAYS = ("mass", "position", "com_offset", "inertia", "translation", "rotation")
 
@@ -34,14 +34,14 @@ class Appendage:
     name: str
     model: FlexibleModel
     parameters: ModeParameters
-    frequencies: Array
+    frequencies: Real
 
     @property
     def mode_count(self) -> int:
         return len(self.frequencies)
 
     @cached_property
-    def rigid_inertia(self) -> Array:
+    def rigid_inertia(self) -> Real:
         """(6,6), order [angular; linear]: the undeformed body about its clamp."""
         return inertia_about_origin(self.parameters)
 
@@ -56,14 +56,14 @@ class Appendage:
         return mode_parameters(replace(model, **points))
 
     @cached_property
-    def momenta(self) -> Array:
+    def momenta(self) -> Real:
         """(n,6) [angular about the clamp; linear] momentum of each mode at unit rate: Q_n + m alpha x A_n and m A_n."""
         p = self.parameters
         linear = p.mass * p.A
         return np.hstack([p.Q + np.cross(p.alpha, linear), linear])
 
 
-def inertia_about_origin(p: ModeParameters) -> Array:
+def inertia_about_origin(p: ModeParameters) -> Real:
     """(6,6), order [angular; linear], of an undeformed body with these parameters about its origin."""
     arm = p.mass * cross_matrix(p.alpha)
     inertia = p.Phi + p.mass * inertia_of(np.outer(p.alpha, p.alpha))

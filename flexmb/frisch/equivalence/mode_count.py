@@ -20,12 +20,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
 from flexmb.frisch.equivalence.relations import weighted_difference
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 UNIT = np.eye(3)
 
 
@@ -40,14 +40,14 @@ class Direction:
     """
 
     name: str
-    motion: Array
+    motion: Real
     inertia: float
-    mode_shares: Array
-    remainder: Array
-    relations: Array
+    mode_shares: Real
+    remainder: Real
+    relations: Real
 
     @property
-    def worst(self) -> Array:
+    def worst(self) -> Real:
         """The largest of remainder and relations (n+1,)."""
         return np.max(np.vstack([self.remainder, self.relations]), axis=0)
 
@@ -77,7 +77,7 @@ def directions(body: Appendage, axes: ArrayLike = UNIT) -> tuple[Direction, ...]
     )
 
 
-def _direction(body: Appendage, name: str, motion: Array, inertia: float) -> Direction:
+def _direction(body: Appendage, name: str, motion: Real, inertia: float) -> Direction:
     p, n = body.moving, body.mode_count
     mass = body.parameters.mass  # of the normalisation
     rates = body.momenta @ motion / mass
@@ -90,7 +90,7 @@ def _direction(body: Appendage, name: str, motion: Array, inertia: float) -> Dir
     return Direction(name, motion, inertia, shares, remainder, relations)
 
 
-def _named(axis: Array) -> str:
+def _named(axis: Real) -> str:
     """x, y or z where it is one of these, else its components."""
     for name, unit in zip("xyz", UNIT, strict=True):
         if np.array_equal(np.abs(axis), unit):

@@ -8,12 +8,10 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
-from numpy.typing import NDArray
 
 from flexmb.frisch.equivalence.advice import Equivalence
-from flexmb.printable import chart_text
-
-Array = NDArray[np.float64]
+from flexmb.output.printable import chart_text
+from flexmb.typing import Real
 
 _SIZE = (12.0, 7.0)  # inches
 _RESOLUTION = 120  # dots per inch
@@ -102,12 +100,12 @@ def _convergence(result: Equivalence, axes: Axes) -> None:
     axes.set_title("Base turning (largest of inertia and relations) and moving (mass)", fontsize="medium")
 
 
-def _principal(vectors: Array, mass: Array) -> Array:
+def _principal(vectors: Real, mass: Real) -> Real:
     """Direction (3,) in which vectors (p,3) are largest in the mean, towards positive components."""
     direction = np.linalg.eigh(np.einsum("p,pa,pb->ab", mass, vectors, vectors))[1][:, -1]
     return direction if direction[np.argmax(np.abs(direction))] > 0.0 else -direction
 
 
-def _named(direction: Array) -> str:
+def _named(direction: Real) -> str:
     nearest = int(np.argmax(np.abs(direction)))
     return "xyz"[nearest] if direction[nearest] > 1.0 - 1e-9 else "the body"

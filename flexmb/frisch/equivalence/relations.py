@@ -22,7 +22,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.linalg import eigh
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
@@ -31,8 +31,7 @@ from flexmb.frisch.elements import inertia_of
 from flexmb.frisch.equivalence.appendage import Appendage
 from flexmb.frisch.parameters import ModeParameters
 from flexmb.modal.cross import cross_matrix
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _ROUND_OFF = 1e-12
 
@@ -42,9 +41,9 @@ class SpringHinge:
     """Where the rigid model turns: point (3,) m from the clamp, axes (k,3) unit vectors at rest, body axes, and the
     stiffness (k,) N m/rad of their springs."""
 
-    point: Array
-    axes: Array
-    stiffness: Array
+    point: Real
+    axes: Real
+    stiffness: Real
 
 
 @dataclass(frozen=True)
@@ -56,8 +55,8 @@ class Relation:
 
     equation: int
     quantity: str
-    rigid: Array
-    flexible: Array
+    rigid: Real
+    flexible: Real
     mismatch: float
 
 
@@ -73,11 +72,11 @@ class Fit:
 
     hinge: SpringHinge
     modes: tuple[int, ...]
-    rates: Array
+    rates: Real
     relations: tuple[tuple[Relation, ...], ...]
     mismatch: float
-    frequencies: Array
-    effective_inertia: Array
+    frequencies: Real
+    effective_inertia: Real
 
 
 def rate_relations(
@@ -127,13 +126,13 @@ def displacement_relations(
     return Relation(47, "mass centre", centre, moved, apart), Relation(49, "inertia tensor", inertia, turned, twisted)
 
 
-def best_rates(body: Appendage, point: Array, axes: Array, rates: ArrayLike) -> Array:
+def best_rates(body: Appendage, point: Real, axes: Real, rates: ArrayLike) -> Real:
     """Hinge rates (k,) that make the norm of (149)-(151) smallest for modal rates (n,)."""
     p = body.parameters
     return _least_squares(_hinge_columns(p, point, axes), _modal_side(p, np.asarray(rates, dtype=float)))
 
 
-def turning_axis(body: Appendage, mode: int) -> Array:
+def turning_axis(body: Appendage, mode: int) -> Real:
     """Unit vector (3,) about which a mode turns the appendage: the omega that goes best with (150), (151).
 
     With all mass in one point, which has no turn of its own, the omega about the clamp that goes best with (149).
@@ -170,7 +169,7 @@ def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int,
     if len(axes) == 1:
         return fit_at(body, starts[0], axes, modes)
 
-    def left(point: Array) -> Array:
+    def left(point: Real) -> Real:
         return np.concatenate([_left(body, point, axes, mode) for mode in modes])
 
     point = least_squares(left, np.mean(starts, axis=0), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
@@ -203,14 +202,14 @@ def fit_at(
     )
 
 
-def modal_effective_inertia(body: Appendage, modes: ArrayLike) -> Array:
+def modal_effective_inertia(body: Appendage, modes: ArrayLike) -> Real:
     """(6,6), order [angular about the clamp; linear]: what these modes can move away from the base, the sum of
     s_n s_n' / m over their momenta s_n."""
     s = body.momenta[np.asarray(modes, dtype=int)]
     return s.T @ s / body.parameters.mass
 
 
-def weighted_difference(p: ModeParameters, motion: Array, rates: Array) -> Array:
+def weighted_difference(p: ModeParameters, motion: Real, rates: Real) -> Real:
     """Differences (3,) between the sides of (149), (150), (151) in the units of the norm, square root of energy.
 
     `motion` (6,) is a rigid motion [omega; velocity of the clamp], `rates` (n,) are modal rates.
@@ -219,12 +218,12 @@ def weighted_difference(p: ModeParameters, motion: Array, rates: Array) -> Array
     return _parts(_weighted(p, velocity, _inertia_rate(p, omega), p.Phi @ omega) - _modal_side(p, rates))
 
 
-def _carried(p: ModeParameters, arm: Array) -> Array:
+def _carried(p: ModeParameters, arm: Real) -> Real:
     """m alpha x (omega x arm), as a matrix (3,3) of omega: angular momentum about the clamp of the mass centre."""
     return -p.mass * cross_matrix(p.alpha) @ cross_matrix(arm)
 
 
-def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | None) -> tuple[Array, tuple[int, ...]]:
+def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | None) -> tuple[Real, tuple[int, ...]]:
     """Unit axes (k,3) and a mode for each."""
     if modes is not None and any(not 0 <= mode < body.mode_count for mode in modes):
         raise ValueError(f"{body.name}: it has modes 1 to {body.mode_count} here")
@@ -249,7 +248,7 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
     return unit, modes
 
 
-def _explained(body: Appendage, axis: Array, mode: int) -> float:
+def _explained(body: Appendage, axis: Real, mode: int) -> float:
     """Part of the squared norm of a mode's (149)-(151) that a hinge about `axis` at the best point takes away."""
     whole = _modal_side(body.parameters, np.eye(body.mode_count)[mode])
     try:
@@ -259,7 +258,7 @@ def _explained(body: Appendage, axis: Array, mode: int) -> float:
     return float(whole @ whole / body.parameters.mass - left @ left)
 
 
-def _nearest_point(body: Appendage, axis: Array, mode: int) -> Array:
+def _nearest_point(body: Appendage, axis: Real, mode: int) -> Real:
     """Where a hinge about one axis makes the norm smallest, nearest to the clamp.
 
     (150) and (151) do not know the point: they fix the rate thetadot; then the point puts the part of (149) across the
@@ -276,31 +275,31 @@ def _nearest_point(body: Appendage, axis: Array, mode: int) -> Array:
     return point - (point @ axis) * axis
 
 
-def _left(body: Appendage, point: Array, axes: Array, mode: int) -> Array:
+def _left(body: Appendage, point: Real, axes: Real, mode: int) -> Real:
     """What is left over of (149)-(151) for unit rate of a mode, weighted by the norm."""
     p, unit = body.parameters, np.eye(body.mode_count)[mode]
     columns, flexible = _hinge_columns(p, point, axes), _modal_side(p, unit)
     return (columns @ best_rates(body, point, axes, unit) - flexible) / np.sqrt(_scale(p, unit))
 
 
-def _inertia_rate(p: ModeParameters, omega: Array) -> Array:
+def _inertia_rate(p: ModeParameters, omega: Real) -> Real:
     """omega x Phi - Phi x omega."""
     turn = cross_matrix(omega)
     return turn @ p.Phi - p.Phi @ turn
 
 
-def _hinge_columns(p: ModeParameters, point: Array, axes: Array) -> Array:
+def _hinge_columns(p: ModeParameters, point: Real, axes: Real) -> Real:
     """Left sides of (149)-(151) per hinge rate, weighted (15,k)."""
     arm = p.alpha - point
     return np.column_stack([_weighted(p, np.cross(q, arm), _inertia_rate(p, q), p.Phi @ q) for q in axes])
 
 
-def _modal_side(p: ModeParameters, rates: Array) -> Array:
+def _modal_side(p: ModeParameters, rates: Real) -> Real:
     """Right sides of (149)-(151), weighted (15,)."""
     return _weighted(p, rates @ p.A, np.einsum("n,nab->ab", rates, p.E), rates @ p.Q)
 
 
-def _weighted(p: ModeParameters, velocity: Array, inertia_rate: Array, momentum: Array) -> Array:
+def _weighted(p: ModeParameters, velocity: Real, inertia_rate: Real, momentum: Real) -> Real:
     """Velocity, inertia rate and angular momentum in the units of the norm, square root of energy, (15,)."""
     moments, principal = np.linalg.eigh(p.Phi)
     size = float(moments.sum())
@@ -311,17 +310,17 @@ def _weighted(p: ModeParameters, velocity: Array, inertia_rate: Array, momentum:
     return np.concatenate([np.sqrt(p.mass) * velocity, inertia_rate.ravel() / np.sqrt(size), own])
 
 
-def _scale(p: ModeParameters, rates: Array) -> float:
+def _scale(p: ModeParameters, rates: Real) -> float:
     """Twice the kinetic energy of modal rates with the base at rest."""
     return float(rates @ p.M1 @ rates)
 
 
-def _parts(weighted: Array) -> Array:
+def _parts(weighted: Real) -> Real:
     """Lengths (3,) of the velocity, the inertia rate and the angular momentum in a weighted column (15,)."""
     return np.array([np.linalg.norm(part) for part in np.split(weighted, (3, 12))])
 
 
-def _relative(p: ModeParameters, weighted: Array, rates: Array) -> tuple[float, float, float]:
+def _relative(p: ModeParameters, weighted: Real, rates: Real) -> tuple[float, float, float]:
     """The parts over the size of the modes' motion; zero where there is none."""
     size = np.sqrt(_scale(p, rates))
     velocity, inertia, momentum = _parts(weighted) / size if size > 0.0 else np.zeros(3)
@@ -333,6 +332,6 @@ def _compact(p: ModeParameters) -> bool:
     return float(np.trace(p.Phi)) <= _ROUND_OFF * p.mass * float(p.alpha @ p.alpha)
 
 
-def _least_squares(columns: Array, side: Array) -> Array:
+def _least_squares(columns: Real, side: Real) -> Real:
     """x that makes |columns x - side| smallest, the shortest of them."""
     return np.asarray(np.linalg.lstsq(columns, side, rcond=None)[0], dtype=np.float64)

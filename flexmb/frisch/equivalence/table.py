@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
@@ -11,8 +10,7 @@ from rich.text import Text
 from flexmb.frisch.equivalence.advice import BEST, Equivalence, percent
 from flexmb.frisch.equivalence.mode_count import Direction
 from flexmb.frisch.equivalence.relations import Fit, Relation, displacement_relations, modal_effective_inertia
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 _UNITS = {149: "m/s", 150: "kg m^2/s", 151: "kg m^2/s", 47: "m", 49: "kg m^2"}
 _SHOWN_MODES = 4
@@ -148,7 +146,7 @@ def _table(title: str, caption: str | None) -> Table:
     return Table(title=title, caption=caption, title_justify="left", caption_justify="left", title_style="bold")
 
 
-def _vector(vector: Array) -> str:
+def _vector(vector: Real) -> str:
     """x, y, z for unit vectors along the axes, components otherwise; round-off is zero."""
     for name, unit in zip("xyz", np.eye(3), strict=True):
         if np.allclose(vector, unit, rtol=0.0, atol=1e-9):

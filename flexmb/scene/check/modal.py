@@ -6,7 +6,6 @@ from collections.abc import Generator, Iterator
 from math import pi, sqrt
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import eigh
 
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
@@ -17,8 +16,7 @@ from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene
-
-Array = NDArray[np.float64]
+from flexmb.typing import Real
 
 PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero at the clamp, this well
 # Lowest frequency times size (m/s). The upper end is the wave speed in the stiffest materials, which no body's first
@@ -154,7 +152,7 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Prob
     yield from _frequency(place, arrays, M)
 
 
-def _is_loose(arrays: ModalArrays, floating: Array, scale: Array, slack: float) -> bool:
+def _is_loose(arrays: ModalArrays, floating: Real, scale: Real, slack: float) -> bool:
     """Whether the clamp does not hold a rigid-body motion of the points that is among the modes.
 
     That they are moved as a rigid body is no fault by itself: a lump at the tip of a beam, say.
@@ -189,7 +187,7 @@ def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Probl
             yield Problem(str(spot), f"mode {n} moves the clamp: it has rigid-body content", remedy)
 
 
-def _mass_blocks(arrays: ModalArrays) -> tuple[Array, Array, Array]:
+def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
     """Mass matrices at rest: modes (m,m), rigid motion [rotation; translation] against modes (6,m), rigid (6,6)."""
     n, _, m = arrays.translation_modes.shape
     centre = arrays.position + arrays.com_offset
@@ -205,7 +203,7 @@ def _mass_blocks(arrays: ModalArrays) -> tuple[Array, Array, Array]:
     return M[6:, 6:], M[:6, 6:], M[:6, :6]
 
 
-def _frequency(place: Place, arrays: ModalArrays, M: Array) -> Iterator[Problem]:
+def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Problem]:
     """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
     stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
     lowest = float(eigh(stiffness, M, eigvals_only=True, subset_by_index=[0, 0])[0])

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
@@ -34,9 +34,9 @@ from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Problem
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, node_frame, ordered
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
-Pose = tuple[Rotation, Array]
+Pose = tuple[Rotation, Real]
 
 
 class Cluster(NamedTuple):
@@ -45,7 +45,7 @@ class Cluster(NamedTuple):
     `beyond`: whether mass hangs from these by moving hinges.
     """
 
-    inertia: Array | None
+    inertia: Real | None
     beyond: bool
 
 
@@ -106,7 +106,7 @@ def _clusters(scene: Scene) -> dict[str, Cluster]:
     return clusters
 
 
-def _spatial_inertia(scene: Scene, body: Body) -> Array | None:
+def _spatial_inertia(scene: Scene, body: Body) -> Real | None:
     """Inertia (6,6) at rest in the body frame, wheels and point masses included; None for a SID body."""
     match body:
         case RigidBody():
@@ -127,7 +127,7 @@ def _spatial_inertia(scene: Scene, body: Body) -> Array | None:
     return total
 
 
-def _attached(item: Wheel | PointMass) -> Array:
+def _attached(item: Wheel | PointMass) -> Real:
     """A wheel that spins freely resists no rotation about its axis."""
     if isinstance(item, PointMass):
         return _lump(item.mass_kg, np.zeros(3), np.zeros((3, 3)))
@@ -138,7 +138,7 @@ def _attached(item: Wheel | PointMass) -> Array:
     return _lump(item.mass_kg, np.zeros(3), inertia)
 
 
-def _beam(body: BeamBody) -> Array:
+def _beam(body: BeamBody) -> Real:
     total = _sum(_lump(t.mass_kg, np.add((t.x_m, 0.0, 0.0), t.com_m), t.inertia_kg_m2) for t in body.tip_masses)
     keys = ("mass_per_length_kg_m", "rotary_y_kg_m", "rotary_z_kg_m")
     for left, right in zip(body.stations, body.stations[1:], strict=False):
@@ -153,13 +153,13 @@ def _beam(body: BeamBody) -> Array:
     return total
 
 
-def _lump(mass: float, com: Vector | Array, inertia: object) -> Array:
+def _lump(mass: float, com: Vector | Real, inertia: object) -> Real:
     """Spatial inertia (6,6), angular first, of a lump with mass centre `com` and `inertia` (3,3) about it."""
     c = np.cross(np.eye(3), np.asarray(com, dtype=float))  # c @ v = com x v
     return np.block([[np.asarray(inertia, dtype=float) - mass * c @ c, mass * c], [-mass * c, mass * np.eye(3)]])
 
 
-def _sum(inertias: Iterable[Array]) -> Array:
+def _sum(inertias: Iterable[Real]) -> Real:
     return sum(inertias, np.zeros((6, 6)))
 
 
@@ -170,14 +170,14 @@ def _end(body: Body, node: str, position: Vector, quaternion: Quaternion) -> Pos
     return turn * Rotation.from_quat(quaternion, scalar_first=True), np.add(frame.position, turn.apply(position))
 
 
-def _motion(pose: Pose) -> Array:
+def _motion(pose: Pose) -> Real:
     """X (6,6): spatial velocity [w; v] of the body frame to that of the frame at `pose`, in that frame's axes."""
     turn, position = pose
     R = turn.as_matrix().T
     return np.block([[R, np.zeros((3, 3))], [-R @ np.cross(np.eye(3), position), R]])
 
 
-def _free_directions(hinge: Hinge) -> Array:
+def _free_directions(hinge: Hinge) -> Real:
     """Free columns of the hinge map at the start (6,n), outboard hinge axes; prescribed coordinates are left out."""
     angular = np.eye(6)[:3]
     directions: Sequence[ArrayLike]
@@ -206,7 +206,7 @@ def _free_directions(hinge: Hinge) -> Array:
     return np.array(kept).reshape(-1, 6).T
 
 
-def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Array]:
+def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Real]:
     """Axes of successive rotations seen from the outboard frame: turned back by the rotations that follow."""
     angles = [_start(coordinate) for _, coordinate in coordinates(hinge)]
     directions = []

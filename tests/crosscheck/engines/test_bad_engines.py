@@ -12,10 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.engine_list import describe_engines
-from crosscheck.pool import Event
-from crosscheck.records import RunRecord, read
-from crosscheck.sweep import sweep
+from crosscheck.records.records import RunRecord, read
+from crosscheck.running.engine_list import describe_engines
+from crosscheck.running.pool import Event
+from crosscheck.running.sweep import sweep
 from tests.crosscheck.engines.bad_engines import (
     ANSWERS,
     CRASHES,
@@ -103,7 +103,7 @@ def here(function: Callable[..., None], jobs: Sequence[Any], *_: object) -> Iter
 def mild(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
     """What does no harm to its process, all in this one, which is quicker."""
     with patch.context() as inner:
-        inner.setattr("crosscheck.sweep.run_jobs", here)
+        inner.setattr("crosscheck.running.sweep.run_jobs", here)
         return Ran(tmp_path_factory.mktemp("mild"), MILD, inner)
 
 

@@ -7,8 +7,8 @@ import pytest
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
+from flexmb.run.warm_up import pendulum
 from flexmb.scene.build import SceneBuilder
-from flexmb.warmup import pendulum
 
 METHODS = {
     "native-radau5": ("tolerance", "radau5"),

@@ -10,9 +10,10 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.stability.map import Array, Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 PROVIDER = "tests.crosscheck.stability.synthetic:maps"
 RADIUS = 0.6
@@ -27,7 +28,7 @@ def scene(x: float, y: float) -> Scene:
     return ANY
 
 
-def circle(x: Array, y: Array) -> Array:
+def circle(x: Real, y: Real) -> Real:
     """Positive outside."""
     return np.asarray(np.hypot(x, y) - RADIUS)
 

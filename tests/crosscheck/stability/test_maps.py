@@ -16,8 +16,8 @@ from crosscheck.stability.judge import judge
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
 from crosscheck.stability.run import Finished, run_here, run_map
-from flexmb.state import pack
-from flexmb.system import compile
+from flexmb.system.system import compile
+from flexmb.tables.state import pack
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"
 DECADES = {"gimbal_lock": 1.0}  # of a cell, where classes are narrower than two

@@ -11,7 +11,8 @@ import pytest
 from matplotlib.image import imread
 from typer.testing import CliRunner
 
-from crosscheck import cli, made_by
+from crosscheck import cli
+from crosscheck.records.records import made_by
 from crosscheck.stability import console, run
 from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.judge import judge

@@ -13,10 +13,10 @@ from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.models import Rung, built
 from flexmb.advisor.quantity import Quantity, error, measured, scales
 from flexmb.advisor.response import rigid_run
-from flexmb.counting import count
-from flexmb.dynamics import accelerations
+from flexmb.entry.articulated import accelerations
+from flexmb.jit.counting import count
 from flexmb.scene import schema as s
-from flexmb.state import pack
+from flexmb.tables.state import pack
 from tests.flexmb.advisor.scenes import stiff_and_soft, turned
 from tests.flexmb.closure import mechanisms
 

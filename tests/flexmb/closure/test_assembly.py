@@ -11,7 +11,7 @@ from numba.core.runtime import _nrt_python, rtsys
 
 import flexmb
 from flexmb.scene import schema as s
-from flexmb.status import Status
+from flexmb.tables.status import Status
 from tests import trees
 from tests.flexmb.closure import chains
 from tests.flexmb.closure import mechanisms as m

@@ -7,7 +7,7 @@ import pytest
 
 import flexmb
 from flexmb.scene import functions as f
-from flexmb.status import Status
+from flexmb.tables.status import Status
 from tests.flexmb.closure import mechanisms as m
 
 SETTINGS = {

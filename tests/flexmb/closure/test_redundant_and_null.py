@@ -12,7 +12,7 @@ from flexmb.closure import system as closure_system
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section
-from flexmb.status import Status
+from flexmb.tables.status import Status
 from tests.bounds import algebra
 from tests.flexmb.closure import chains, loops
 

@@ -9,7 +9,7 @@ import pytest
 
 import flexmb
 from flexmb.closure.branch import turned_over
-from flexmb.status import Status
+from flexmb.tables.status import Status
 from tests.flexmb.closure import mechanisms as m
 
 LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR)

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import dynamics
+from flexmb.entry import articulated
 from flexmb.frisch.system import Motion, NestedSystem
 from tests import trees
 from tests.bounds import algebra, backward_error
@@ -83,7 +83,7 @@ def test_wheel_torques(pair):
     """(82), (94), (102), (113): the whole torque on a wheel, bearing and motor, from the wheel's own momentum."""
     system, wheels = pair.system, np.zeros((len(pair.system.constants.wheel), 6))
     y, none = packed(pair.state), np.zeros(0, np.int64)
-    dynamics.observe_motion(
+    articulated.observe_motion(
         0.0, y, pair.motion.accelerations, none, none, system.constants, system.workspace(), np.zeros((0, 24)), wheels,
         np.zeros(4), np.zeros(6),
     )  # fmt: skip

@@ -11,14 +11,14 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ellipj
 
-from flexmb.bundle import bundle
 from flexmb.integrate.control import ACCEPTED, COUNTS, copy, derivative
 from flexmb.integrate.dop853 import dop853, interpolant, interpolate, stages
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
 from flexmb.integrate.problem import Problem, problem
 from flexmb.integrate.rk4 import rk4
-from flexmb.kernel import helper, kernel
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 
 HARMONIC, KEPLER, CONING, TOP, BLOW_UP, BREAKDOWN, SWITCHED, POWER = range(8)
 

@@ -10,11 +10,11 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.bundle import bundle
 from flexmb.integrate.jacobians import COUNTS
 from flexmb.integrate.problem import stiff_problem
-from flexmb.kernel import kernel
-from flexmb.status import NOT_POSITIVE_DEFINITE, OK
+from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import kernel
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 from tests.flexmb.integrate.integration_problems import (
     BREAKDOWN_AT,
     CONE_ANGLE,

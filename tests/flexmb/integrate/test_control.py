@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import _ivp, solve_ivp
 
 from flexmb.integrate import dop853_tableau as tableau
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK, STEP_TOO_SMALL
+from flexmb.tables.status import MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK, STEP_TOO_SMALL
 from tests.flexmb.integrate.integration_problems import (
     BLOW_UP,
     BREAKDOWN,

@@ -6,7 +6,7 @@ from scipy.linalg import expm
 
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.lu import lu_factorise, lu_solve
-from flexmb.kernel import kernel
+from flexmb.jit.kernel import kernel
 from tests.bounds import UNIT_ROUNDOFF, gamma
 
 THETAS = (0.003, 0.25, 0.3, 0.77, 1.0)

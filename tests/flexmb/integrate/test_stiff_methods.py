@@ -11,7 +11,7 @@ from flexmb.integrate import radau5_tableau as tableau
 from flexmb.integrate.exponential import exponential
 from flexmb.integrate.generalised_alpha import generalised_alpha
 from flexmb.integrate.radau5 import radau5
-from flexmb.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, NOT_POSITIVE_DEFINITE, OK, STEP_TOO_SMALL
+from flexmb.tables.status import MAX_STEPS, NONFINITE, NOT_CONVERGED, NOT_POSITIVE_DEFINITE, OK, STEP_TOO_SMALL
 from tests.bounds import UNIT_ROUNDOFF, observed_order
 from tests.flexmb.integrate.stiff_problems import (
     BLOW_UP,

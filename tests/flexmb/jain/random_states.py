@@ -8,10 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 import flexmb
+from flexmb.typing import Real
 from tests import trees
 from tests.bounds import algebra
-
-Array = NDArray[np.float64]
 
 # first-order mass matrices lose definiteness where the deformation is not small
 LEVELS = {
@@ -26,8 +25,8 @@ class RandomState:
 
     system: flexmb.System
     state: flexmb.State
-    M: Array
-    bias: Array
+    M: Real
+    bias: Real
 
     @property
     def bound(self) -> float:
@@ -47,7 +46,7 @@ class RandomState:
         """(nu,) which speeds are not prescribed."""
         return self.system.constants.speed["prescribed"] < 0
 
-    def inertia(self, rates: Array) -> float:
+    def inertia(self, rates: Real) -> float:
         """Size of the terms of M rates + bias."""
         return float(np.max(np.abs(self.M) @ np.abs(rates) + np.abs(self.bias)))
 

@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import composite
-from flexmb.counting import count
+from flexmb.entry import composite
 from flexmb.jain.places import matrices
-from flexmb.state import DynamicsError
+from flexmb.jit.counting import count
+from flexmb.tables.state import DynamicsError
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain
 from tests.bounds import backward_error, gamma

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.counting import Operations, count
 from flexmb.jain import cost
+from flexmb.jit.counting import Operations, count
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import ModalNode, Scene

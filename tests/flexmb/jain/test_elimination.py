@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.counting import count
 from flexmb.dense import DenseSystem
 from flexmb.jain.condensed import semidefinite_root
+from flexmb.jit.counting import count
 from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points

@@ -8,15 +8,16 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import factorisation
-from flexmb.counting import count
-from flexmb.factors import MassMatrixFactors
+from flexmb.entry import factorisation
 from flexmb.jain.response import response
-from flexmb.state import DynamicsError
+from flexmb.jit.counting import count
+from flexmb.system.factors import MassMatrixFactors
+from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
 from tests import trees
 from tests.benchmarks.rivals import flexible_chain
 from tests.bounds import backward_error, gamma
-from tests.flexmb.jain.random_states import LEVELS, Array, RandomState, random_state
+from tests.flexmb.jain.random_states import LEVELS, RandomState, random_state
 
 CARRIERS = ("rigid", "modal", "floating")
 
@@ -34,7 +35,7 @@ def factors(found) -> MassMatrixFactors:
     return found.system.factorise(found.state)
 
 
-def norm(x: Array) -> float:
+def norm(x: Real) -> float:
     return float(np.linalg.norm(x, np.inf))
 
 

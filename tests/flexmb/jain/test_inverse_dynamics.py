@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb import consistent
-from flexmb.consistent import held_hinges
-from flexmb.counting import count
+from flexmb.entry import consistent
+from flexmb.entry.consistent import held_hinges
+from flexmb.jit.counting import count
 from tests.benchmarks.rivals import flexible_chain
 from tests.bounds import gamma
 from tests.flexmb.jain.random_states import LEVELS, RandomState, random_state
@@ -103,7 +103,7 @@ def test_operations_grow_with_the_bodies():
         y, rates = np.concatenate([state.q, state.u, [0.0]]), np.ones(system.nu)
         c, w = system.constants, system.workspace()
         written = np.zeros(system.nu), np.zeros((bodies, 6))
-        forced = count(flexmb.dynamics.inverse_dynamics, 0.0, y, rates, c, w, *written)
+        forced = count(flexmb.entry.articulated.inverse_dynamics, 0.0, y, rates, c, w, *written)
         followed = count(consistent.consistent_accelerations, 0.0, y, rates, c, *held_hinges(c, w))
         return np.array([forced.operations.total, followed.operations.total])
 

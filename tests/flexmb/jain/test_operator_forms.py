@@ -6,17 +6,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import flexmb
 from flexmb.jain.elements import phi, value
 from flexmb.jain.operators import Operators
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene.shapes import beam_section
+from flexmb.typing import Real
 from tests import trees
 from tests.bounds import gamma
 
-Array = NDArray[np.float64]
 SEEDS = range(3)
 RECIPE = replace(trees.EVERY_LEVEL, bodies=6, deformation=0.03, carriers=("modal", "floating"))
 
@@ -54,7 +53,7 @@ def as_two(o: Operators, modes_outboard: bool = True) -> Operators:
     return Operators(names, tuple(parent), columns, tuple(rows), E_Phi, H, M_m, a_m, b_m, K_m, deformation, o.chi, V_m)
 
 
-def close(a: Array, b: Array, n: int, size: float) -> bool:
+def close(a: Real, b: Real, n: int, size: float) -> bool:
     return bool(np.max(np.abs(a - b), initial=0.0) <= gamma(n) * size)
 
 

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 import flexmb
 from flexmb.dense import DenseSystem
@@ -20,10 +19,9 @@ from flexmb.dense.system import Snapshot
 from flexmb.jain.elements import undeformed
 from flexmb.jain.operators import Operators
 from flexmb.scene.modal_data import inertia_points
+from flexmb.typing import Real
 from tests import trees
 from tests.bounds import algebra, gamma
-
-Array = NDArray[np.float64]
 
 # first-order mass matrices lose definiteness where the deformation is not small
 LINEAR = replace(trees.LINEAR, deformation=0.03)
@@ -73,11 +71,11 @@ def longest() -> Case:
     return case(trees.random_scene(200, recipe))
 
 
-def norm(x: Array) -> float:
+def norm(x: Real) -> float:
     return float(np.linalg.norm(x, np.inf)) if x.size else 0.0
 
 
-def residual(found: Array, expected: Array, *factors: Array) -> float:
+def residual(found: Real, expected: Real, *factors: Real) -> float:
     """Norm of the difference over the product of the norms of what was multiplied."""
     return norm(found - expected) / max(float(np.prod([norm(x) for x in factors])), np.finfo(float).tiny)
 
@@ -142,7 +140,7 @@ def check_accelerations(o: Operators, rng: np.random.Generator) -> None:
     T = rng.normal(size=len(o.M)) * norm(o.C)
     chi_dot = o.accelerations(T)
 
-    def size(rates: Array) -> float:
+    def size(rates: Real) -> float:
         """Of the terms that are summed in M rates + C - T."""
         return norm(H_Phi @ (np.abs(o.M_m) @ (H_Phi.T @ np.abs(rates)) + forces) + np.abs(T))
 
@@ -200,7 +198,7 @@ def check_recursion(case: Case) -> None:
     assert norm(o.inverse_dynamics(rates) - T) <= case.bound * norm(np.abs(o.M) @ np.abs(rates) + np.abs(o.C))
 
 
-def check_equations(case: Case, M: Array, c: Array) -> None:
+def check_equations(case: Case, M: Real, c: Real) -> None:
     assert np.max(np.abs(case.operators.M - M)) <= case.bound * np.max(np.abs(M))
     assert np.max(np.abs(case.operators.C - c)) <= case.bound * np.max(np.abs(c))
 

@@ -9,7 +9,7 @@ from scipy.linalg import eigh, expm
 from scipy.spatial.transform import Rotation
 
 import flexmb as fm
-from flexmb import dynamics
+from flexmb.entry import articulated
 from flexmb.scene.shapes import beam_section
 from tests.bounds import UNIT_ROUNDOFF, observed_order
 
@@ -178,7 +178,7 @@ def ends(system: fm.System, start: fm.State, T: float) -> tuple[np.ndarray, np.n
 
     def rhs(t, y):
         dy = np.empty(len(y) + 1)
-        assert dynamics.rhs(t, np.append(y, 0.0), dy, system.constants, w) == 0
+        assert articulated.rhs(t, np.append(y, 0.0), dy, system.constants, w) == 0
         return dy[:-1]
 
     y = solve_ivp(rhs, (0.0, T), np.concatenate([start.q, start.u]), "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]

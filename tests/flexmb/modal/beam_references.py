@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 from scipy.optimize import brentq
 
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes
+from flexmb.typing import Real
 
-Array = NDArray[np.float64]
 EPS = np.finfo(float).eps
 
 UNIT = {
@@ -33,22 +32,22 @@ def beam(elements: int, count: int, section: dict | None = None, modes: dict | N
     return BeamBody(**(data | changes))
 
 
-def frequencies(body: BeamBody) -> Array:
+def frequencies(body: BeamBody) -> Real:
     """Angular frequencies (m,) of the model of `body`."""
     return np.sqrt(np.diag(flexible_model(body).stiffness))
 
 
-def clamped_free_roots(count: int) -> Array:
+def clamped_free_roots(count: int) -> Real:
     """beta L with cos cosh + 1 = 0."""
     return _roots(lambda b: np.cos(b) + 1.0 / np.cosh(b), [(n * np.pi, (n + 1) * np.pi) for n in range(count)])
 
 
-def free_free_roots(count: int) -> Array:
+def free_free_roots(count: int) -> Real:
     """beta L > 0 with cos cosh - 1 = 0."""
     return _roots(lambda b: np.cos(b) - 1.0 / np.cosh(b), [(n * np.pi, (n + 1) * np.pi) for n in range(1, count + 1)])
 
 
-def tip_mass_roots(ratio: float, count: int) -> Array:
+def tip_mass_roots(ratio: float, count: int) -> Real:
     """beta L of a clamped beam with a point mass `ratio` times the beam's at the tip.
 
     1 + cos cosh + ratio b (cos sinh - sin cosh) = 0, divided by cosh.
@@ -61,8 +60,8 @@ def tip_mass_roots(ratio: float, count: int) -> Array:
 
 
 def plane_roots(
-    length: float, EI: float, GA: float, mass: float, rotary: float, guesses: Array, tip: Array | None = None
-) -> Array:
+    length: float, EI: float, GA: float, mass: float, rotary: float, guesses: Real, tip: Real | None = None
+) -> Real:
     """Frequencies of a uniform clamped Timoshenko beam by its transfer matrix, next to `guesses` (within 1 %).
 
     State [v, theta, M, Q]: v' = theta + Q/GA, theta' = M/EI, M' = -Q - rotary w^2 theta, Q' = -mass w^2 v. At the tip
@@ -79,14 +78,14 @@ def plane_roots(
     return _roots(equation, [(0.99 * g, 1.01 * g) for g in guesses])
 
 
-def varying_roots(EI: Callable[[float], float], mass: Callable[[float], float], guesses: Array) -> Array:
+def varying_roots(EI: Callable[[float], float], mass: Callable[[float], float], guesses: Real) -> Real:
     """Frequencies of a clamped Euler-Bernoulli beam of length 1 with varying section, by integrating its equation.
 
     Integration tolerance 1e-12, hence good to about 1e-10.
     """
 
     def equation(omega: float) -> float:
-        def slope(x: float, state: Array) -> Array:
+        def slope(x: float, state: Real) -> Real:
             v, theta, M, Q = state.reshape(4, 2)
             return np.concatenate([theta, M / EI(x), -Q, -mass(x) * omega**2 * v])
 
@@ -98,10 +97,10 @@ def varying_roots(EI: Callable[[float], float], mass: Callable[[float], float], 
     return _roots(equation, [(0.99 * g, 1.01 * g) for g in guesses])
 
 
-def slopes(sizes: list[int], errors: Array) -> Array:
+def slopes(sizes: list[int], errors: Real) -> Real:
     """Observed orders between neighbouring sizes: -d log(error) / d log(size); errors (len(sizes), k)."""
     return -np.diff(np.log(errors), axis=0) / np.diff(np.log(sizes))[:, None]
 
 
-def _roots(equation: Callable[[float], float], brackets: list[tuple[float, float]]) -> Array:
+def _roots(equation: Callable[[float], float], brackets: list[tuple[float, float]]) -> Real:
     return np.array([brentq(equation, low, high, xtol=1e-300, rtol=4 * EPS) for low, high in brackets])

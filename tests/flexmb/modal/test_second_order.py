@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from msgspec.structs import replace
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
@@ -21,9 +20,9 @@ from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points
 from flexmb.surrogate import modal_points
+from flexmb.typing import Real
 from tests.bounds import algebra, gamma, observed_order, relative
 
-Array = NDArray[np.float64]
 MODES = 14
 SCALES = 0.5 ** np.arange(5)
 
@@ -45,13 +44,13 @@ def tapered(boundary: str = "clamped-free", theory: str = "euler-bernoulli", fam
     )  # fmt: skip
 
 
-def exact_axis(body: s.BeamBody, eta: Array, x: Array) -> list[tuple[Array, Array]]:
+def exact_axis(body: s.BeamBody, eta: Real, x: Real) -> list[tuple[Real, Real]]:
     """Position and rotation at ascending x by integrating R' = R kappa~, r' = R (e_x + Gamma) from the root."""
     elements = beam_elements(body)
     M = elements.mass(inertia_stations(body, elements.mesh, elements.table), lumps(body))
     columns = beam_modes(elements, elements.stiffness(), M, body.modes).columns
 
-    def slope(at: float, y: Array) -> Array:
+    def slope(at: float, y: Real) -> Real:
         strain, curvature = (each[0] @ eta for each in elements.strain(np.array([at]), columns))
         R = y[3:].reshape(3, 3)
         return np.concatenate([R @ (strain + [1.0, 0.0, 0.0]), (R @ skew(curvature)).ravel()])
@@ -65,7 +64,7 @@ def exact_axis(body: s.BeamBody, eta: Array, x: Array) -> list[tuple[Array, Arra
     return [(found[at][:3], found[at][3:].reshape(3, 3)) for at in x]
 
 
-def quadratic(G: Array, eta: Array) -> Array:
+def quadratic(G: Real, eta: Real) -> Real:
     return 0.5 * np.einsum("...mn,m,n->...", G, eta, eta)
 
 
@@ -155,16 +154,16 @@ class Raw:
         self.at_node = self.field[0] + 1.0
 
     @property
-    def gravity(self) -> Array:
+    def gravity(self) -> Real:
         """Stiffness under mass forces along each axis: what they do on the field, with the other sign."""
         return -np.einsum("p,pamn->amn", self.mass, self.field)
 
     @property
-    def gradient(self) -> Array:
+    def gradient(self) -> Real:
         """Under mass forces along a that grow with coordinate b."""
         return -np.einsum("p,pb,pamn->abmn", self.mass, self.position, self.field)
 
-    def scene(self, node: s.ModalNode, field: Array | None, level: s.Level = "stiffened", **stiffness) -> s.Scene:
+    def scene(self, node: s.ModalNode, field: Real | None, level: s.Level = "stiffened", **stiffness) -> s.Scene:
         points = inertia_points(self.mass, self.position, self.shapes, second_translation=field)
         return (
             SceneBuilder("raw", gravity=(1.0, 2.0, 3.0))

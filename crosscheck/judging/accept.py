@@ -1,0 +1,49 @@
+"""Accepting: the figures that cases have reached become those that later runs are held against."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+
+import msgspec
+
+from crosscheck.engines.registry import BUILT_IN
+from crosscheck.judging.accepted import FILE, dumps, figures, merged
+from crosscheck.judging.results import collect
+from crosscheck.library.find import Case
+from crosscheck.records.records import Archive, CaseRecord, read
+from crosscheck.records.session import last_session
+from crosscheck.report.outcome import conclude
+
+
+class NotAccepted(ValueError):
+    """Something is not as expected: its figures are nothing to hold others against."""
+
+
+def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[tuple[Path, int]]:
+    """Write `accepted.toml` of each case from the records; returns the files and how many figures each holds.
+
+    `partial`: only some engines were asked for, so the figures of others are kept. The records are told too, so that
+    they are judged by what they reached. Raises NotAccepted, and writes nothing, unless all is as expected.
+    """
+    cases = tuple(cases)
+    found = last_session(read(records))
+    outcome = conclude(collect(found))
+    if not outcome.ok:
+        raise NotAccepted(f"Nothing is accepted. {outcome.headline}: put that right first.")
+    if outcome.idle:
+        raise NotAccepted(f"Nothing is accepted: nothing was compared in {', '.join(outcome.idle)}. Leave that out.")
+    latest = {record.case: record for record in found if isinstance(record, CaseRecord)}
+    written = []
+    archive = Archive(records)
+    try:
+        for case in cases:
+            now = figures(outcome.verdicts[case.name], BUILT_IN)
+            accepted = merged(case.accepted, now) if partial else now
+            file = case.folder / FILE
+            file.write_text(dumps(accepted), encoding="utf-8")
+            archive.write(msgspec.structs.replace(latest[case.name], accepted=accepted))
+            written.append((file, sum(len(table) for table in accepted.values())))
+    finally:
+        archive.close()
+    return written

@@ -1,0 +1,286 @@
+"""Results: the runs of one engine on one variant, read from records, with the uncertainty of every channel."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, spatial, unknown
+from crosscheck.judging.verdict import Ending, Signal
+from crosscheck.records.records import BrokenLine, CaseRecord, Environment, Packed, Record, RunRecord, RunStatus, unpack
+from flexmb.run.channels import family, magnitude, signal_range
+from flexmb.typing import Real
+
+Key = tuple[str, str, str]  # variant, engine, role
+RUNGS = 3
+
+
+@dataclass
+class Result:
+    """The runs of one ladder, coarse to fine. `status` and `message` are those of the finest effort.
+
+    `refined` is the same engine's result with the finer spatial discretisation, finished or not, where the variant
+    asks for one. `reached_s` is the last sample time of a run that diverged.
+    """
+
+    variant: str
+    engine: str
+    status: RunStatus
+    message: str
+    runs: tuple[RunRecord, ...]
+    reached_s: float | None = None
+    refined: Result | None = None
+    refinement: tuple[float, float] = (2.0, 2.0)
+    _unpacked: dict[int, Real] = field(default_factory=dict, repr=False)
+    _estimates: dict[str, Uncertainty] = field(default_factory=dict, repr=False)
+
+    @property
+    def finest(self) -> RunRecord:
+        """The run at the finest effort."""
+        return self.runs[-1]
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Names of the channels that the finest run has."""
+        return tuple(self.finest.channels) if self.status == "finished" else ()
+
+    @property
+    def times(self) -> Real:
+        """Sample times of the finest run (s)."""
+        assert self.finest.times is not None
+        return self._array(self.finest.times)
+
+    def values(self, channel: str, run: RunRecord | None = None) -> Real:
+        """A channel (T, k) of the finest run, or of another run of the ladder."""
+        return self._array((run or self.finest).channels[channel])
+
+    @property
+    def ending(self) -> Ending:
+        """How a run that did not finish ended; not for one that did."""
+        assert self.status != "finished"
+        return Ending(self.status, f"{self.engine} on {self.variant}: {self.message}", self.reached_s)
+
+    def uncertainty(self, channel: str) -> Uncertainty:
+        """Numerical U of a channel of the finest run, from the last three efforts of its method.
+
+        An effort too coarse to be followed may diverge and is left out. One that is missing for any other reason says
+        nothing about convergence, and neither do the others without it: U is unknown.
+        """
+        if channel not in self._estimates:
+            self._estimates[channel] = self._estimate(channel)
+        return self._estimates[channel]
+
+    def _estimate(self, channel: str) -> Uncertainty:
+        finest = self.finest
+        gap = self._gap(channel)
+        if gap:
+            return unknown(len(self.values(channel)), gap)
+        ladder = [run for run in self._ladder() if run.status == "finished"]
+        if _without_effect(ladder):
+            ladder = ladder[-1:]
+        rungs = [Rung(run.effort_value, self.values(channel, run)) for run in ladder]
+        size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
+        return estimate(channel, finest.effort_kind, rungs, finest.evaluations, size)
+
+    def _ladder(self) -> list[RunRecord]:
+        """The last efforts of the finest run's method."""
+        method = (self.finest.effort_kind, self.finest.effort_method)
+        return [run for run in self.runs if (run.effort_kind, run.effort_method) == method][-RUNGS:]
+
+    def _gap(self, channel: str) -> str:
+        """What the ladder lacks; "" if nothing."""
+        recorded = {run.rung for run in self.runs}
+        missing = [rung for rung in range(self.finest.rungs) if rung not in recorded]
+        if missing:
+            return f"effort {missing[0] + 1} of {self.finest.rungs} is not recorded"
+        for run in self._ladder():
+            if run.status not in ("finished", "diverged"):
+                return f"effort {run.effort} {_past(run.status)}: {run.message}"
+            if run.status == "finished" and channel not in run.channels:
+                return f"effort {run.effort} does not offer the channel"
+        return ""
+
+    def doubt(self, channel: str, across: bool) -> Uncertainty:
+        """U of a channel; `across` variants, the spatial discretisation adds to it.
+
+        Where a refined run was asked for and gives no result, its part of U is unknown, and so is U.
+        """
+        own = self.uncertainty(channel)
+        if not across or self.refined is None:
+            return own
+        fault = self._unrefined(channel, self.refined)
+        if fault:
+            return unknown(len(own.envelope), f"its refined run {fault}")
+        ratio, order = self.refinement
+        envelope = own.envelope + spatial(channel, self.values(channel), self.refined.values(channel), ratio, order)
+        return Uncertainty(envelope, float(envelope[-1]), f"{own.how}; spatial refinement", own.order)
+
+    def _unrefined(self, channel: str, refined: Result) -> str:
+        """Why the refined run says nothing about the channel; "" if it does."""
+        if refined.status != "finished":
+            return f"{_past(refined.status)}: {refined.message}"
+        if channel not in refined.channels:
+            return "does not offer the channel"
+        if _same(self.finest, refined.finest):
+            return "gave the very same result: it is not refined"
+        return ""
+
+    def signal(self, channel: str, across: bool) -> Signal:
+        """The channel as a verdict needs it; `across` variants, the spatial discretisation adds to U."""
+        return self._signal(channel, self.doubt(channel, across))
+
+    def control_signal(self, channel: str, like: Result, across: bool) -> Signal:
+        """The channel of a control's one run, with the U of the same engine's unmutated result `like`."""
+        return self._signal(channel, like.doubt(channel, across))
+
+    def _signal(self, channel: str, doubt: Uncertainty) -> Signal:
+        sizes = [max(signal_range(name, self.values(name)) for name in self._relatives(channel))]
+        if channel.endswith(".torque"):
+            sizes.append(self._largest(".force") * self._largest(".position"))
+        return Signal(self.values(channel), doubt, tuple(sizes))
+
+    def _largest(self, ending: str) -> float:
+        """Largest magnitude (SI) among the channels with that ending; 0 if there is none."""
+        sizes = (magnitude(name, self.values(name)) for name in self.finest.channels if name.endswith(ending))
+        return max(sizes, default=0.0)
+
+    def _relatives(self, channel: str) -> list[str]:
+        kin = family(channel)
+        return [name for name in self.finest.channels if family(name) == kin]
+
+    def _array(self, packed: Packed) -> Real:
+        if id(packed) not in self._unpacked:
+            self._unpacked[id(packed)] = unpack(packed)
+        return self._unpacked[id(packed)]
+
+
+@dataclass(frozen=True)
+class CaseResults:
+    """A case with all its results by (variant, engine, role)."""
+
+    case: CaseRecord
+    results: dict[Key, Result]
+
+    def get(self, variant: str, engine: str, role: str = "main") -> Result:
+        """A result; one that was never recorded "did not run"."""
+        return self.results.get((variant, engine, role)) or _never_recorded(variant, engine)
+
+
+@dataclass(frozen=True)
+class Session:
+    """Everything a file of records says; `broken` are its lines that say nothing."""
+
+    environments: tuple[Environment, ...]
+    cases: tuple[CaseResults, ...]
+    broken: tuple[BrokenLine, ...] = ()
+
+
+def collect(records: Sequence[Record]) -> Session:
+    """Records -> results by case. The last record of a case and of each run counts."""
+    cases = {record.case: record for record in records if isinstance(record, CaseRecord)}
+    runs: dict[tuple[str, ...], RunRecord] = {}
+    for record in records:
+        if isinstance(record, RunRecord):
+            runs.pop(record.key, None)  # so that the order is that of the last records
+            runs[record.key] = record
+    return Session(
+        environments=tuple(record for record in records if isinstance(record, Environment)),
+        cases=tuple(
+            _case_results(case, [run for run in runs.values() if run.case == name]) for name, case in cases.items()
+        ),
+        broken=tuple(record for record in records if isinstance(record, BrokenLine)),
+    )
+
+
+def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
+    groups: dict[Key, list[RunRecord]] = {}
+    ladders: dict[tuple[str, str], list[tuple[str, str, float]]] = {}
+    for variant in case.run.variants:
+        for item in variant.efforts:
+            prescribed = [(item.kind, item.method, value) for value in item.values]
+            ladders.setdefault((variant.name, item.engine), []).extend(prescribed)
+    for run in runs:
+        ladder = ladders.get((run.variant, run.engine))
+        if not run.effort or ladder is None or _on(ladder, run):
+            groups.setdefault((run.variant, run.engine, run.role), []).append(run)
+    results = {key: _result(key, group) for key, group in groups.items()}
+    for variant in case.run.variants:
+        if variant.refined is None:
+            continue
+        counts = [(getattr(variant, key), getattr(variant.refined, key)) for key in ("segments", "pieces")]
+        ratio = next((fine / coarse for coarse, fine in counts if fine is not None), 2.0)
+        for engine in variant.engines:
+            main, refined = results.get((variant.name, engine, "main")), results.get((variant.name, engine, "refined"))
+            if main is not None:
+                main.refined = refined or _never_recorded(variant.name, engine)
+                main.refinement = (ratio, variant.refined.order)
+    return CaseResults(case, results)
+
+
+def _malformed(run: RunRecord) -> str:
+    """How a finished run's signals are none, each (T, k) with T sample times; "" if they are."""
+    if run.status != "finished":
+        return ""
+    if run.times is None:
+        return "its record holds no times"
+    samples = run.times.shape
+    for name, packed in run.channels.items():
+        if len(samples) != 1 or samples[0] == 0 or len(packed.shape) != 2 or packed.shape[0] != samples[0]:
+            return f"its record holds {name} of shape {packed.shape} at times of shape {samples}"
+    return ""
+
+
+def _never_recorded(variant: str, engine: str) -> Result:
+    return Result(variant, engine, "did not run", "no run of it is recorded: the session was cut short", ())
+
+
+def _on(ladder: Sequence[tuple[str, str, float]], run: RunRecord) -> bool:
+    """Whether a run is one of the efforts that the case prescribes now, at its place; another ladder's say nothing."""
+    place = slice(run.rung, run.rung + 1)
+    return run.rungs == len(ladder) and list(ladder[place]) == [(run.effort_kind, run.effort_method, run.effort_value)]
+
+
+def _without_effect(ladder: Sequence[RunRecord]) -> bool:
+    """Whether the last two efforts did the very same work with the very same result.
+
+    Then the engine did not follow the effort (say, a step cut short by the sample times), and equality means nothing.
+    """
+    return len(ladder) >= 2 and _same(*ladder[-2:])
+
+
+def _same(one: RunRecord, other: RunRecord) -> bool:
+    """Whether two runs did the very same work with the very same result in every channel of the second."""
+    return one.evaluations == other.evaluations and all(
+        name in one.channels and one.channels[name].data == packed.data for name, packed in other.channels.items()
+    )
+
+
+def _past(status: RunStatus) -> str:
+    """A status as what a run did."""
+    return f"was {status}" if status == "refused" else status
+
+
+def _result(key: Key, group: list[RunRecord]) -> Result:
+    """A result from the runs of one scene and one origin: those of the record that came last."""
+    variant, engine, _ = key
+    last = group[-1]
+    if not last.effort:
+        return Result(variant, engine, last.status, last.message, ())
+    stamp = (last.scene, last.version, last.rungs, last.made_by)
+    same = [run for run in group if run.effort and (run.scene, run.version, run.rungs, run.made_by) == stamp]
+    rungs = {run.rung: run for run in same}  # of two ladders as long as each other, what came last counts
+    runs = tuple(rungs[rung] for rung in sorted(rungs))
+    finest = runs[-1]
+    if finest.rung < finest.rungs - 1:
+        message = "the finest effort is not recorded: the session was cut short"
+        return Result(variant, engine, "did not run", message, runs)
+    fault = _malformed(finest)
+    if fault:
+        return Result(variant, engine, "failed", fault, runs)
+    if finest.status != "diverged":
+        return Result(variant, engine, finest.status, finest.message, runs)
+    reached = 0.0 if finest.times is None else float(np.max(unpack(finest.times), initial=0.0))
+    message = f"diverged at t = {reached:.4g} s: {finest.message}"
+    return Result(variant, engine, "diverged", message, runs, reached)

@@ -1,0 +1,206 @@
+"""Verdicts: what can be said about two results on a channel, given their numerical uncertainties.
+
+E = max |a - b| over the run and U = U_a + U_b. **agree**: E <= U and U within the goal. **differ**: E > U.
+**unresolved**: E <= U but U above the goal, so that sloppiness cannot pass as agreement; or U, goal or scale are none.
+Where there is nothing to compare, the status is that of the graver of the two runs. **refused**: an engine cannot
+represent the scene or does not offer the channel. **diverged**: the engine says so, and how far it got. **failed**: the
+adapter raised, broke the contract, or gave values that are no numbers. **did not finish**: it ran into its limit of
+time or memory. **crashed**: its process died. **did not run**: an engine or a result that was asked for is missing. The
+last three are never what was expected.
+E, U and the goal are relative to the channel's range (or to the scale that the case states). Where that range lies
+below U, the signal is zero as far as can be told, and the range of its family (say, all hinge torques) is used.
+
+Judging is total: it has an answer to every input, and none that is not finite, or not positive where it must be, can
+end as agreement. It asks whether what it needs holds, never whether it fails: a comparison with NaN is false.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Literal, get_args
+
+import msgspec
+import numpy as np
+
+from crosscheck.judging.accepted import Figure
+from crosscheck.judging.uncertainty import Uncertainty
+from flexmb.run.channels import distance, family, signal_range
+from flexmb.typing import Real
+
+Status = Literal[
+    "agree",
+    "differ",
+    "unresolved",
+    "refused",
+    "diverged",
+    "failed",
+    "did not finish",
+    "crashed",
+    "did not run",
+]
+STATUSES: tuple[Status, ...] = get_args(Status)
+# The gravest first: what stands for several.
+GRAVITY: tuple[Status, ...] = (
+    "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
+)  # fmt: skip
+NEVER_EXPECTED = ("did not finish", "crashed", "did not run")
+WHOLE_RANGE = 1.0  # a goal beyond it resolves nothing
+
+
+class Verdict(msgspec.Struct, frozen=True, kw_only=True):
+    """One judged channel of one comparison; the records of verdicts.json. `scale` is in the channel's SI unit.
+
+    `outside` says how a result with the expected status is beyond the bounds that the case sets to it. `accepted` are
+    the figures reached when the case's figures were last accepted, `worse` says how E or U has grown since.
+    """
+
+    case: str
+    comparison: str
+    kind: Literal["comparison", "control", "conservation"]
+    channel: str
+    variant_a: str
+    engine_a: str
+    variant_b: str
+    engine_b: str
+    level: str
+    status: Status
+    expected: Status
+    E: float | None
+    U: float | None
+    goal: float
+    scale: float | None
+    reason: str
+    expected_reason: str = ""
+    outside: str = ""
+    accepted: Figure | None = None
+    worse: str = ""
+
+    @property
+    def sides(self) -> tuple[tuple[str, str], tuple[str, str]]:
+        """Variant and engine of its two sides."""
+        return (self.variant_a, self.engine_a), (self.variant_b, self.engine_b)
+
+    @property
+    def ok(self) -> bool:
+        """Whether it came out as the case expects, within its bounds; what crashed or did not run never does."""
+        return self.status == self.expected and not self.outside and self.status not in NEVER_EXPECTED
+
+
+@dataclass(frozen=True)
+class Ending:
+    """How a run that did not finish ended, and the last sample time it reached (s), if it reached any."""
+
+    status: Status
+    reason: str
+    reached_s: float | None = None
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A status with its numbers (relative) and a reason a reader understands.
+
+    `endings`: of the runs that did not finish, where that is why there is nothing to compare.
+    """
+
+    status: Status
+    reason: str
+    E: float | None = None
+    U: float | None = None
+    scale: float | None = None
+    endings: tuple[Ending, ...] = ()
+
+
+@dataclass(frozen=True)
+class Signal:
+    """One channel of one result: values (T, k), U, and further sizes (SI) for a signal that is zero within U.
+
+    `sizes`: the largest range in the channel's family (say, all hinge torques); for torques then the largest force
+    times the extent of the scene, since a torque that vanishes is the balance of forces at such distances.
+    """
+
+    values: Real
+    uncertainty: Uncertainty
+    sizes: tuple[float, ...]
+
+
+def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None = None) -> Finding:
+    """Judge two finished signals on the same times; `scale` replaces the larger of their ranges. Never raises."""
+    nothing = _incomparable(a.values, b.values) or _unmeasurable(a, b, goal, scale)
+    if nothing is not None:
+        return nothing
+    error = float(np.max(distance(channel, a.values, b.values)))
+    total = a.uncertainty.value + b.uncertainty.value
+    if not np.isfinite(error):
+        return Finding("failed", "the results are so large that their distance is no number")
+    if error == total == 0.0:
+        return Finding("agree", "the results are equal to the last digit", 0.0, 0.0, scale)
+    size = scale if scale is not None else _size(channel, a, b, total)
+    if not 0.0 < size < np.inf:
+        return Finding("unresolved", f"the signal's size is {size:g}: the case must state a scale for this channel")
+    with np.errstate(over="ignore"):
+        apart, doubt = (float(np.float64(number) / size) for number in (error, total))
+    if not np.isfinite(apart):
+        return Finding("unresolved", f"the distance {error:.2g} is beyond measure in units of the scale {size:.2g}")
+    if error > total:
+        beyond = f"{error / total:.3g} x their uncertainty" if total > 0.0 else "with no uncertainty to excuse it"
+        return Finding("differ", f"the results are {apart:.2g} of the range apart, {beyond}", apart, doubt, size)
+    if not doubt <= goal:
+        cause = max((a, b), key=lambda signal: signal.uncertainty.value).uncertainty.how
+        text = f"uncertainty {doubt:.2g} exceeds the goal {goal:.2g}; largest part: {cause}"
+        return Finding("unresolved", text, apart, doubt, size)
+    return Finding("agree", f"{apart:.2g} of the range apart, within the uncertainty {doubt:.2g}", apart, doubt, size)
+
+
+def conserve(drift: Real, scale: float, limit: float) -> Finding:
+    """Judge a conserved quantity: drift (T,) in SI relative to `scale` against `limit`, at its worst. Never raises."""
+    if drift.size == 0 or not np.all(np.isfinite(drift)):
+        return Finding("failed", "the quantity holds values that are not numbers, or none at all")
+    if not 0.0 < limit <= WHOLE_RANGE:
+        return Finding("unresolved", f"a limit of {limit:g} is no limit: it must lie between 0 and 1")
+    if not 0.0 < scale < np.inf:
+        text = f"the quantity's size is {scale:g}: the case must state a scale to measure drift by"
+        return Finding("unresolved", text)
+    with np.errstate(over="ignore"):
+        worst = float(np.max(np.abs(drift)) / scale)
+    if not np.isfinite(worst):
+        return Finding("unresolved", f"the drift is beyond measure in units of the scale {scale:.2g}")
+    if worst > limit:
+        return Finding("differ", f"drifts by {worst:.2g}, more than the limit {limit:.2g}", worst, scale=scale)
+    return Finding("agree", f"drifts by {worst:.2g}, within the limit {limit:.2g}", worst, scale=scale)
+
+
+def _incomparable(a: Real, b: Real) -> Finding | None:
+    """Why there is nothing to take a distance of, if so."""
+    if a.ndim != 2 or a.shape != b.shape:
+        return Finding("failed", f"the results are of different shapes, {a.shape} and {b.shape}: samples by components")
+    if a.size == 0:
+        return Finding("failed", "the results hold no values at all")
+    if not (np.all(np.isfinite(a)) and np.all(np.isfinite(b))):
+        return Finding("failed", "a result holds values that are not numbers")
+    return None
+
+
+def _unmeasurable(a: Signal, b: Signal, goal: float, scale: float | None) -> Finding | None:
+    """Why no distance means anything here, if so: U, goal, scale or sizes that are none."""
+    for uncertainty in (a.uncertainty, b.uncertainty):
+        if not uncertainty.value >= 0.0:
+            return Finding("unresolved", f"an uncertainty of {uncertainty.value:g} is none: {uncertainty.how}")
+    if not 0.0 < goal <= WHOLE_RANGE:
+        return Finding("unresolved", f"a goal of {goal:g} is none: it must lie between 0 and 1")
+    if scale is not None and not 0.0 < scale < np.inf:
+        return Finding("unresolved", f"a scale of {scale:g} is none: it must be positive and finite")
+    if not all(0.0 <= size < np.inf for size in (*a.sizes, *b.sizes)):
+        return Finding("unresolved", f"the sizes of the signals, {(*a.sizes, *b.sizes)}, are not all finite")
+    return None
+
+
+def _size(channel: str, a: Signal, b: Signal, total: float) -> float:
+    """Range of the two signals, or the first of their further sizes above `total`, their uncertainty (SI).
+
+    Kinds of energy turn into each other: their size is always that of the largest of them.
+    """
+    own = max(signal_range(channel, a.values), signal_range(channel, b.values))
+    further = [max(pair) for pair in zip_longest(a.sizes, b.sizes, fillvalue=0.0)]
+    candidates = further if family(channel) == "energy" else [own, *further]
+    return next((size for size in candidates if size > total), max(candidates, default=0.0))

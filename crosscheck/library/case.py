@@ -1,0 +1,299 @@
+"""What a case folder says: the structs behind run.toml and provenance.toml, and the rules they must satisfy.
+
+A case is a folder ``cases/<family>/<case>/`` with ``scene.toml`` (and further scenes), ``run.toml``,
+``provenance.toml`` and ``README.md``. Unknown keys are refused with their place. A complete run.toml::
+
+    title = "Pendulum with two arms"
+    tags = ["canonical"]
+    duration_s = 10.0
+    samples = 201
+
+    [[variant]]                       # one model of the physics, run by several engines
+    name = "rigid"
+    engines = ["native", "pinocchio", "mujoco", "exudyn"]
+
+    [[variant]]
+    name = "full"
+    scene = "flexible.toml"
+    engines = ["native"]
+    also = ["native-frisch"]          # charted, and compared where named
+
+    [[variant]]
+    name = "segments"
+    scene = "flexible.toml"
+    transform = "segments"
+    segments = 16
+    refined = { segments = 32 }       # its distance to the refined model is the discretisation's uncertainty
+    engines = ["native", "pinocchio"]
+
+    [[comparison]]                    # every pair of the variant's engines (or of `engines`)
+    name = "rigid, all engines"
+    variant = "rigid"
+    goals = { "marker:tip.position" = 1e-7, "load" = 1e-6, "energy" = 1e-9 }
+
+    [[comparison]]                    # one named pair
+    name = "flexible against segments"
+    a = { variant = "full", engine = "native" }
+    b = { variant = "segments", engine = "pinocchio" }
+    goals = { "marker:tip.position" = 1e-2 }
+    expect = "differ"
+    band = { "marker:tip.position" = [2e-2, 2e-1] }    # E is expected within
+    reason = "the unstiffened body bends by more than the beam"
+
+    [[comparison]]
+    name = "flexible to the end"
+    a = { variant = "full", engine = "native-frisch" }
+    b = { variant = "segments", engine = "pinocchio" }
+    goals = { "marker:tip.position" = 1e-2 }
+    expect = "diverged"
+    diverged_s = [7.5, 8.5]           # the last sample time reached is expected within
+    reason = "above the critical speed the unstiffened body diverges"
+
+    [[control]]                       # a deliberate fault that must be seen
+    name = "upper arm 1 % too heavy"
+    mutation = "mass"
+    target = "upper"
+    a = { variant = "rigid", engine = "native" }       # runs the faulty scene
+    b = { variant = "rigid", engine = "pinocchio" }    # runs the true one
+    goals = { "marker:tip.position" = 1e-6 }
+
+    [[conservation]]
+    variant = "rigid"
+    quantity = "energy"
+    limit = 1e-9
+
+    [[chart]]                         # work-precision chart
+    observable = "marker:tip.position"
+    variants = ["rigid", "segments"]
+    reference = "rigid"
+
+Channels are named ``marker:<name>.position | orientation | velocity | angular_velocity``, ``energy.<kind>``,
+``energy.total``, ``momentum.angular | linear``, ``load:<hinge>.torque | force``,
+``wheel_load:<wheel>.torque | force`` and ``drive:<name>``. A pattern is a channel, a shell pattern of one
+(``marker:*.position``), or its beginning (``load``, ``load:elbow``, ``energy``); the longest that names a channel
+counts. A goal is the largest uncertainty, relative to the channel's range, with which a comparison still counts as
+resolved.
+
+An expectation other than *agree* needs its reason in words, and bounds, outside of which it is not as expected:
+``band`` for the size of E (*differ*) or of U (*unresolved*), for each pattern of channels ``[low, high]`` with high at
+most 100 times low; ``diverged_s`` for the last sample time that a *diverged* run reached, at most a quarter of the run
+wide; ``because`` for a text that the engine's own reason must contain (*failed*, *refused*). What crashed, did not
+finish or did not run is never as expected. Statuses are explained in `crosscheck.judging.verdict`.
+
+Every key, those with a default in brackets with it; the structs below say more of each:
+
+- at the top: ``title``; ``tags`` [none]; ``duration_s`` (s); ``samples`` (from 0 to the end, both counted);
+  ``time_limit_s`` [1800] (s), for one engine on one variant with all its efforts; ``--time-limit`` comes before it;
+- ``variant``: ``name``; ``scene`` ["scene.toml"]; ``transform`` ["none"], or "rigidify", "modal_points", "segments"
+  with their number ``segments``, "substructures" with ``pieces`` and ``eigenmodes`` [0], the last two for
+  ``split_body`` [every beam] alone; ``level`` [the scene's] of all flexible bodies; ``refined`` [none] with
+  ``segments``, ``pieces`` or ``elements`` and ``order`` [2.0]; ``engines``; ``also`` [none]; ``efforts`` [the
+  engine's own], each with ``engine``, ``kind`` ("tolerance" or "step"), ``method`` and falling ``values``;
+  ``duration_s`` and ``samples`` [the case's]; ``note`` [none], shown in the report;
+- ``comparison``: ``name``; ``variant`` with ``engines`` [all of the variant's], or ``a`` and ``b``, each with a
+  ``variant`` and an ``engine``; ``goals``; ``scales`` [the ranges] (SI); ``expect`` ["agree"]; ``band``, ``diverged_s``
+  or ``because``, as ``expect`` needs; ``reason``;
+- ``control``: ``name``; ``mutation``; ``target`` [the scene]; ``a``; ``b``; ``goals``; ``scales``, as above;
+- ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``;
+  ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (for it all),
+  ``diverged_s``, ``because`` and ``reason``, as above;
+- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
+
+``case_check.py`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
+that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
+the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.judging.accepted`).
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+from flexmb.scene.schema import Level
+
+Expectation = Literal["agree", "differ", "unresolved", "refused", "diverged", "failed"]
+Band = tuple[float, float]  # lowest and highest that is as expected
+Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
+TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
+MutationKind = Literal[
+    "mass",
+    "inertia",
+    "com",
+    "hinge_axis",
+    "hinge_rotation",
+    "node_rotation",
+    "gravity_sign",
+    "wheel_axis",
+    "stiffness",
+    "dropped_stiffening",
+]
+Quantity = Literal["energy", "linear_momentum", "angular_momentum"]
+
+
+class CaseError(ValueError):
+    """A case folder that cannot be run: the message names the file, the place in it and the remedy."""
+
+
+class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Refuses unknown keys; frozen."""
+
+
+class Side(_Strict, frozen=True, kw_only=True):
+    """One side of a comparison: a variant run by an engine."""
+
+    variant: str
+    engine: str
+
+
+class Refined(_Strict, frozen=True, kw_only=True):
+    """A finer spatial discretisation of the same variant: more segments, pieces or elements per beam.
+
+    `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment
+    and for pieces of level "full").
+    """
+
+    segments: int | None = None
+    pieces: int | None = None
+    elements: int | None = None
+    order: float = 2.0
+
+
+class EffortLadder(_Strict, frozen=True, kw_only=True):
+    """Efforts that replace an engine's own ladder for a variant: `values` from coarse to fine, at least two."""
+
+    engine: str
+    kind: Literal["tolerance", "step"]
+    method: str
+    values: tuple[float, ...]
+
+
+class Variant(_Strict, frozen=True, kw_only=True):
+    """A model of the case: a scene file, a transformation, and the engines that run the result.
+
+    `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes), "segments" (every
+    beam, or `split_body` only, as `segments` rigid segments) or "substructures" (likewise as `pieces` flexible pieces
+    welded together, each with `eigenmodes` besides its attachment modes). `level` replaces the level of every flexible
+    body. `engines` are compared engine by engine; those in `also` run the variant too, for its charts and for what
+    names them. `duration_s` and `samples` replace the case's. `note` is shown in the report.
+    """
+
+    name: str
+    scene: str = "scene.toml"
+    transform: Transform = "none"
+    segments: int | None = None
+    pieces: int | None = None
+    eigenmodes: int = 0
+    split_body: str | None = None
+    level: Level | None = None
+    refined: Refined | None = None
+    engines: tuple[str, ...]
+    also: tuple[str, ...] = ()
+    efforts: tuple[EffortLadder, ...] = ()
+    duration_s: float | None = None
+    samples: int | None = None
+    note: str = ""
+
+
+class Comparison(_Strict, frozen=True, kw_only=True):
+    """Two results held against each other: `a` and `b`, or every pair of `engines` of one `variant`.
+
+    `goals` maps channel patterns to the resolution goal, relative to the channel's range. `scales` replaces the range
+    by an absolute size (SI) for channels whose range is no measure, such as a momentum that stays zero. `band`,
+    `diverged_s` and `because` are the bounds of an expectation other than "agree".
+    """
+
+    name: str
+    variant: str | None = None
+    engines: tuple[str, ...] = ()
+    a: Side | None = None
+    b: Side | None = None
+    goals: dict[str, float]
+    scales: dict[str, float] = {}
+    expect: Expectation = "agree"
+    band: dict[str, Band] = {}
+    diverged_s: Band | None = None
+    because: str = ""
+    reason: str = ""
+
+
+class Control(_Strict, frozen=True, kw_only=True):
+    """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; they must come out *differ*.
+
+    Mutations: "mass" and "inertia" (+1 % of body `target`), "com" (+1 % of the body's mass-centre offset),
+    "hinge_axis" (sign of hinge `target`), "hinge_rotation" and "node_rotation" (conjugated quaternion of hinge or
+    "body.node" `target`), "gravity_sign", "wheel_axis" (sign of wheel `target`), "stiffness" (+1 % of the springs of
+    hinge or of body `target`), "dropped_stiffening" (level stiffened becomes full).
+    """
+
+    name: str
+    mutation: MutationKind
+    target: str = ""
+    a: Side
+    b: Side
+    goals: dict[str, float]
+    scales: dict[str, float] = {}
+
+
+class Conservation(_Strict, frozen=True, kw_only=True):
+    """A conserved quantity: its drift over the run, less the recorded work, relative to `scale`, is at most `limit`.
+
+    `scale` (SI) is by default the largest magnitude reached: for the energy the largest sum of magnitudes of its kinds.
+    `engines` are by default all of the variant's. Bounds of an expectation are those of a comparison, with one `band`.
+    """
+
+    variant: str
+    quantity: Quantity
+    limit: float
+    engines: tuple[str, ...] = ()
+    scale: float | None = None
+    expect: Expectation = "agree"
+    band: Band | None = None
+    diverged_s: Band | None = None
+    because: str = ""
+    reason: str = ""
+
+
+class Chart(_Strict, frozen=True, kw_only=True):
+    """A work-precision chart: error of `observable` against the most certain result of variant `reference`."""
+
+    title: str = ""
+    observable: str
+    variants: tuple[str, ...]
+    reference: str
+
+
+class RunFile(_Strict, frozen=True, kw_only=True):
+    """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together."""
+
+    title: str
+    tags: tuple[str, ...] = ()
+    duration_s: float
+    samples: int
+    time_limit_s: float | None = None
+    variants: tuple[Variant, ...] = msgspec.field(name="variant")
+    comparisons: tuple[Comparison, ...] = msgspec.field(name="comparison", default=())
+    controls: tuple[Control, ...] = msgspec.field(name="control", default=())
+    conservations: tuple[Conservation, ...] = msgspec.field(name="conservation", default=())
+    charts: tuple[Chart, ...] = msgspec.field(name="chart", default=())
+
+    def variant(self, name: str) -> Variant:
+        """The variant called `name`; CaseError names those there are."""
+        for variant in self.variants:
+            if variant.name == name:
+                return variant
+        known = ", ".join(variant.name for variant in self.variants)
+        raise CaseError(f'no variant "{name}"; the variants are {known}')
+
+
+class Provenance(_Strict, frozen=True, kw_only=True):
+    """provenance.toml: where the case's data and its expected outcome come from.
+
+    `reference` says what anchors the case: a published number, a closed form, or the agreement of independent codes.
+    `uncertainty` states, in words and numbers, how well that anchor is known.
+    """
+
+    reference: Literal["published", "closed form", "high precision", "independent codes"]
+    sources: tuple[str, ...]
+    uncertainty: str
+    notes: str = ""

@@ -1,0 +1,136 @@
+"""The case library: finding case folders, shipped or the user's own, and reading them."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, field
+from importlib.resources import as_file, files
+from pathlib import Path
+from typing import TypeVar
+
+from crosscheck.judging.accepted import FILE as ACCEPTED
+from crosscheck.judging.accepted import Accepted
+from crosscheck.library.case import CaseError, Provenance, RunFile, Variant
+from crosscheck.library.case_check import check_accepted, check_run_file
+from flexmb.scene.convert import to_struct
+from flexmb.scene.files import load_scene
+from flexmb.scene.problems import SceneError, closest
+from flexmb.scene.reading import Unreadable, parse_toml, read_text
+from flexmb.scene.schema import Scene
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Case:
+    """A case folder that was read and checked. `name` is "<family>/<case>"."""
+
+    name: str
+    folder: Path
+    run: RunFile
+    provenance: Provenance | None
+    readme: str
+    accepted: Accepted = field(default_factory=dict)
+
+    def scene(self, variant: Variant) -> Scene:
+        """The variant's scene as its file says, before any transformation."""
+        return load_scene(self.folder / variant.scene)
+
+
+def shipped_folder() -> Path:
+    """Folder of the shipped cases: package data of an installed wheel, or `cases/` beside the package in a checkout."""
+    packaged = files("crosscheck") / "cases"
+    if packaged.is_dir():
+        with as_file(packaged) as folder:
+            return folder
+    return Path(__file__).resolve().parents[2] / "cases"
+
+
+def shipped_cases() -> tuple[Case, ...]:
+    """Every shipped case, by name."""
+    return tuple(load_case(path.parent) for path in sorted(shipped_folder().glob("*/*/run.toml")))
+
+
+def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
+    """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder.
+
+    CaseError also for two folders whose cases have the same name: records and report could not tell them apart.
+    """
+    found: dict[str, Case] = {}
+    for word in words:
+        for case in _resolve_one(word):
+            other = found.setdefault(case.name, case)
+            if other.folder != case.folder:
+                raise CaseError(
+                    f"{other.folder} and {case.folder} are both called {case.name}: rename a folder, or run one alone"
+                )
+    return tuple(found.values())
+
+
+def _resolve_one(word: str) -> tuple[Case, ...]:
+    folder = Path(word)
+    if os.path.isfile(folder / "run.toml"):  # False for whatever cannot even be a path
+        return (load_case(folder),)
+    cases = shipped_cases()
+    named = tuple(case for case in cases if word in (case.name, case.name.partition("/")[2]))
+    chosen = named or tuple(case for case in cases if word == "all" or word in case.run.tags)
+    if not chosen:
+        known = {name for case in cases for name in (case.name, case.name.partition("/")[2], *case.run.tags)}
+        raise CaseError(
+            f'"{word}" is no case, no tag and no folder with a run.toml: {closest(word, known)}. '
+            "`crosscheck list` shows them all."
+        )
+    return chosen
+
+
+def load_case(folder: Path) -> Case:
+    """Read and check a case folder; CaseError names file, place and remedy."""
+    folder = folder.resolve()
+    run = _read(folder / "run.toml", RunFile)
+    try:
+        check_run_file(run)
+    except CaseError as error:
+        raise CaseError(f"{folder / 'run.toml'}: {error}") from None
+    for variant in run.variants:
+        if not os.path.isfile(folder / variant.scene):
+            missing = f'variant "{variant.name}" needs {variant.scene}, which is not there'
+            raise CaseError(f"{folder / 'run.toml'}: {missing}")
+    accepted: Accepted = {}
+    if _present(folder / ACCEPTED):
+        accepted = _read(folder / ACCEPTED, Accepted)
+        try:
+            check_accepted(accepted, run)
+        except CaseError as error:
+            raise CaseError(f"{folder / ACCEPTED}: {error}") from None
+    provenance_file, readme = folder / "provenance.toml", folder / "README.md"
+    return Case(
+        name=f"{folder.parent.name}/{folder.name}",
+        folder=folder,
+        run=run,
+        provenance=_read(provenance_file, Provenance) if _present(provenance_file) else None,
+        readme=_text(readme) if _present(readme) else "",
+        accepted=accepted,
+    )
+
+
+def _present(file: Path) -> bool:
+    """Whether anything stands at the file's place: what cannot be read is refused there, not passed over."""
+    return os.path.lexists(file)
+
+
+def _read(file: Path, kind: type[T]) -> T:
+    try:
+        return to_struct(parse_toml(_text(file)), kind, str(file))
+    except SceneError as error:  # the file of a case is no scene, whose message would call it one
+        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
+    except (Unreadable, RecursionError, OverflowError) as error:
+        raise CaseError(f"{file}: {error}") from None
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_text(file)
+    except Unreadable as error:
+        raise CaseError(f"{file}: {error}") from None
+    except OSError as error:
+        raise CaseError(f"{file}: {error.strerror}") from None

@@ -1,0 +1,59 @@
+"""Patterns of channels in a run file: which of several names a channel, and whether one can name any channel at all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from fnmatch import fnmatchcase
+
+from flexmb.run.channels import matches
+
+PARTS = {
+    "marker": ("position", "orientation", "velocity", "angular_velocity"),
+    "load": ("torque", "force"),
+    "wheel_load": ("torque", "force"),
+    "drive": (),
+}
+KINDS = {
+    "energy": ("kinetic", "strain", "spring", "gravity", "total"),
+    "momentum": ("angular", "linear"),
+    "work": (),
+}
+
+
+def most_specific(patterns: Iterable[str], channel: str) -> str | None:
+    """The longest of the patterns that name the channel, the first of several; None where none does."""
+    return max((pattern for pattern in patterns if matches(pattern, channel)), key=len, default=None)
+
+
+def fault(pattern: str) -> str:
+    """Why no channel can have such a name; "" if one can.
+
+    A pattern is a kind (`load`), a kind and a name (`load:elbow`), or these and a part (`load:elbow.torque`). A name
+    with a dot needs its part, or `.*`.
+    """
+    kind, named, rest = pattern.partition(":")
+    if named:
+        parts = _matching(PARTS, kind)
+        if not parts:
+            return f'there is no kind "{kind}:"; it is one of {", ".join(f"{each}:" for each in PARTS)}'
+        name, dot, part = rest.rpartition(".")
+        if not (name if dot else rest):
+            return f"it names no {kind}"
+        known = [each for group in parts for each in group]
+        if dot and known and not any(fnmatchcase(each, part) for each in known):
+            return f'there is no "{part}" of a {kind}; it is one of {", ".join(known)}'
+        return ""
+    kind, dotted, part = pattern.partition(".")
+    if not dotted:
+        known = [*PARTS, *KINDS]
+        return "" if any(fnmatchcase(each, kind) for each in known) else f"it is none of {', '.join(known)}"
+    parts = _matching(KINDS, kind)
+    known = [each for group in parts for each in group]
+    if any(fnmatchcase(each, part) for each in known):
+        return ""
+    whole = ", ".join(f"{each}.{part}" for each, group in KINDS.items() for part in group)
+    return f"channels with a dot alone are {whole}"
+
+
+def _matching(table: dict[str, tuple[str, ...]], kind: str) -> list[tuple[str, ...]]:
+    return [parts for each, parts in table.items() if fnmatchcase(each, kind)]

@@ -1,0 +1,112 @@
+"""What of a case is run: its run file reduced to the engines that were asked for, every comparison an explicit pair.
+A variant then has one list of engines, those beside it among them.
+
+No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
+only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
+engine by engine; if it does not exist, that shows as *did not run*.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from itertools import combinations
+
+import msgspec
+
+from crosscheck.engines.registry import BUILT_IN
+from crosscheck.library.case import Chart, Comparison, Conservation, RunFile, Side, Variant
+from flexmb.scene.problems import closest
+
+
+def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
+    """The reduced run file; variants keep the engines that something needs, and go where nothing does."""
+    run = _joined(run, asked)
+    comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison)]
+    kept = tuple(pair for pair in comparisons if _wanted(asked, (pair.a.engine, pair.b.engine)))
+    controls = tuple(control for control in run.controls if _wanted(asked, (control.a.engine, control.b.engine)))
+    conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
+    needed = {(side.variant, side.engine) for item in (*kept, *controls) for side in (item.a, item.b)}
+    needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
+    needed |= {(v.name, engine) for v in run.variants for engine in _all(v) if engine in asked or not asked}
+    variants = tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines)
+    return msgspec.structs.replace(
+        run,
+        variants=variants,
+        comparisons=kept,
+        controls=controls,
+        conservations=conservations,
+        charts=_charts(run.charts, {variant.name for variant in variants}),
+    )
+
+
+def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
+    """Which of the engines asked for nothing in any of the run files is for, and which could be; "" if none is idle."""
+    runs = tuple(runs)
+    busy = {engine for run in runs for variant in select(run, asked).variants for engine in variant.engines}
+    idle = [engine for engine in asked if engine not in busy]
+    known = {engine for run in runs for variant in run.variants for engine in _all(variant)}
+    if not idle:
+        return ""
+    return f"no case that was asked for has a part for engine {', '.join(idle)}: {closest(idle[0], known)}"
+
+
+def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
+    """The run file with foreign engines added to the variants that are compared engine by engine."""
+    known = set(BUILT_IN).union(*(_all(variant) for variant in run.variants))
+    foreign = tuple(engine for engine in asked if engine not in known)
+    open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
+    variants = tuple(
+        msgspec.structs.replace(variant, engines=variant.engines + foreign) if variant.name in open_to_all else variant
+        for variant in run.variants
+    )
+    return msgspec.structs.replace(run, variants=variants)
+
+
+def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
+    """A comparison as explicit pairs."""
+    if comparison.variant is None:
+        return [comparison]
+    engines = comparison.engines or run.variant(comparison.variant).engines
+    return [
+        msgspec.structs.replace(
+            comparison,
+            variant=None,
+            engines=(),
+            a=Side(variant=comparison.variant, engine=first),
+            b=Side(variant=comparison.variant, engine=second),
+        )
+        for first, second in combinations(engines, 2)
+    ]
+
+
+def _wanted(asked: tuple[str, ...], involved: tuple[str, str]) -> bool:
+    if not asked:
+        return True
+    if len(asked) == 1:
+        return asked[0] in involved
+    return set(involved) <= set(asked)
+
+
+def _narrowed(run: RunFile, item: Conservation, asked: tuple[str, ...]) -> Conservation | None:
+    engines = item.engines or run.variant(item.variant).engines
+    kept = tuple(engine for engine in engines if not asked or engine in asked)
+    return msgspec.structs.replace(item, engines=kept) if kept else None
+
+
+def _keep(variant: Variant, needed: set[tuple[str, str]]) -> Variant:
+    engines = tuple(engine for engine in _all(variant) if (variant.name, engine) in needed)
+    efforts = tuple(ladder for ladder in variant.efforts if ladder.engine in engines)
+    return msgspec.structs.replace(variant, engines=engines, also=(), efforts=efforts)
+
+
+def _all(variant: Variant) -> tuple[str, ...]:
+    return (*variant.engines, *variant.also)
+
+
+def _charts(charts: tuple[Chart, ...], names: set[str]) -> tuple[Chart, ...]:
+    """Charts whose reference still runs, with the variants that do."""
+    return tuple(
+        msgspec.structs.replace(chart, variants=tuple(name for name in chart.variants if name in names))
+        for chart in charts
+        if chart.reference in names
+    )

@@ -1,0 +1,95 @@
+"""What made a result, as one key: a recorded result counts for as long as its key is that of the sources here.
+
+The key is a digest of the texts of all source files that can take part (`sources`), of the versions and contents of the
+libraries these import and of what those require in turn, of the settings of the compiler, of Python and of the machine.
+Scene, sample times and effort are fields of the record itself. A changed comment changes the key too: running again is
+cheaper than being wrong.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import platform
+import re
+import sys
+from collections.abc import Iterable
+from functools import cache
+from importlib.metadata import Distribution, PackageNotFoundError, distribution
+from pathlib import Path
+
+from crosscheck.records.records import processor
+from crosscheck.records.sources import owner, sources
+
+# What of the harness has a part in the numbers that are recorded; their own imports serve other ends.
+RECORDING = (
+    "crosscheck.running.execute",
+    "crosscheck.running.checked",
+    "crosscheck.engines.contract",
+    "crosscheck.records.records",
+    "flexmb.run.channels",
+)
+
+
+def made_by(modules: Iterable[str], recording: Iterable[str] = RECORDING) -> str:
+    """The key of results that `modules` compute and the modules `recording` check and store."""
+    return _key(frozenset(modules), frozenset(recording))
+
+
+@cache
+def _key(modules: frozenset[str], recording: frozenset[str]) -> str:
+    found = sources(modules, recording)
+    digest = hashlib.sha256()
+    for module, file in sorted(found.files.items()):
+        digest.update(f"{module} {_text(file)}\n".encode())
+    for library in sorted(found.libraries):
+        digest.update(f"{library} {_library(library)}\n".encode())
+    digest.update(_machine().encode())
+    return digest.hexdigest()[:16]
+
+
+@cache  # the first reading counts: what is edited while this process runs is not what it has loaded
+def _text(file: Path) -> str:
+    return hashlib.sha256(file.read_bytes()).hexdigest()
+
+
+@cache
+def _library(top: str) -> str:
+    """Versions and contents of the distribution of a library and of all that it requires."""
+    first = owner(top)
+    if first is None:
+        return "not installed"
+    found: dict[str, Distribution] = {}
+    waiting = [first]
+    while waiting:
+        each = waiting.pop()
+        if each.name not in found:
+            found[each.name] = each
+            waiting.extend(_required(each))
+    return ", ".join(_content(found[name]) for name in sorted(found))
+
+
+def _required(library: Distribution) -> list[Distribution]:
+    """Installed distributions that one requires, extras left out."""
+    names = [re.split(r"[^\w.-]", text, maxsplit=1)[0] for text in library.requires or () if "extra ==" not in text]
+    found = []
+    for name in names:
+        try:
+            found.append(distribution(name))
+        except PackageNotFoundError:  # required on other platforms
+            continue
+    return found
+
+
+def _content(library: Distribution) -> str:
+    """Version, and a digest of the list of its files with theirs: a build of the same version has another."""
+    record = library.read_text("RECORD") or ""
+    return f"{library.name} {library.version} {hashlib.sha256(record.encode()).hexdigest()[:16]}"
+
+
+@cache
+def _machine() -> str:
+    compiler = {name: text for name, text in os.environ.items() if name.startswith("NUMBA_")}
+    compiler.pop("NUMBA_CACHE_DIR", None)
+    place = (platform.system(), platform.machine(), *platform.libc_ver(), processor())
+    return f"{sys.version} {place} {sorted(compiler.items())}"

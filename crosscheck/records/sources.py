@@ -1,0 +1,164 @@
+"""Which files and which libraries the result of a module can depend on, found from the texts, importing nothing.
+
+The files are the module's own and all that these import, directly or not, inside the packages that count as sources:
+flexmb, crosscheck, the module's own package, and whatever on the path belongs to no installed distribution, such as a
+package in development. A module named in a string ("flexmb.system.system", "crosscheck.engines.native:NativeEngine")
+counts as imported. What is installed is a library: it is known by its distribution, and its sources are not read.
+"""
+
+from __future__ import annotations
+
+import ast
+import re
+import sys
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass, field
+from functools import cache
+from importlib.machinery import EXTENSION_SUFFIXES, ModuleSpec
+from importlib.metadata import Distribution, distributions
+from importlib.util import find_spec
+from pathlib import Path
+
+OURS = ("flexmb", "crosscheck")
+_NAMED = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?::\w+)?")
+
+
+@dataclass
+class Sources:
+    """Files by the name of their module, and the libraries that they import: top-level names."""
+
+    files: dict[str, Path] = field(default_factory=dict)
+    libraries: set[str] = field(default_factory=set)
+
+
+def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
+    """Everything that `modules` reach by imports, and the files of the modules `alone` without what these import."""
+    found = Sources()
+    waiting = list(dict.fromkeys(modules))
+    own = {*OURS, *(_top(module) for module in waiting)}
+    seen = set[str]()
+    for module in alone:
+        found.files.update(_with_parents(module))
+    while waiting:
+        module = waiting.pop()
+        if module in seen:
+            continue
+        seen.add(module)
+        top = _top(module)
+        if top in sys.stdlib_module_names:
+            continue
+        if top not in own and owner(top) is not None:
+            found.libraries.add(top)
+            continue
+        files = _with_parents(module)
+        if not files:
+            if not _place(top):
+                found.libraries.add(top)  # not installed: that it is missing is part of what a result depends on
+            continue
+        found.files.update(files)
+        for name, file in files.items():
+            if name != "flexmb" or module == "flexmb":  # what that imports by itself, it imports for its users only
+                waiting.extend(imported(name, file))
+    return found
+
+
+def imported(module: str, file: Path) -> Iterator[str]:
+    """Modules that a source file imports or names, parents of a package's submodule left out."""
+    if file.suffix != ".py":
+        return
+    try:
+        tree = ast.parse(file.read_bytes())
+    except (SyntaxError, ValueError):  # it cannot be imported either
+        return
+    package = module if file.name == "__init__.py" else module.rpartition(".")[0]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from (name.name for name in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = _absolute(package, node)
+            members = [f"{base}.{name.name}" for name in node.names]
+            modules = [member for member in members if _file(member) is not None]
+            yield from modules
+            if len(modules) < len(members):
+                yield base
+        elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+            named = _NAMED.fullmatch(node.value)
+            if named and "." in named[1] and _top(named[1]) in {*OURS, _top(module)} and _file(named[1]) is not None:
+                yield named[1]
+
+
+@cache
+def owner(top: str) -> Distribution | None:
+    """The installed distribution that a top-level module belongs to; None where its sources are on the path."""
+    spec = _spec(top)
+    if spec is None or spec.origin is None:
+        return None
+    origin = Path(spec.origin)
+    for distribution, record in _installed():
+        root = Path(str(distribution.locate_file("")))
+        if not origin.is_relative_to(root):
+            continue
+        inside = origin.relative_to(root).as_posix()
+        if f"\n{inside}," in record or (not record and distribution.name.replace("-", "_") == top):
+            return distribution
+    return None
+
+
+@cache
+def _installed() -> list[tuple[Distribution, str]]:
+    """Installed distributions with their lists of files, "" where a distribution keeps none."""
+    return [(each, f"\n{each.read_text('RECORD') or ''}".rstrip()) for each in distributions()]
+
+
+def _absolute(package: str, node: ast.ImportFrom) -> str:
+    """The module that `from ... import` names, with the dots of a relative import resolved."""
+    if not node.level:
+        return node.module or ""
+    parts = package.split(".")
+    kept = parts[: len(parts) - node.level + 1]
+    return ".".join([*kept, node.module] if node.module else kept)
+
+
+def _with_parents(module: str) -> dict[str, Path]:
+    """The file of a module, if there is one, and those of the packages it is in, which Python runs before it."""
+    parts = module.split(".")
+    names = (".".join(parts[: n + 1]) for n in range(len(parts)))
+    return {name: file for name in names if (file := _file(name)) is not None}
+
+
+@cache
+def _file(module: str) -> Path | None:
+    """Where the text (or the compiled extension) of a module is, as far as its place tells."""
+    top, *rest = module.split(".")
+    for place in _place(top):
+        path = place.joinpath(*rest)
+        beside = [path.with_name(f"{path.name}{suffix}") for suffix in (".py", *EXTENSION_SUFFIXES)]
+        for candidate in (path / "__init__.py", *beside):
+            if candidate.is_file():
+                return candidate
+    return None
+
+
+@cache
+def _place(top: str) -> tuple[Path, ...]:
+    """Folders of a top-level package; of a single module its path without the suffix."""
+    spec = _spec(top)
+    if spec is None:
+        return ()
+    if spec.submodule_search_locations is not None:
+        return tuple(Path(each) for each in spec.submodule_search_locations)
+    if spec.origin is None:
+        return ()
+    origin = Path(spec.origin)
+    return (origin.parent / origin.name.partition(".")[0],)
+
+
+def _spec(top: str) -> ModuleSpec | None:
+    try:
+        return find_spec(top)
+    except ValueError:  # a module that was made, not loaded, such as __main__
+        return None
+
+
+def _top(module: str) -> str:
+    return module.partition(".")[0]

@@ -1,0 +1,227 @@
+"""From a case to jobs: the scene of every variant, transformed, mutated or refined, for every engine that runs it."""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import NamedTuple
+
+import msgspec
+import numpy as np
+
+from crosscheck.engines.contract import Effort
+from crosscheck.library.case import TAKES_APART, Control, Refined, RunFile, Variant
+from crosscheck.library.controls import mutate
+from crosscheck.library.find import Case
+from crosscheck.library.selection import select
+from crosscheck.records.drawing import draw, levels
+from crosscheck.records.records import CaseRecord, VariantInfo
+from crosscheck.running.pool import TIME_LIMIT_S
+from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.check import check_scene
+from flexmb.scene.schema import Scene
+from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
+from flexmb.typing import Real
+
+MAIN, REFINED = "main", "refined"
+
+
+class Done(NamedTuple):
+    """A run that is recorded: its effort, what made it, and its place: a ladder of another length is run anew."""
+
+    effort: str
+    made_by: str
+    rung: int
+    rungs: int
+
+
+@dataclass(frozen=True)
+class Job:
+    """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
+
+    `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
+    channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
+    name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
+    `time_limit_s` it is stopped.
+    """
+
+    case: str
+    variant: str
+    role: str
+    engine: str
+    scene: Scene | None
+    scene_id: str
+    times: Real
+    provider: str
+    efforts: tuple[Effort, ...] = ()
+    finest_only: bool = False
+    kept: tuple[str, ...] = ()
+    done: frozenset[Done] = field(default_factory=frozenset)
+    error: str = ""
+    time_limit_s: float = TIME_LIMIT_S
+
+    @property
+    def title(self) -> str:
+        """How progress names it."""
+        role = "" if self.role == MAIN else f" ({self.role})"
+        return f"{self.case} · {self.variant}{role} · {self.engine}"
+
+
+def plan(
+    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None
+) -> tuple[CaseRecord, list[Job]]:
+    """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own."""
+    run = select(case.run, asked)
+    infos: dict[str, VariantInfo] = {}
+    jobs: list[Job] = []
+    for variant in run.variants:
+        scene, error = _attempt(case, variant)
+        infos[variant.name] = _info(case, variant, scene, error)
+        jobs += [_job(case, run, variant, MAIN, engine, scene, error, provider) for engine in variant.engines]
+        if variant.refined is not None:
+            scene, error = _attempt(case, refine(variant, variant.refined), variant.refined)
+            crossing = _engines_compared_across(run, variant)
+            jobs += [_job(case, run, variant, REFINED, engine, scene, error, provider) for engine in crossing]
+    for control in run.controls:
+        variant = run.variant(control.a.variant)
+        scene, error = _attempt(case, variant, control=control)
+        jobs.append(_job(case, run, variant, f"control:{control.name}", control.a.engine, scene, error, provider))
+    limit = time_limit_s or case.run.time_limit_s or TIME_LIMIT_S
+    jobs = [replace(job, time_limit_s=limit) for job in jobs]
+    record = CaseRecord(
+        case=case.name,
+        run=run,
+        provenance=case.provenance,
+        readme=case.readme,
+        variants=infos,
+        accepted=case.accepted,
+    )
+    return record, jobs
+
+
+def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None) -> Scene:
+    """The scene with the variant's levels and its transformation; `refined` sets the number of beam elements."""
+    scene = at_level(scene, variant)
+    if refined is not None and refined.elements is not None:
+        scene = _on_beams(scene, elements=refined.elements)
+    match variant.transform:
+        case "rigidify":
+            return rigidify(scene)
+        case "modal_points":
+            return modal_points(scene)
+        case "segments":
+            return finite_segments(scene, variant.split_body, variant.segments)
+        case "substructures":
+            return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
+    return scene
+
+
+def at_level(scene: Scene, variant: Variant) -> Scene:
+    """The scene with every flexible body at the level of the variant, if it has one."""
+    return scene if variant.level is None else _on_flexible(scene, level=variant.level)
+
+
+def refine(variant: Variant, refined: Refined) -> Variant:
+    """The variant with its refined number of segments or pieces."""
+    counts = {key: getattr(refined, key) for key in ("segments", "pieces") if getattr(refined, key) is not None}
+    return msgspec.structs.replace(variant, **counts)
+
+
+def sample_times(run: RunFile, variant: Variant) -> Real:
+    """Sample times of a variant (s), the case's unless it has its own."""
+    return np.linspace(0.0, variant.duration_s or run.duration_s, variant.samples or run.samples)
+
+
+def scene_identity(scene: Scene, times: Real) -> str:
+    """Digest of a scene, of the files it refers to, and of the sample times: the same runs have the same digest."""
+    digest = hashlib.sha256(msgspec.json.encode(scene))
+    for body in scene.bodies:
+        file = getattr(body, "file", None)
+        if file is not None:
+            digest.update(Path(file).read_bytes())
+    digest.update(times.tobytes())
+    return digest.hexdigest()[:16]
+
+
+def _attempt(
+    case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
+) -> tuple[Scene | None, str]:
+    """The checked scene of a variant, or why there is none: one bad variant must not stop the others."""
+    try:
+        scene = case.scene(variant)
+        if control is not None:  # a fault in what the variant models, hence at its level
+            scene = mutate(at_level(scene, variant), control.mutation, control.target)
+            variant = msgspec.structs.replace(variant, level=None)
+        scene = variant_scene(scene, variant, refined)
+        check_scene(scene, t_end=variant.duration_s or case.run.duration_s)
+        return scene, ""
+    except (ValueError, NotImplementedError, OSError) as error:
+        return None, str(error)
+
+
+def _job(
+    case: Case,
+    run: RunFile,
+    variant: Variant,
+    role: str,
+    engine: str,
+    scene: Scene | None,
+    error: str,
+    provider: str,
+) -> Job:
+    times = sample_times(run, variant)
+    return Job(
+        case=case.name,
+        variant=variant.name,
+        role=role,
+        engine=engine,
+        scene=scene,
+        scene_id="" if scene is None else scene_identity(scene, times),
+        times=times,
+        provider=provider,
+        efforts=_ladder(variant, engine),
+        finest_only=role != MAIN,
+        kept=tuple(chart.observable for chart in run.charts),
+        error=error,
+    )
+
+
+def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:
+    """The efforts that the case prescribes for an engine, none where it leaves them to the engine."""
+    return tuple(
+        Effort(kind=ladder.kind, value=value, method=ladder.method)
+        for ladder in variant.efforts
+        if ladder.engine == engine
+        for value in ladder.values
+    )
+
+
+def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> VariantInfo:
+    """Bodies that the variant takes to pieces are drawn whole: their markers keep their names."""
+    if scene is None:
+        return VariantInfo(level="", drawing=None, error=error)
+    drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
+    drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
+    return VariantInfo(level=levels(scene), drawing=draw(drawn) if drawable else None)
+
+
+def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
+    """Engines whose result of this variant is compared with another variant: there its discretisation matters."""
+    crossing = [item for item in (*run.comparisons, *run.controls) if item.a.variant != item.b.variant]
+    found = {side.engine for item in crossing for side in (item.a, item.b) if side.variant == variant.name}
+    return tuple(engine for engine in variant.engines if engine in found)
+
+
+def _on_flexible(scene: Scene, **changes: object) -> Scene:
+    bodies = tuple(
+        body if isinstance(body, RigidBody) else msgspec.structs.replace(body, **changes) for body in scene.bodies
+    )
+    return msgspec.structs.replace(scene, bodies=bodies)
+
+
+def _on_beams(scene: Scene, **changes: object) -> Scene:
+    bodies = tuple(
+        msgspec.structs.replace(body, **changes) if isinstance(body, BeamBody) else body for body in scene.bodies
+    )
+    return msgspec.structs.replace(scene, bodies=bodies)

@@ -1,0 +1,107 @@
+"""Running many jobs: plan them, leave out what is already recorded, run the rest in a pool, record as results come.
+
+`run_jobs` of `pool` is the local scheduler; any function with its signature can take its place.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from crosscheck.engines.registry import COMPILED_LIKE
+from crosscheck.library.find import Case
+from crosscheck.records.records import Archive, Confirmed, Record, RunRecord, environment, read
+from crosscheck.running.checked import clean
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import Done, Job, plan
+from crosscheck.running.pool import Event, run_jobs
+
+PROVIDER = "crosscheck.engines.registry:engines"
+Listener = Callable[[Sequence[Job], Event], None]
+
+
+def sweep(
+    cases: Iterable[Case],
+    asked: tuple[str, ...],
+    records: Path,
+    *,
+    fresh: bool = False,
+    workers: int | None = None,
+    provider: str = PROVIDER,
+    time_limit_s: float | None = None,
+    memory_limit_bytes: float | None = None,
+    listener: Listener = lambda jobs, event: None,
+) -> None:
+    """Run cases and append to the file `records`; what it already holds is confirmed, not run again, unless `fresh`.
+
+    What it holds counts where scene, effort and all that made it are the same (`made_by`). `asked` are the engines
+    (none: all), `workers` the number of processes (default: one per core). An engine that takes longer than
+    `time_limit_s` for a scene (default: the case's limit, or else the pool's), or more memory than `memory_limit_bytes`
+    (default: its part of the machine's), is stopped. `listener` hears every event, with the list of jobs.
+    """
+    if fresh:
+        records.unlink(missing_ok=True)
+    known = read(records) if records.exists() else []
+    plans = [plan(case, asked, provider, time_limit_s) for case in cases]
+    jobs = [replace(job, done=_done(known, job)) for _, planned in plans for job in planned]
+    archive = Archive(records)
+    try:
+        archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
+        for record, _ in plans:
+            archive.write(record)
+        log = str(records.with_suffix(".log"))
+        doing: dict[int, str] = {}
+        for event in run_jobs(
+            execute, jobs, workers or os.cpu_count() or 1, log, _engine, _time_limit, memory_limit_bytes
+        ):
+            if isinstance(event.content, RunRecord | Confirmed):
+                archive.write(event.content)
+            elif event.kind == "emitted":
+                doing[event.job] = event.content
+            elif event.kind in ("crashed", "stopped"):
+                event = replace(event, content=f"{event.content}, while at {doing.get(event.job, 'its start')}")
+                archive.write(_cut_short(jobs[event.job], event))
+            listener(jobs, event)
+    finally:
+        archive.close()
+
+
+def _engine(job: Job) -> str:
+    """A worker stays with its engine: each loads its library, or compiles its kernels, once."""
+    return COMPILED_LIKE.get(job.engine, job.engine)
+
+
+def _time_limit(job: Job) -> float:
+    return job.time_limit_s
+
+
+def _done(known: Sequence[Record], job: Job) -> frozenset[Done]:
+    """Efforts of the job whose outcome is already known for the same scene, with what made it.
+
+    A later record without an effort (missing engine, crash) withdraws the earlier ones. A record of an older version,
+    which does not say what made it, is of no use here.
+    """
+    done: set[Done] = set()
+    for record in known:
+        if not isinstance(record, RunRecord) or record.key[:4] != (job.case, job.variant, job.role, job.engine):
+            continue
+        if not record.effort:
+            done.clear()
+        elif record.status in ("finished", "diverged") and record.scene == job.scene_id:
+            done.add(Done(record.effort, record.made_by, record.rung, record.rungs))
+    return frozenset(done)
+
+
+def _cut_short(job: Job, event: Event) -> RunRecord:
+    return RunRecord(
+        case=job.case,
+        variant=job.variant,
+        role=job.role,
+        engine=job.engine,
+        version="",
+        scene=job.scene_id,
+        status="crashed" if event.kind == "crashed" else "did not finish",
+        message=clean(event.content),
+    )

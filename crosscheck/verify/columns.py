@@ -1,0 +1,220 @@
+"""Columns of somebody's CSV as channels: named as `crosscheck verify` asks for them, or as in a `trajectory.csv`."""
+
+from __future__ import annotations
+
+import csv
+import io
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flexmb.scene.reading import MIB, Unreadable, read_text
+from flexmb.typing import Real
+
+MARKER_GROUPS = {
+    "position": ("px", "py", "pz"),
+    "orientation": ("qw", "qx", "qy", "qz"),
+    "velocity": ("vx", "vy", "vz"),
+    "angular_velocity": ("wx", "wy", "wz"),
+}
+LOAD_GROUPS = {"torque": ("tx", "ty", "tz"), "force": ("fx", "fy", "fz")}
+# Columns of Trajectory.to_csv that are compared: ending, its letters, unit, and how the channel is called.
+OWN_GROUPS = {
+    "position": ("xyz", "m", "marker:{}.position"),
+    "quaternion": ("wxyz", "1", "marker:{}.orientation"),
+    "velocity": ("xyz", "m/s", "marker:{}.velocity"),
+    "angular_velocity": ("xyz", "rad/s", "marker:{}.angular_velocity"),
+    "torque": ("xyz", "N m", "load:{}.torque"),
+    "force": ("xyz", "N", "load:{}.force"),
+}
+OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
+TIME_MATCH_S = 1e-9
+LIMIT = 128 * MIB
+NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
+SEPARATORS = {";": "semicolons", "\t": "tabs"}
+
+
+class VerifyError(ValueError):
+    """A CSV or a request that cannot be compared; the message says what to change."""
+
+
+@dataclass(frozen=True)
+class Columns:
+    """Channels (T, k) of a CSV; `own`: it is a whole trajectory.csv of flexmb, and `left_out` are its other columns."""
+
+    channels: dict[str, Real]
+    own: bool = False
+    left_out: tuple[str, ...] = ()
+
+
+def read_columns(file: Path, times: Real) -> Columns:
+    """Channels of a CSV whose times are the case's; groups such as tip.px, tip.py, tip.pz must be whole.
+
+    VerifyError names file, line, column and remedy.
+    """
+    try:
+        header, numbers, rows = _rows(read_text(file, LIMIT), len(times))
+    except OSError as error:
+        raise VerifyError(f"{file} cannot be read: {error.strerror}") from None
+    except Unreadable as error:
+        raise VerifyError(f"{file} cannot be read: {error}") from None
+    except VerifyError as error:
+        raise VerifyError(f"{file} cannot be read as a CSV of numbers with one header line: {error}") from None
+    try:
+        return _columns(header, numbers, rows, times)
+    except VerifyError as error:
+        raise VerifyError(f"{file}: {error}") from None
+
+
+def _rows(text: str, wanted: int) -> tuple[list[str], list[int], Real]:
+    """Names of the columns, line numbers of the rows, and the numbers (rows, columns); an empty cell is NaN.
+
+    Of rows beyond those wanted only one is read: it is enough to know that there are more.
+    """
+    reader = csv.reader(io.StringIO(text, newline=""), strict=True)
+    numbers: list[int] = []
+    rows: list[Real] = []
+    try:
+        header = next((row for row in reader if any(row)), None)
+        if header is None:
+            raise VerifyError("it is empty: begin with a line of column names")
+        names = [name.strip() for name in header]
+        if len(names) == 1:
+            for separator, word in SEPARATORS.items():
+                if separator in names[0]:
+                    advice = "write commas between columns and points in numbers (no decimal comma)"
+                    raise VerifyError(f"line {reader.line_num}: columns are separated by {word}: {advice}")
+        for row in reader:
+            if any(cell.strip() for cell in row) and len(rows) <= wanted:
+                numbers.append(reader.line_num)
+                rows.append(_numbers(row, names, reader.line_num))
+    except csv.Error as error:
+        raise VerifyError(f"line {reader.line_num}: {error}: correct the quotes and the length of that line") from None
+    return names, numbers, np.array(rows).reshape(len(rows), len(names))
+
+
+def _numbers(row: list[str], names: Sequence[str], line: int) -> Real:
+    if len(row) != len(names):
+        hint = " (is it a decimal comma? write a point)" if len(row) > len(names) else ""
+        what = f"line {line} has {len(row)} cells, the header has {len(names)}"
+        raise VerifyError(f"{what}: give each column one cell{hint}")
+    return np.array([_number(cell.strip(), name, line) for cell, name in zip(row, names, strict=True)])
+
+
+def _number(cell: str, name: str, line: int) -> float:
+    if NUMBER.fullmatch(cell) and math.isfinite(value := float(cell)):
+        return value
+    if not cell:
+        return math.nan
+    where, shown = f"line {line}, column {name!r:.60}", f"{cell!r:.40}"
+    if DECIMAL_COMMA.fullmatch(cell):
+        raise VerifyError(f"{where}: {shown} has a decimal comma: write a point")
+    if cell.lower().lstrip("+-") in ("nan", "inf", "infinity") or NUMBER.fullmatch(cell):
+        raise VerifyError(f"{where}: {shown} is not finite: give numbers that can be compared, or leave the column out")
+    raise VerifyError(f"{where}: {shown} is not a number: write it like -1.25e-3")
+
+
+def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> Columns:
+    places: dict[str, int] = {}
+    for number, name in enumerate(header, start=1):
+        if name and name in places:
+            raise VerifyError(f'columns {places[name]} and {number} are both called "{name}": keep one of them')
+        places[name] = number
+    own = OWN_HEADER.fullmatch(header[0]) is not None
+    if header[0] not in ("t", "t [s]"):
+        raise VerifyError(f'the first column must be "t"; it is "{header[0]}"')
+    _check_times(numbers, rows[:, 0], times)
+    filled = {}
+    for name, values in zip(header[1:], rows.T[1:], strict=True):
+        empty = np.isnan(values)
+        if np.all(empty):
+            continue
+        if np.any(empty):
+            line = numbers[int(np.argmax(empty))]
+            raise VerifyError(f'line {line}: the cell of column "{name}" is empty: fill the whole column or none of it')
+        if not name:
+            raise VerifyError(f"column {header.index('') + 1} has no name: name it in the first line or leave it out")
+        filled[name] = values
+    return _own_channels(filled) if own else Columns(_channels(filled))
+
+
+def _check_times(numbers: list[int], given: Real, times: Real) -> None:
+    asked = (
+        f"{len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s; --template writes a file "
+        f"with them, `flexmb simulate SCENE --t-end {times[-1]:g} --samples {len(times)}` gives them"
+    )
+    n = min(len(given), len(times))
+    off = ~(np.abs(given[:n] - times[:n]) <= TIME_MATCH_S)
+    if np.any(off):
+        i = int(np.argmax(off))
+        wrong = "empty" if np.isnan(given[i]) else f"{given[i]:.17g} s, not {times[i]:.10g} s"
+        raise VerifyError(f"its times are not the case's: in line {numbers[i]} the time is {wrong} (they are {asked})")
+    if len(given) != len(times):
+        count = "more" if len(given) > len(times) else f"only {len(given)}"
+        raise VerifyError(f"its times are not the case's: there are {count} rows (they are {asked})")
+
+
+def _channels(filled: dict[str, Real]) -> dict[str, Real]:
+    """Whole groups of filled columns as channels; VerifyError for a column that belongs to no whole group."""
+    found: dict[str, Real] = {}
+    left = dict(filled)
+    for item in dict.fromkeys(name.rpartition(".")[0] for name in filled):
+        for prefix, groups in (("marker", MARKER_GROUPS), ("load", LOAD_GROUPS)):
+            for part, letters in groups.items():
+                names = [f"{item}.{letter}" for letter in letters]
+                if all(name in left for name in names):
+                    found[f"{prefix}:{item}.{part}"] = np.column_stack([left.pop(name) for name in names])
+    if left:
+        raise VerifyError(f"no whole group contains {_listed(list(left))}; the groups are {_groups_text()}")
+    if not found:
+        raise VerifyError("there is nothing in it but times")
+    return found
+
+
+def _own_channels(filled: dict[str, Real]) -> Columns:
+    """Channels of a trajectory.csv: whole vectors, energies, momentum and work; what else there is, is left out."""
+    units, left = {}, {}
+    for header, values in filled.items():
+        match = OWN_HEADER.fullmatch(header)
+        if match is None:
+            raise VerifyError(f'column "{header}" has no unit, unlike the first: write it "name [unit]"')
+        units[match[1]], left[match[1]] = match[2], values
+    found: dict[str, Real] = {}
+    for item, _, part in [name.rpartition(".")[0].rpartition(".") for name in left]:
+        if part in OWN_GROUPS:
+            letters, unit, channel = OWN_GROUPS[part]
+            names = [f"{item}.{part}.{letter}" for letter in letters]
+            if all(name in left for name in names):
+                _require_unit(names, units, unit)
+                found[channel.format(item)] = np.column_stack([left.pop(name) for name in names])
+    for part, unit in (("angular", "N m s"), ("linear", "N s")):
+        names = [f"momentum.{part}.{letter}" for letter in "xyz"]
+        if all(name in left for name in names):
+            _require_unit(names, units, unit)
+            found[f"momentum.{part}"] = np.column_stack([left.pop(name) for name in names])
+    for name in [name for name in left if name == "work" or name.startswith("energy.")]:
+        _require_unit([name], units, "J")
+        found[name] = left.pop(name)[:, None]
+    if not found:
+        raise VerifyError("no column of it can be compared: write it with Trajectory.to_csv or `flexmb simulate`")
+    return Columns(found, own=True, left_out=tuple(left))
+
+
+def _require_unit(names: Sequence[str], units: dict[str, str], expected: str) -> None:
+    for name in names:
+        if units[name] != expected:
+            raise VerifyError(f'column "{name}" is in "{units[name]}": give it in {expected}, as "{name} [{expected}]"')
+
+
+def _listed(names: list[str]) -> str:
+    return ", ".join(name[:60] for name in names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")
+
+
+def _groups_text() -> str:
+    groups = (*MARKER_GROUPS.values(), *LOAD_GROUPS.values())
+    return ", ".join("NAME." + "/".join(group) for group in groups)

@@ -1,0 +1,48 @@
+"""Places of coordinates in q and of speeds in u."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.building.links import Link
+from flexmb.hinges import catalogue
+from flexmb.scene import schema as s
+from flexmb.tables.state import Layout
+
+_QUATERNION = {catalogue.SPHERICAL: 0, catalogue.FREE: 3}  # where it starts: the helper `catalogue.quaternion_offset`
+
+
+class Numbering:
+    """Places of all coordinates in q and speeds in u, Jain & Rodriguez (3), (4): body by body hinge, modes, wheels."""
+
+    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
+        self.q: dict[str, slice] = {}
+        self.u: dict[str, slice] = {}
+        self.nq = self.nu = 0
+        quaternions = list[int]()
+        for link in chain:
+            kind = catalogue.KINDS[link.kind]
+            if link.kind in _QUATERNION:
+                quaternions.append(self.nq + _QUATERNION[link.kind])
+            self._append(link.hinge.name, kind.NQ, kind.NV)
+            self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
+            for wheel in wheels.get(link.name, ()):
+                self._append(wheel.name, 1, 1)
+        for link in chain:
+            self.q[f"{link.name}.hinge"] = self.q[link.hinge.name]
+            self.u[f"{link.name}.hinge"] = self.u[link.hinge.name]
+        self.layout = Layout(self.nq, self.nu, self.q, self.u, np.array(quaternions, np.int64))
+
+    def _append(self, name: str, nq: int, nu: int) -> None:
+        self.q[name] = slice(self.nq, self.nq + nq)
+        self.u[name] = slice(self.nu, self.nu + nu)
+        self.nq += nq
+        self.nu += nu
+
+
+def wheels_by_body(scene: s.Scene) -> dict[str, list[s.Wheel]]:
+    """Wheels of every body that has some, in the scene's order."""
+    found: dict[str, list[s.Wheel]] = {}
+    for wheel in scene.wheels:
+        found.setdefault(wheel.body, []).append(wheel)
+    return found

@@ -1,0 +1,64 @@
+"""Entry points of the composite-body route: mass matrix, accelerations, right-hand side of the motion."""
+
+from __future__ import annotations
+
+from flexmb.jain import composite
+from flexmb.jain.balance import power
+from flexmb.jain.places import Matrices
+from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import kernel
+from flexmb.motion.coordinates import configuration_rate, load_state
+from flexmb.tables.arrays import Workspace
+from flexmb.tables.status import OK
+from flexmb.typing import Index
+
+
+@bundle
+class CompositeWorkspace:
+    """What an evaluation by composite bodies writes."""
+
+    sweeps: Workspace
+    matrices: Matrices
+
+    @property
+    def fault(self) -> Index:
+        """(1,) body where an evaluation failed."""
+        return self.sweeps.fault
+
+
+@kernel
+def mass_matrix(t, y, c, w, m, M):
+    """M (nu,nu) at the configuration of y."""
+    load_state(t, y, c, w)
+    composite.mass_matrix(c, w, m)
+    nu = M.shape[0]
+    for a in range(nu):
+        i = m.speed[a]
+        for b in range(a, nu):
+            j = m.speed[b]
+            M[i, j] = m.M[a, b]
+            M[j, i] = m.M[a, b]
+
+
+@kernel
+def accelerations(t, y, c, w, m):
+    """udot into w.speed.acceleration, drive loads into w.speed.drive; returns a status code."""
+    load_state(t, y, c, w)
+    return composite.forward_dynamics(c, w, m)
+
+
+@kernel
+def rhs(t, y, dy, c, w):
+    """dy/dt of y = [q, u, work] at time t; returns a status code. `work` collects the non-conservative power."""
+    load_state(t, y, c, w.sweeps)
+    status = composite.forward_dynamics(c, w.sweeps, w.matrices)
+    if status != OK:
+        return status
+    configuration_rate(c, w.sweeps)
+    nq, nu = w.sweeps.q.shape[0], w.sweeps.u.shape[0]
+    for i in range(nq):
+        dy[i] = w.sweeps.rate[i]
+    for j in range(nu):
+        dy[nq + j] = w.sweeps.speed[j].acceleration
+    dy[nq + nu] = power(c, w.sweeps)
+    return OK

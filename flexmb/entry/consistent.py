@@ -1,0 +1,39 @@
+"""Entry point of the underactuated problem: hinges and wheels move as told, modes follow.
+
+Jain & Rodriguez, after (45): generalised forces act on hinges only, hence T^f = 0 decides the modal accelerations. It
+is the articulated recursion with every hinge and wheel prescribed, O(N).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from flexmb.jain.sweeps import forward_dynamics
+from flexmb.jit.kernel import kernel
+from flexmb.motion.coordinates import load_state
+from flexmb.tables.arrays import FUNCTION, Constants, Workspace
+
+
+@kernel
+def consistent_accelerations(t, y, rates, scene, held, w):
+    """Modal accelerations that need no modal force, w.speed.acceleration, for hinges and wheels at `rates` (nu,).
+
+    `held` and w: of `held_hinges`. Returns a status code.
+    """
+    load_state(t, y, scene, w)
+    for j in range(rates.shape[0]):
+        w.function[scene.function.shape[0] + j, 2] = rates[j]
+    return forward_dynamics(held, w)
+
+
+def held_hinges(c: Constants, w: Workspace) -> tuple[Constants, Workspace]:
+    """The constants c with every hinge and wheel prescribed, and a copy of w that holds a rate for each."""
+    speeds, functions = len(c.speed), len(c.function)
+    speed = c.speed.copy()
+    speed["prescribed"] = functions + np.arange(speeds)
+    for body in c.body:
+        speed["prescribed"][body["etad_index"] : body["etad_index"] + body["modes"]] = -1
+    function = np.concatenate([c.function, np.zeros(speeds, FUNCTION)])
+    return replace(c, speed=speed, function=function), replace(w, function=np.zeros((len(function), 3)))

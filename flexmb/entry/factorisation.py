@@ -1,0 +1,82 @@
+"""Entry points of the innovations factorisation of a mass matrix, M = F F': Jain & Rodriguez (54)-(56)."""
+
+from flexmb.jain import innovations, precision
+from flexmb.jit.kernel import helper, kernel
+from flexmb.motion.coordinates import load_state
+from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
+
+
+@kernel
+def factorise(t, y, scene, c, w):
+    """Factors into w: the state with the functions of `scene`, free speeds as in c; returns a status code."""
+    load_state(t, y, scene, w)
+    return OK if innovations.factorise(c, w) else NOT_POSITIVE_DEFINITE
+
+
+@kernel
+def solve(c, w, x, b):
+    """Rows of b (m,nu) replaced by M^-1 b."""
+    for row in range(b.shape[0]):
+        _apply(c, x, b[row])
+        innovations.innovations(c, w, x)
+        innovations.respond(c, w, x)
+        for j in range(b.shape[1]):
+            b[row, j] = x.speed[j].acceleration
+
+
+@kernel
+def half_solve(c, w, x, b):
+    """Rows of b (m,nu) replaced by F^-1 b."""
+    for row in range(b.shape[0]):
+        _apply(c, x, b[row])
+        innovations.innovations(c, w, x)
+        for j in range(b.shape[1]):
+            b[row, j] = x.speed[j].innovation
+
+
+@kernel
+def half_multiply(c, w, x, b):
+    """Rows of b (m,nu) replaced by F b."""
+    for row in range(b.shape[0]):
+        innovations.clear(c, x)
+        for j in range(b.shape[1]):
+            x.speed[j].innovation = b[row, j]
+        innovations.synthesise(c, w, x)
+        for j in range(b.shape[1]):
+            b[row, j] = x.speed[j].applied
+
+
+@kernel
+def multiply(c, w, x, b):
+    """Rows of b (m,nu) replaced by M b."""
+    for row in range(b.shape[0]):
+        innovations.clear(c, x)
+        for j in range(b.shape[1]):
+            x.speed[j].acceleration = b[row, j]
+        innovations.excite(c, w, x)
+        innovations.synthesise(c, w, x)
+        for j in range(b.shape[1]):
+            b[row, j] = x.speed[j].applied
+
+
+@kernel
+def weigh(c, w, x, y):
+    """y (nu,) replaced by F^-1 S'S F'^-1 y, for S of `flexmb.jain.precision`."""
+    for j in range(y.shape[0]):
+        x.speed[j].innovation = y[j]
+    precision.weigh(c, w, x)
+    for j in range(y.shape[0]):
+        y[j] = x.speed[j].innovation
+
+
+@kernel
+def log_determinant(c, w):
+    """log det M."""
+    return innovations.log_determinant(c, w)
+
+
+@helper
+def _apply(c, x, b):
+    innovations.clear(c, x)
+    for j in range(b.shape[0]):
+        x.speed[j].applied = b[j]

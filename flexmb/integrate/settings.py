@@ -1,0 +1,88 @@
+"""The integrators by name, and what a run may ask of them."""
+
+from __future__ import annotations
+
+import sys
+from dataclasses import dataclass, replace
+from typing import Literal, get_args
+
+import numpy as np
+
+from flexmb.tables import arguments
+
+Method = Literal["dop853", "rk4", "radau5", "exponential", "generalised_alpha"]
+FIXED: tuple[Method, ...] = ("rk4", "generalised_alpha")  # take equal steps
+LINEARISING: tuple[Method, ...] = ("radau5", "exponential", "generalised_alpha")  # need Jacobians
+FINEST_RTOL = 100 * np.finfo(float).eps
+COARSEST_RTOL = 1e-2  # estimates of a step's error are its leading term, which is none where two digits are lost
+MOST_STEPS = sys.maxsize  # that compiled code counts
+SHORTEST_STEP = 10 * np.finfo(float).eps  # fixed step over the length of the run: time would stand still
+DAMPING_NOTHING_SLOW = 0.8  # spectral radius: a mode that is not resolved loses nine tenths in ten steps
+
+
+@dataclass(frozen=True)
+class Settings:
+    """How a run is integrated: `step` (s) and `spectral_radius` belong to methods that have them, else None."""
+
+    method: Method
+    rtol: float
+    atol: float
+    step: float | None
+    max_steps: int
+    spectral_radius: float | None = None
+
+    @property
+    def radius(self) -> float:
+        """Spectral radius at infinite frequency of generalised-alpha."""
+        return DAMPING_NOTHING_SLOW if self.spectral_radius is None else self.spectral_radius
+
+    def checked(self, t_end: float) -> Settings:
+        """The same in plain numbers; ValueError for settings that make no sense, TypeError for what is no number."""
+        plain = replace(
+            self,
+            rtol=arguments.number("rtol", self.rtol),
+            atol=arguments.number("atol", self.atol),
+            step=None if self.step is None else arguments.number("step", self.step),
+            max_steps=arguments.whole("max_steps", self.max_steps),
+            spectral_radius=(
+                None if self.spectral_radius is None else arguments.number("spectral_radius", self.spectral_radius)
+            ),
+        )
+        plain._check(t_end)
+        return plain
+
+    def _check(self, t_end: float) -> None:
+        if self.method not in get_args(Method):
+            raise ValueError(f"method is {self.method!r}: use one of {', '.join(map(repr, get_args(Method)))}")
+        if self.method in FIXED and (self.step is None or self.step <= 0.0):
+            raise ValueError(
+                f'method "{self.method}" takes fixed steps, but step is {self.step}: give a positive step in seconds'
+            )
+        if self.step is not None and self.step < SHORTEST_STEP * t_end:
+            raise ValueError(
+                f"step is {self.step:g} s, by which double precision does not advance a time of {t_end:g} s: max_steps "
+                f"allows {self.max_steps} of them, so use {t_end / self.max_steps:.1e} s or more"
+            )
+        if self.method not in FIXED and self.step is not None:
+            raise ValueError(
+                f'method "{self.method}" chooses its own steps: leave step out and set rtol and atol, or use "rk4"'
+            )
+        if self.spectral_radius is not None:
+            if self.method != "generalised_alpha":
+                raise ValueError(f'spectral_radius is for method "generalised_alpha": leave it out for "{self.method}"')
+            if not 0.0 <= self.spectral_radius <= 1.0:
+                raise ValueError(
+                    f"spectral_radius is {self.spectral_radius:g}: from 0 (what is not resolved dies in a step) to 1 "
+                    "(nothing is damped)"
+                )
+        if not FINEST_RTOL <= self.rtol <= COARSEST_RTOL:
+            raise ValueError(
+                f"rtol is {self.rtol:g}: double precision resolves {FINEST_RTOL:.1e}, and above {COARSEST_RTOL:g} the "
+                "error of a step is not known; use a value between them"
+            )
+        if not self.atol > 0.0:
+            raise ValueError(
+                f"atol is {self.atol:g}: give a positive one, or a coordinate that passes zero stops the run"
+            )
+        if not 1 <= self.max_steps <= MOST_STEPS:
+            raise ValueError(f"max_steps is {self.max_steps}: allow at least one step, and at most {MOST_STEPS}")

@@ -1,0 +1,23 @@
+"""Pivots of the recursion that may be rounding, by body: noted in w.doubt."""
+
+from flexmb.jit.kernel import helper
+from flexmb.spatial.pivots import is_small
+
+
+@helper
+def note_modes(c, w, k, L):
+    """Note small pivots of the modes of body k, of a Cholesky factor L."""
+    for n in range(c.body[k].modes):
+        if not (L[n, n] * L[n, n]).real > c.speed[c.body[k].etad_index + n].doubtful:
+            w.doubt[0] = 1
+
+
+@helper
+def note_hinge(c, w, k, L, first):
+    """Note small pivots of the free speeds of hinge k, from row `first` on of a Cholesky factor L."""
+    for a in range(w.body[k].free_count):
+        diagonal = 0.0
+        for b in range(first + a + 1):
+            diagonal += L[first + a, b] * L[first + a, b]
+        j = c.body[k].u_index + w.body[k].free_speed[a]
+        is_small(c, w, j, L[first + a, first + a] * L[first + a, first + a], diagonal)

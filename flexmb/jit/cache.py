@@ -1,0 +1,109 @@
+"""Compiled kernels on disk: a file for each kernel and the types it was compiled for, read only if it is sound.
+
+Numba's own cache believes what it finds: a file that was cut short ends in a traceback, one with a flipped bit is run.
+And its index gives two processes that compile one kernel at once, for different types, the same file. Here a file is
+named after all that its contents depend on, appears at once, and begins with their digest. What does not match it is
+deleted and compiled anew, with one warning.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+import pickle
+import shutil
+import sys
+import uuid
+import warnings
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import llvmlite
+import numba
+from numba.core.caching import NullCache
+from numba.core.compiler import CompileResult
+from numba.core.serialize import dumps
+
+_DIGEST = hashlib.sha256().digest_size
+
+
+class KernelCache(NullCache):  # type: ignore[misc]
+    """What numba's dispatcher asks for compiled versions of one function, kept in a folder."""
+
+    def __init__(self, function: Callable[..., Any], folder: Path) -> None:
+        """The folder stands for the sources; see `flexmb.jit.kernel.cache_directory`."""
+        self._folder, self._name = folder, function.__name__
+        cells = tuple(cell.cell_contents for cell in function.__closure__ or ())
+        own = function.__qualname__, function.__code__.co_firstlineno, function.__code__.co_code, dumps(cells)
+        self._function = (*own, sys.implementation.cache_tag, numba.__version__, llvmlite.__version__)
+
+    @property
+    def cache_path(self) -> str:
+        """The folder."""
+        return str(self._folder)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """The version for a signature, or None where there is none that is sound."""
+        target_context.refresh()
+        file = self._file(sig, target_context.codegen())
+        try:
+            data = file.read_bytes()
+        except FileNotFoundError:
+            return None
+        except OSError:  # a folder in its place, or no permission
+            data = b""
+        contents = memoryview(data)[_DIGEST:]
+        if _digest(file, contents) != data[:_DIGEST]:
+            self._discard(file)
+            return None
+        return CompileResult._rebuild(target_context, *pickle.loads(contents))
+
+    def save_overload(self, sig: Any, data: Any) -> None:
+        """Keep a version; a warning where that cannot be done."""
+        if data.library.has_dynamic_globals:  # addresses of this process
+            return
+        file, contents = self._file(sig, data.codegen), dumps(data._reduce())
+        written = file.with_suffix(f".{uuid.uuid4().hex[:16]}")
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            written.write_bytes(_digest(file, contents) + contents)
+            os.replace(written, file)
+        except OSError as problem:
+            if not file.is_file():  # else another process was faster
+                warn_once(
+                    f"compiled kernels cannot be kept in {self._folder.parent} ({problem.strerror}), and the next "
+                    "process compiles them again: make room or permit writing there, or set NUMBA_CACHE_DIR"
+                )
+        finally:
+            with suppress(OSError):
+                written.unlink()
+
+    def _file(self, sig: Any, codegen: Any) -> Path:
+        key = repr((self._function, str(sig), codegen.magic_tuple()))
+        return self._folder / f"{self._name}-{hashlib.sha256(key.encode()).hexdigest()[:32]}.kernel"
+
+    def _discard(self, file: Path) -> None:
+        try:
+            if file.is_dir() and not file.is_symlink():
+                shutil.rmtree(file)
+            else:
+                file.unlink(missing_ok=True)
+        except OSError:
+            pass  # where the new one cannot be put in its place either, `save_overload` says so
+        warn_once(f"damaged files in {self._folder.parent}: they were deleted, and their kernels are compiled anew")
+
+
+@cache
+def warn_once(text: str) -> None:
+    """In this process: numba resets what Python knows of warnings that were shown."""
+    warnings.warn(text, RuntimeWarning, stacklevel=2)
+
+
+def _digest(file: Path, contents: Any) -> bytes:
+    """Of a file's name and contents: one that was renamed is not sound either."""
+    digest = hashlib.sha256(file.name.encode())
+    digest.update(contents)
+    return digest.digest()

@@ -1,0 +1,175 @@
+"""Operations that a kernel executes: its own source, interpreted, on scalars that count.
+
+    count(dynamics.accelerations, 0.0, y, system.constants, system.workspace()).operations
+
+Every addition, multiplication, division and square root with a number of the arguments in it counts, also with zeros
+and ones; a change of sign does not, nor does what the source does to its literals alone. The compiled kernel executes
+no more than that. Kernels do not know of it: who does not count pays nothing.
+"""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass, fields, is_dataclass
+from types import BuiltinFunctionType, FunctionType, ModuleType, SimpleNamespace
+from typing import Any
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Operations:
+    """Numbers of operations; `elementary` are sines, cosines and the like."""
+
+    multiplications: int = 0
+    additions: int = 0  # and subtractions
+    divisions: int = 0
+    square_roots: int = 0
+    elementary: int = 0
+
+    @property
+    def total(self) -> int:
+        """All of them, each for one floating-point operation."""
+        return self.multiplications + self.additions + self.divisions + self.square_roots + self.elementary
+
+    def __add__(self, other: Operations) -> Operations:
+        return Operations(*(getattr(self, field.name) + getattr(other, field.name) for field in fields(self)))
+
+    def __sub__(self, other: Operations) -> Operations:
+        return self + -1 * other
+
+    def __rmul__(self, times: int) -> Operations:
+        return Operations(*(times * getattr(self, field.name) for field in fields(self)))
+
+
+@dataclass(frozen=True)
+class Counted:
+    """Operations of one call, what it returned, and its arguments as it left them."""
+
+    operations: Operations
+    result: Any
+    arguments: tuple[Any, ...]
+
+
+def count(kernel: Callable[..., Any], *arguments: Any) -> Counted:
+    """Call a kernel or helper, interpreted, on copies of the arguments: floats, arrays, bundles, tuples of these.
+
+    Arrays of floats become arrays of objects, tables of records hold namespaces; all else stays what it is.
+    """
+    tally = Counter[str]()
+    scalar = _scalars(tally)
+    copies = tuple(_counting(argument, scalar) for argument in arguments)
+    result = _Interpreter(scalar)(kernel)(*copies)
+    return Counted(Operations(**tally), result, copies)
+
+
+def _scalars(tally: Counter[str]) -> Any:
+    """The class of floats whose operations `tally` counts."""
+
+    def counted(kind: str, operation: Callable[..., float]) -> Callable[..., float]:
+        def method(*operands: float) -> float:
+            tally[kind] += 1
+            return Scalar(operation(*operands))
+
+        return method
+
+    class Scalar(float):
+        __slots__ = ()
+        __add__ = counted("additions", float.__add__)
+        __radd__ = counted("additions", float.__radd__)
+        __sub__ = counted("additions", float.__sub__)
+        __rsub__ = counted("additions", float.__rsub__)
+        __mul__ = counted("multiplications", float.__mul__)
+        __rmul__ = counted("multiplications", float.__rmul__)
+        __truediv__ = counted("divisions", _divide)
+        __rtruediv__ = counted("divisions", lambda a, b: _divide(b, a))
+        square_root = counted("square_roots", math.sqrt)
+        elementary = staticmethod(lambda function: counted("elementary", function))
+
+        def __pow__(self, exponent: float) -> float:  # type: ignore[override]
+            if exponent == 2:
+                return Scalar.__mul__(self, self)
+            if exponent != 0.5:
+                raise NotImplementedError("only squares and square roots are counted as powers")
+            return Scalar.square_root(self)
+
+        def __neg__(self) -> float:
+            return Scalar(float.__neg__(self))
+
+        def __abs__(self) -> float:
+            return Scalar(float.__abs__(self))
+
+    return Scalar
+
+
+def _divide(a: float, b: float) -> float:
+    """As the compiled code divides: by zero without an exception."""
+    if b == 0.0:
+        with np.errstate(all="ignore"):
+            return float(np.divide(float(a), float(b)))
+    return float(a) / float(b)
+
+
+def _counting(value: Any, scalar: Any) -> Any:
+    """A copy of an argument, of the same class, whose every float is a `scalar`; records become namespaces."""
+    if is_dataclass(value) and not isinstance(value, type):
+        copy = object.__new__(type(value))  # a bundle's own constructor takes addresses of arrays
+        for field in fields(value):
+            object.__setattr__(copy, field.name, _counting(getattr(value, field.name), scalar))
+        return copy
+    if isinstance(value, tuple):
+        parts = [_counting(part, scalar) for part in value]
+        return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    if isinstance(value, np.void):
+        names = value.dtype.names or ()
+        return SimpleNamespace(**{name: _counting(value[name], scalar) for name in names})
+    if isinstance(value, np.ndarray):
+        if value.dtype.kind in "iub":
+            return value.copy()
+        objects = np.empty(value.shape, object)
+        for place in np.ndindex(value.shape):
+            objects[place] = _counting(value[place], scalar)
+        return objects
+    if isinstance(value, np.integer):
+        return int(value)
+    return scalar(value) if isinstance(value, float) else value
+
+
+class _Interpreter:
+    """Twins of compiled functions: the same code, with twins of what their modules hold."""
+
+    def __init__(self, scalar: Any) -> None:
+        self._scalar = scalar
+        self._namespaces: dict[str, dict[str, Any]] = {}
+
+    def __call__(self, thing: Any) -> Any:
+        """The twin of a function, of a module of the package, of a function of `math`; all else is its own."""
+        function = getattr(thing, "py_func", None)
+        if isinstance(function, FunctionType):
+            return self._function(function)
+        if hasattr(thing, "variants"):  # flexmb.jit.kernel.by_bundle
+            array, having, lacking = map(self, thing.variants)
+            return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
+        if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
+            return self(thing.of_reals)
+        if isinstance(thing, ModuleType) and thing.__name__.startswith(f"{__package__}."):
+            return SimpleNamespace(**self._namespace(vars(thing)))
+        if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
+            return self._scalar.square_root if thing is math.sqrt else self._scalar.elementary(thing)
+        return thing
+
+    def _function(self, function: FunctionType) -> FunctionType:
+        space = self._namespace(function.__globals__)
+        twin = FunctionType(function.__code__, space, function.__name__, function.__defaults__, function.__closure__)
+        twin.__kwdefaults__ = function.__kwdefaults__
+        return twin
+
+    def _namespace(self, original: dict[str, Any]) -> dict[str, Any]:
+        name = original["__name__"]
+        if name not in self._namespaces:
+            space = self._namespaces[name] = {}
+            for key, value in original.items():
+                space[key] = self(value)
+        return self._namespaces[name]

@@ -1,0 +1,94 @@
+"""Coordinates and speeds: out of the integrator's vector, their rates, and what springs and motors do along them.
+
+Both algorithms, Jain's recursion and Frisch's matrices, start here.
+"""
+
+from flexmb.hinges import catalogue
+from flexmb.jit.kernel import helper, kernel
+from flexmb.spatial.rotation import rotation_vector
+from flexmb.spatial.scalar import sqrt
+from flexmb.tables.functions import evaluate
+
+
+@helper
+def load_state(t, y, c, w):
+    """Copy q and u out of y = [q, u, ...]: functions of time at t, prescribed coordinates exact, quaternions unit."""
+    for f in range(c.function.shape[0]):
+        value, rate, acceleration = evaluate(
+            c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
+        )
+        w.function[f, 0] = value
+        w.function[f, 1] = rate
+        w.function[f, 2] = acceleration
+    nq = w.q.shape[0]
+    for i in range(nq):
+        w.raw[i] = y[i]
+        w.q[i] = y[i]
+    for j in range(w.u.shape[0]):
+        w.u[j] = y[nq + j]
+        f = c.speed[j].prescribed
+        if f >= 0:
+            w.q[c.speed[j].coordinate] = w.function[f, 0]
+            w.u[j] = w.function[f, 1]
+    normalise_quaternions(w.q, c)
+
+
+@helper
+def normalise_quaternions(q, c):
+    """Scale every hinge quaternion in q to unit length."""
+    for k in range(c.body.shape[0]):
+        start = catalogue.quaternion_offset(c.body[k].hinge_kind)
+        if start >= 0:
+            i = c.body[k].q_index + start
+            s = 1.0 / sqrt(q[i] * q[i] + q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3])
+            for n in range(4):
+                q[i + n] *= s
+
+
+@kernel
+def project(t, y, c):
+    """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
+    normalise_quaternions(y, c)
+    nu = c.speed.shape[0]
+    nq = y.shape[0] - nu - 1
+    for j in range(nu):
+        f = c.speed[j].prescribed
+        if f >= 0:
+            value, rate, _ = evaluate(
+                c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
+            )
+            y[c.speed[j].coordinate] = value
+            y[nq + j] = rate
+
+
+@helper
+def configuration_rate(c, w):
+    """qdot(q, u) into w.rate; quaternions are taken raw, so that their norm is an invariant of the flow."""
+    for k in range(c.body.shape[0]):
+        catalogue.rate(
+            c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, w.rate
+        )
+        for n in range(c.body[k].modes):
+            w.rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
+    for i in range(c.wheel.shape[0]):
+        w.rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
+
+
+@helper
+def hinge_forces(c, w):
+    """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
+    for j in range(w.u.shape[0]):
+        force = -c.speed[j].damping * w.u[j]
+        i = c.speed[j].coordinate
+        if i >= 0:
+            force -= c.speed[j].stiffness * (w.q[i] - c.speed[j].rest)
+        f = c.speed[j].motor
+        if f >= 0:
+            force += w.function[f, 0]
+        w.speed[j].applied = force
+    for k in range(c.body.shape[0]):
+        if c.body[k].ball_spring != 0.0:
+            i = c.body[k].q_index
+            theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
+            for n in range(3):
+                w.speed[c.body[k].u_index + n].applied -= c.body[k].ball_spring * theta[n]

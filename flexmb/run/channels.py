@@ -1,0 +1,149 @@
+"""Channels: the named signals in which two runs are compared, how far apart two signals are, and how large one is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from fnmatch import fnmatchcase
+from typing import Protocol
+
+import numpy as np
+
+from flexmb.typing import Real
+
+
+class Path(Protocol):
+    """A marker in World axes: position (T,3) m, quaternion (T,4) scalar first, velocity (T,6) [angular; linear]."""
+
+    @property
+    def position(self) -> Real: ...
+    @property
+    def quaternion(self) -> Real: ...
+    @property
+    def velocity(self) -> Real: ...
+
+
+class Run(Protocol):
+    """A trajectory, ours or another code's: loads (T,6), drives (T,k), energies (T,), momentum (T,6), work (T,)."""
+
+    @property
+    def markers(self) -> Mapping[str, Path]: ...
+    @property
+    def loads(self) -> Mapping[str, Real]: ...
+    @property
+    def wheel_loads(self) -> Mapping[str, Real]: ...
+    @property
+    def drives(self) -> Mapping[str, Real]: ...
+    @property
+    def energy(self) -> Mapping[str, Real]: ...
+    @property
+    def momentum(self) -> Real | None: ...
+    @property
+    def work(self) -> Real | None: ...
+
+
+UNITS = {
+    ".position": "m",
+    ".orientation": "rad",
+    ".velocity": "m/s",
+    ".angular_velocity": "rad/s",
+    ".torque": "Nm",
+    ".force": "N",
+    ".angular": "Nms",
+    ".linear": "Ns",
+}
+
+
+def channels_of(trajectory: Run) -> dict[str, Real]:
+    """All signals of a trajectory, each (T, k), in World axes.
+
+    Torque and force, angular and linear parts are channels of their own: a norm never mixes units. The total energy is
+    the sum of the kinds the engine knows. "work" is the work done on the system, where the engine integrates it.
+    """
+    found: dict[str, Real] = {}
+    for name, path in trajectory.markers.items():
+        found[f"marker:{name}.position"] = path.position
+        found[f"marker:{name}.orientation"] = path.quaternion
+        found[f"marker:{name}.angular_velocity"] = path.velocity[:, :3]
+        found[f"marker:{name}.velocity"] = path.velocity[:, 3:]
+    for prefix, loads in (("load", trajectory.loads), ("wheel_load", trajectory.wheel_loads)):
+        for name, load in loads.items():
+            found[f"{prefix}:{name}.torque"] = load[:, :3]
+            found[f"{prefix}:{name}.force"] = load[:, 3:]
+    found |= {f"drive:{name}": drive.reshape(len(drive), -1) for name, drive in trajectory.drives.items()}
+    if trajectory.momentum is not None:
+        found["momentum.angular"] = trajectory.momentum[:, :3]
+        found["momentum.linear"] = trajectory.momentum[:, 3:]
+    found |= {f"energy.{kind}": energy[:, None] for kind, energy in trajectory.energy.items()}
+    if trajectory.energy:
+        found["energy.total"] = np.sum([energy[:, None] for energy in trajectory.energy.values()], axis=0)
+    if trajectory.work is not None:
+        found["work"] = trajectory.work[:, None]
+    return found
+
+
+def matches(pattern: str, channel: str) -> bool:
+    """Whether `pattern` names the channel: itself, a shell pattern of it, or its beginning up to a "." or ":"."""
+    return any(fnmatchcase(channel, form) for form in (pattern, f"{pattern}.*", f"{pattern}:*"))
+
+
+def family(channel: str) -> str:
+    """What a channel is one of: "load.torque" for every hinge's torque, "energy" for every kind of energy."""
+    kind, _, rest = channel.partition(":")
+    if not rest:
+        return "energy" if channel.startswith("energy.") else channel
+    return f"{kind}.{rest.rpartition('.')[2]}" if kind != "drive" else kind
+
+
+def unit(channel: str) -> str:
+    """SI unit of a channel."""
+    if channel.startswith(("energy.", "work")):
+        return "J"
+    if channel.startswith("drive:"):
+        return "N or Nm"
+    return next((symbol for ending, symbol in UNITS.items() if channel.endswith(ending)), "")
+
+
+def distance(channel: str, a: Real, b: Real) -> Real:
+    """Distance of two signals at each time, (T,): the Euclidean norm of a - b, for orientations the angle between them.
+
+    Quaternions q and -q are one orientation; the angle is 4 asin(|q_a - q_b| / 2), accurate for small angles.
+    """
+    with np.errstate(over="ignore", invalid="ignore"):
+        return _distance(channel, a, b)
+
+
+def _distance(channel: str, a: Real, b: Real) -> Real:
+    if channel.endswith(".orientation"):
+        chord = np.minimum(norms(a - b), norms(a + b))
+        return 4.0 * np.arcsin(np.minimum(chord / 2.0, 1.0))
+    return norms(a - b)
+
+
+def norms(rows: Real) -> Real:
+    """Euclidean norm of each row, (T,), neither lost below nor beyond the range of the numbers it is squared in.
+
+    Rows are scaled by powers of two, which rounds nothing. What is not finite stays so.
+    """
+    largest = np.max(np.abs(rows), axis=1, initial=0.0)
+    exponent = np.where(np.isfinite(largest), np.frexp(largest)[1], 0)
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.ldexp(np.linalg.norm(np.ldexp(rows, -exponent[:, None]), axis=1), exponent)
+
+
+def magnitude(channel: str, values: Real) -> float:
+    """Largest size of the signal itself, to which round-off is proportional (rad for orientations: half a turn)."""
+    if channel.endswith(".orientation"):
+        return float(np.pi)
+    return float(np.max(norms(values), initial=0.0))
+
+
+def signal_range(channel: str, values: Real) -> float:
+    """The channel's range, to which goals are relative.
+
+    For positions and orientations the farthest the signal gets from where it starts (a choice of origin must not
+    matter); for everything else, where zero means something, its largest magnitude.
+    """
+    if channel.endswith((".position", ".orientation")):
+        start = np.broadcast_to(values[:1], values.shape)
+        return float(np.max(distance(channel, values, start), initial=0.0))
+    return magnitude(channel, values)

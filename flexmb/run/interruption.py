@@ -1,0 +1,60 @@
+"""Ctrl-C while compiled code runs: Python sees it, and the run ends at its next step and keeps what it reached."""
+
+from __future__ import annotations
+
+import _thread
+import threading
+from collections.abc import Callable
+from typing import Any
+
+from flexmb.run.trajectory import Trajectory
+from flexmb.typing import Index
+
+PATIENCE = 0.1  # s between looks at the keyboard, where waiting itself does not see it (Windows)
+
+
+class Interrupted(KeyboardInterrupt):
+    """Ctrl-C ended a run. `trajectory` holds what was reached, as of a run that stopped."""
+
+    def __init__(self, trajectory: Trajectory) -> None:
+        super().__init__(trajectory)
+        self.trajectory = trajectory
+
+    def __str__(self) -> str:
+        return f"{self.trajectory.message}; what was reached is in the attribute `trajectory`"
+
+
+def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index) -> tuple[Any, bool]:
+    """What `run` returns, and whether Ctrl-C was pressed: then stop[0] = 1 asks it to return soon.
+
+    Python handles signals in the main thread, and only between its own instructions: so compiled code runs in another
+    thread, and the main one waits. Called from another thread, `run` is called there, and Ctrl-C is for others to see.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        return run(*arguments), False
+    done, found = threading.Event(), list[Any]()
+
+    def work() -> None:
+        try:
+            found.append((run(*arguments), None))
+        except BaseException as problem:
+            found.append((None, problem))
+        finally:
+            done.set()
+
+    _thread.start_new_thread(work, ())
+    interrupted = False
+    try:
+        while not done.wait(PATIENCE):
+            pass
+    except KeyboardInterrupt:
+        stop[0], interrupted = 1, True
+        done.wait()
+    except BaseException:  # of a handler of another signal, an alarm for example
+        stop[0] = 1
+        done.wait()
+        raise
+    result, problem = found[0]
+    if problem is not None:
+        raise problem
+    return result, interrupted

@@ -1,0 +1,96 @@
+"""Charts of one run as PNG files: what an analyst looks at first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from flexmb.output.printable import chart_text
+from flexmb.run.trajectory import Trajectory
+from flexmb.typing import Real
+
+_SIZE = (9.0, 5.5)  # inches
+_RESOLUTION = 120  # dots per inch
+
+
+def write_plots(trajectory: Trajectory, folder: Path) -> list[Path]:
+    """Write markers, energy, momentum, loads and drives, as far as the run has them; returns the paths."""
+    folder.mkdir(parents=True, exist_ok=True)
+    wanted: dict[str, tuple[Callable[[Trajectory, Figure], None], bool]] = {
+        "markers": (_markers, bool(trajectory.markers)),
+        "energy": (_energy, True),
+        "momentum": (_momentum, True),
+        "loads": (_loads, bool(trajectory.loads | trajectory.wheel_loads)),
+        "drives": (_drives, bool(trajectory.drives)),
+    }
+    return [_write(trajectory, folder / f"{name}.png", draw) for name, (draw, present) in wanted.items() if present]
+
+
+def _write(trajectory: Trajectory, path: Path, draw: Callable[[Trajectory, Figure], None]) -> Path:
+    figure = Figure(figsize=_SIZE, layout="constrained")
+    draw(trajectory, figure)
+    stopped = "" if trajectory.finished else f": {trajectory.message.split(':')[0]}"
+    figure.suptitle(chart_text(f"{trajectory.scene}{stopped}"))
+    for axes in figure.axes:
+        axes.grid(alpha=0.3)
+        if axes.get_legend_handles_labels()[0]:
+            axes.legend(fontsize="small", loc="best")
+    figure.axes[-1].set_xlabel("t (s)")
+    figure.savefig(path, dpi=_RESOLUTION)
+    return path
+
+
+def _rows(figure: Figure, *labels: str) -> list[Axes]:
+    """One panel below the other with a common time axis."""
+    panels = list(np.atleast_1d(figure.subplots(len(labels), sharex=True)))
+    for panel, label in zip(panels, labels, strict=True):
+        panel.set_ylabel(label)
+    return panels
+
+
+def _markers(trajectory: Trajectory, figure: Figure) -> None:
+    panels = _rows(figure, "x (m)", "y (m)", "z (m)")
+    for name, path in trajectory.markers.items():
+        for axis, panel in enumerate(panels):
+            panel.plot(trajectory.t, path.position[:, axis], label=chart_text(name))
+
+
+def _energy(trajectory: Trajectory, figure: Figure) -> None:
+    above, below = _rows(figure, "energy (J)", "drift (J)")
+    for kind, energy in trajectory.energy.items():
+        if np.any(energy):
+            above.plot(trajectory.t, energy, label=kind)
+    if np.any(trajectory.work):
+        above.plot(trajectory.t, trajectory.work, label="work", linestyle="--")
+    above.plot(trajectory.t, trajectory.total_energy, label="total", color="black")
+    below.plot(trajectory.t, trajectory.energy_drift, label="total - start - work")
+
+
+def _momentum(trajectory: Trajectory, figure: Figure) -> None:
+    for part, panel in enumerate(_rows(figure, "angular (N m s)", "linear (N s)")):
+        for axis in range(3):
+            panel.plot(trajectory.t, trajectory.momentum[:, 3 * part + axis], label="xyz"[axis])
+
+
+def _loads(trajectory: Trajectory, figure: Figure) -> None:
+    """Magnitudes: components of many hinges in one chart are not legible; the CSV has them."""
+    torque, force = _rows(figure, "|torque| (N m)", "|force| (N)")
+    for name, load in (trajectory.loads | trajectory.wheel_loads).items():
+        torque.plot(trajectory.t, _magnitude(load[:, :3]), label=chart_text(name))
+        force.plot(trajectory.t, _magnitude(load[:, 3:]), label=chart_text(name))
+
+
+def _drives(trajectory: Trajectory, figure: Figure) -> None:
+    (panel,) = _rows(figure, "drive load (N or N m)")
+    for name, drive in trajectory.drives.items():
+        for i in range(drive.shape[1]):
+            panel.plot(trajectory.t, drive[:, i], label=chart_text(name if drive.shape[1] == 1 else f"{name}[{i}]"))
+
+
+def _magnitude(vectors: Real) -> Real:
+    """Lengths of (T,3); hypot does not overflow where a diverging run's squares would."""
+    return np.hypot(np.hypot(vectors[:, 0], vectors[:, 1]), vectors[:, 2])

@@ -1,0 +1,50 @@
+"""What a run says about itself in a terminal."""
+
+from __future__ import annotations
+
+import numpy as np
+from rich.table import Table
+from rich.text import Text
+
+from flexmb.run.trajectory import Trajectory
+
+
+def summary(trajectory: Trajectory) -> Table:
+    """Status, drift of energy and momentum, steps, and where the time went."""
+    table = Table(show_header=False, box=None, padding=(0, 2, 0, 0))
+    table.add_column(style="dim")
+    table.add_column()
+    for name, value in _rows(trajectory):
+        table.add_row(name, value)
+    return table
+
+
+def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
+    cost = trajectory.statistics
+    steps = f"{cost.accepted_steps} accepted, {cost.rejected_steps} rejected, {cost.evaluations} evaluations"
+    if cost.jacobians:
+        steps += f", {cost.jacobians} Jacobians, {cost.factorisations} factorisations"
+    rows: list[tuple[str, Text | str]] = [
+        ("status", Text(trajectory.message, style="green" if trajectory.finished else "bold red")),
+        ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),
+    ]
+    if len(trajectory.t):
+        rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
+    return [
+        *rows,
+        ("steps", steps),
+        ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run, {cost.output_s:.2f} s output"),
+    ]
+
+
+def _energy(trajectory: Trajectory) -> str:
+    """The largest gain of energy beyond the work done, and relative to the energy that moved."""
+    drift, scale = np.abs(trajectory.energy_drift).max(), trajectory.energy_scale
+    relative = f" ({drift / scale:.1e} of {scale:.4g} J)" if scale > 0.0 else ""
+    return f"{drift:.1e} J{relative}"
+
+
+def _momentum(trajectory: Trajectory) -> list[tuple[str, str]]:
+    """Largest change of either momentum: a drift only where nothing pushes from outside."""
+    change = np.abs(trajectory.momentum_drift)
+    return [("momentum change", f"{change[:, :3].max():.1e} N m s angular, {change[:, 3:].max():.1e} N s linear")]

@@ -1,0 +1,151 @@
+"""The result of a run: everything observable at the output times, as arrays, with its units when written to a file."""
+
+from __future__ import annotations
+
+import csv
+import os
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+
+@dataclass(frozen=True)
+class MarkerPath:
+    """Motion of a marker in World axes.
+
+    position (T,3) m; quaternion (T,4) scalar first, marker to World components, without jumps of sign; velocity and
+    acceleration (T,6) [angular; linear], the linear one being the classical acceleration of the marker point.
+    """
+
+    position: Real
+    quaternion: Real
+    velocity: Real
+    acceleration: Real
+
+
+@dataclass(frozen=True)
+class Statistics:
+    """What a run cost: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
+
+    `factorisations` counts those of a matrix of the size of the state, or of its exponential.
+    """
+
+    evaluations: int
+    accepted_steps: int
+    rejected_steps: int
+    jacobians: int
+    factorisations: int
+    compile_s: float
+    run_s: float
+    output_s: float
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """One run, at the T output times that were reached.
+
+    t (T,) s; q (T,nq) and u (T,nu), in the order of `q_names`, `u_names`, which are (name, unit); markers by name;
+    loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
+    wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
+    by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
+    motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    """
+
+    scene: str
+    status: Status
+    message: str
+    stopped_at: float
+    t: Real
+    q: Real
+    u: Real
+    q_names: tuple[tuple[str, str], ...]
+    u_names: tuple[tuple[str, str], ...]
+    markers: dict[str, MarkerPath]
+    loads: dict[str, Real]
+    wheel_loads: dict[str, Real]
+    drives: dict[str, Real]
+    energy: dict[str, Real]
+    momentum: Real
+    work: Real
+    statistics: Statistics
+
+    @property
+    def finished(self) -> bool:
+        return self.status is Status.OK
+
+    @property
+    def total_energy(self) -> Real:
+        """Sum of all kinds of energy (T,) J."""
+        return np.sum(list(self.energy.values()), axis=0)
+
+    @property
+    def energy_drift(self) -> Real:
+        """Energy gained beyond the work done (T,) J: zero but for the error of the integration."""
+        return self.total_energy - self.total_energy[0] - (self.work - self.work[0])
+
+    @property
+    def energy_scale(self) -> float:
+        """What a drift of energy is compared with (J): the largest change of work or of any kind of energy."""
+        changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
+        return max(*changes, float(np.max(self.energy["kinetic"])))
+
+    @property
+    def momentum_drift(self) -> Real:
+        """Change of momentum since the start (T,6): zero only for scenes without external forces."""
+        return self.momentum - self.momentum[0]
+
+    def columns(self) -> Iterator[tuple[str, str, Real]]:
+        """(name, unit, values (T,)) of every scalar channel, time first."""
+        yield "t", "s", self.t
+        for i, (name, unit) in enumerate(self.q_names):
+            yield name, unit, self.q[:, i]
+        for i, (name, unit) in enumerate(self.u_names):
+            yield name, unit, self.u[:, i]
+        for name, path in self.markers.items():
+            yield from _vector(f"{name}.position", "m", path.position)
+            for i, axis in enumerate("wxyz"):
+                yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
+            yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
+            yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
+        for name, load in (self.loads | self.wheel_loads).items():
+            yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
+        for name, drive in self.drives.items():
+            for i in range(drive.shape[1]):
+                yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
+        for kind, energy in self.energy.items():
+            yield f"energy.{kind}", "J", energy
+        yield "energy.total", "J", self.total_energy
+        yield "work", "J", self.work
+        yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+
+    def to_csv(self, path: str | os.PathLike[str]) -> None:
+        """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
+        columns = list(self.columns())
+        with Path(path).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow([f"{name} [{unit}]" for name, unit, _ in columns])
+            for row in zip(*(values.tolist() for _, _, values in columns), strict=True):
+                writer.writerow([f"{value:.17g}" for value in row])
+
+    def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
+        """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""
+        from flexmb.run.plots import write_plots  # matplotlib is slow to import, and only needed here
+
+        return write_plots(self, Path(folder))
+
+
+def _vector(name: str, unit: str, values: Real) -> Iterator[tuple[str, str, Real]]:
+    for i, axis in enumerate("xyz"):
+        yield f"{name}.{axis}", unit, values[:, i]
+
+
+def _spatial(
+    name: str, parts: tuple[str, str], units: tuple[str, str], values: Real
+) -> Iterator[tuple[str, str, Real]]:
+    yield from _vector(f"{name}.{parts[0]}", units[0], values[:, :3])
+    yield from _vector(f"{name}.{parts[1]}", units[1], values[:, 3:])

@@ -1,0 +1,126 @@
+"""Compile ahead: `python -m flexmb.run.warm_up` fills the disk cache, so that the first real run starts at once.
+
+Everything depends on types only, not on the scene: one small scene of each kind compiles what every scene of its kind
+runs. Without arguments that is what `simulate` does with a tree by its defaults; --method, --algorithm and --scene add
+others.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+from time import perf_counter
+from typing import Literal, get_args
+
+from flexmb.entry import articulated
+from flexmb.integrate.settings import FIXED, LINEARISING, Method
+from flexmb.jit.kernel import cache_directory
+from flexmb.run.simulate import simulate
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.schema import Scene
+from flexmb.scene.shapes import beam_section
+from flexmb.system.system import Algorithm, System, compile
+
+Kind = Literal["tree", "condensed", "closed"]
+RUNNING: tuple[Algorithm, ...] = ("articulated", "composite", "frisch", "frisch_as_printed")
+ON_CHAINS: tuple[Algorithm, ...] = ("articulated", "composite")
+
+
+def pendulum() -> Scene:
+    """One rigid body on one revolute hinge, under gravity."""
+    return _bob().revolute("pivot", "ground", "bob").scene()
+
+
+def with_panel() -> Scene:
+    """The same with a beam of so many modes that they are condensed."""
+    panel = _bob().revolute("pivot", "ground", "bob").beam(
+        "panel", length=1.0, elements=8, modes=8, level="ruthless",
+        section=beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=1.7e-10, Iz=1.7e-10, rho=2700.0),
+    )  # fmt: skip
+    return panel.weld("root", "bob", "panel").scene()
+
+
+def looped() -> Scene:
+    """The pendulum held by a closure."""
+    return _bob().free("float", "ground", "bob").closure("pivot", "revolute", "ground", "bob").scene()
+
+
+SCENES = {"tree": pendulum, "condensed": with_panel, "closed": looped}
+
+
+def warm_up(
+    methods: Sequence[Method] = ("dop853", "rk4"),
+    algorithms: Sequence[Algorithm] = ("articulated",),
+    scenes: Sequence[Kind] = ("tree",),
+) -> float:
+    """Compile, or find compiled, all kernels behind `simulate` and `System`; returns the seconds it took.
+
+    scenes: "tree"; "condensed", trees with bodies of so many modes that they are eliminated in condensed form;
+    "closed", scenes with closures. Every method is compiled with every algorithm and scene that `simulate` runs it
+    with. Raises ValueError for a name that does not exist.
+    """
+    _check("method", methods, get_args(Method))
+    _check("algorithm", algorithms, RUNNING)
+    _check("scene", scenes, get_args(Kind))
+    start = perf_counter()
+    for kind in scenes:
+        system = compile(SCENES[kind]())
+        for algorithm in algorithms:
+            for method in methods:
+                if _runs(kind, algorithm, method):
+                    step = 1e-3 if method in FIXED else None
+                    simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
+        _pointwise(system)
+    return perf_counter() - start
+
+
+def _check(what: str, names: Sequence[str], known: Sequence[str]) -> None:
+    for name in names:
+        if name not in known:
+            raise ValueError(f"{what} is {name!r}: use one of {', '.join(map(repr, known))}")
+
+
+def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
+    """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
+    if method in LINEARISING and (kind == "closed" or algorithm != "articulated"):
+        return False
+    if kind == "closed":
+        return algorithm in ON_CHAINS
+    return kind == "tree" or algorithm == "articulated"
+
+
+def _pointwise(system: System) -> None:
+    state = system.initial_state
+    rates = system.accelerations(state)
+    if not system.scene.closures:
+        system.inverse_dynamics(state, rates)
+    system.mass_matrix(state)
+
+
+def _bob() -> SceneBuilder:
+    return (
+        SceneBuilder("pendulum", gravity=(0.0, -9.81, 0.0))
+        .rigid_body("bob", mass=1.0, com=(1.0, 0.0, 0.0), inertia=(1e-2, 1e-2, 1e-2))
+        .marker("centre", "bob", offset=(1.0, 0.0, 0.0))
+    )
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """The command line."""
+    parser = argparse.ArgumentParser(prog="python -m flexmb.run.warm_up", description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("--method", action="append", choices=get_args(Method), help="beside dop853 and rk4")
+    parser.add_argument("--algorithm", action="append", choices=RUNNING, help="beside articulated")
+    parser.add_argument("--scene", action="append", choices=get_args(Kind), help="beside trees")
+    asked = parser.parse_args(arguments)
+    seconds = warm_up(
+        ("dop853", "rk4", *(asked.method or ())),
+        ("articulated", *(asked.algorithm or ())),
+        ("tree", *(asked.scene or ())),
+    )
+    kept = cache_directory(Path(articulated.__file__))
+    print(f"compiled in {seconds:.1f} s, kept in {Path(kept).parent if kept else 'memory only: no folder is writable'}")
+
+
+if __name__ == "__main__":
+    main()

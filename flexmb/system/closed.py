@@ -1,0 +1,130 @@
+"""A compiled scene with closures: the system of its tree, with the accelerations and loads of the closed chain."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.closure import dynamics as closed_dynamics
+from flexmb.closure.assembly import consistent
+from flexmb.closure.constants import closure_constants, slowest_mode
+from flexmb.closure.system import ClosedMotion, ClosureError, Closures
+from flexmb.closure.tables import Closed
+from flexmb.scene import schema as s
+from flexmb.system.system import Algorithm, Evaluation, System
+from flexmb.tables import arguments
+from flexmb.tables.state import State, finite_result, pack
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+
+class ClosedSystem(System):
+    """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone."""
+
+    def __init__(self, scene: s.Scene) -> None:
+        super().__init__(scene)
+        own = closure_constants(scene, self.constants, self._closure_ports)
+        slowest = slowest_mode(self._links)
+        self.closures = Closures(
+            scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check
+        )
+        self._start: State | None = None
+
+    @property
+    def initial_state(self) -> State:
+        """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
+
+        Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates
+        first, then speeds. Prescribed ones are their functions'.
+        """
+        if self._start is None:
+            y = consistent(self.closures, 0.0, pack(super().initial_state))
+            self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
+        return State(self._start.q, self._start.u, 0.0, self.layout)
+
+    def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
+        """udot (nu,) of the closed chain under all loads, at a state that closes all closures.
+
+        Raises DynamicsError where an inertia is not positive definite, the closures are singular, or numbers are so
+        large that they overflow.
+        """
+        t, y = self.layout.entering(state)
+        return finite_result(self._motion(t, y, algorithm).accelerations, t)
+
+    def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
+        _refuse_others(self.scene, algorithm)
+        motion = self.closures.composite_motion if algorithm == "composite" else self.closures.motion
+        found = motion(t, y)
+        self._trust(t, y, self.closures)
+        return found
+
+    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""
+        if accelerations is not None:
+            raise NotImplementedError(
+                f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
+                "leave accelerations out, or prescribe coordinates"
+            )
+        return self._evaluate(*self.layout.entering(state), "articulated").loads
+
+    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        """With the closures' loads too."""
+        motion, out = self._motion(t, y, algorithm), self._outputs()
+        out.loads[:] = motion.hinges
+        self._observe_motion(t, y, motion.accelerations, out)
+        found = self._evaluation(t, motion.drives, out)
+        closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
+        return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
+
+    def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
+        """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
+
+        The others, in overconstrained mechanisms of rigid bodies, are those of the least closure loads (`evaluate`).
+        """
+        hinges, closures = self.closures.determined(*self.layout.entering(state))
+        names = [link.hinge.name for link in self._links], [closure.name for closure in self.scene.closures]
+        return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
+
+    def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
+        """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""
+        return self.closures.gaps(*self.layout.entering(state))
+
+    def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
+        """Fields of a `flexmb.run.propagate.Route`; ClosureError where there is no motion to run."""
+        _refuse_others(self.scene, algorithm)
+        if arguments.number("stabilise", stabilise) < 0.0:
+            raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
+        self._refuse_locked()
+
+        def tables() -> tuple[Closed, Closed]:
+            chain = self.closures.chain("composite" if algorithm == "composite" else "articulated", stabilise)
+            return chain, chain
+
+        return tables, closed_dynamics.rhs, closed_dynamics.project
+
+    def _refuse_locked(self) -> None:
+        start = self.initial_state  # counts the independent rows
+        locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
+        if locked and not np.any(self.constants.speed["prescribed"] >= 0):
+            names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
+            raise ClosureError(
+                f"closures {names} leave none of the {len(start.u)} free speeds: the mechanism is locked. Free a "
+                "hinge, or let bodies deform"
+            )
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """What a failure's number stands for: a closure or a body."""
+        if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
+            return self.scene.closures[fault].name
+        return super().fault_name(status, fault)
+
+
+def _refuse_others(scene: s.Scene, algorithm: Algorithm) -> None:
+    if algorithm not in ("articulated", "composite"):
+        raise NotImplementedError(
+            f'scene "{scene.name}" has closures, which algorithm {algorithm!r} does not know: '
+            'use algorithm="articulated" or "composite"'
+        )

@@ -1,0 +1,120 @@
+"""The mass matrix of one state in factors, M = F F', by recursion: solutions and products in O(N), M never formed.
+
+Jain & Rodriguez (54)-(56): F = (1 + H Phi K) D^1/2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.entry import factorisation
+from flexmb.jain.response import Response, response
+from flexmb.tables import arguments
+from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.state import finite_result
+from flexmb.typing import Real
+
+ROUNDING = 2.0**-53
+NEGLIGIBLE = 2.0**-49  # 16 roundings: singular scenes come out at 2 and less, definite ones with a digit left at 90
+STEPS = 30  # of the power method at most
+CONVERGED = 1.1  # it is told to a digit
+
+
+class Condition(NamedTuple):
+    """kappa: `flexmb.jain.precision`; speed: number in u of the one whose pivot magnifies rounding most."""
+
+    kappa: float
+    speed: int
+
+    @property
+    def digits(self) -> float:
+        """Significant decimal digits that rounding leaves of the accelerations, 0 to 16."""
+        return float(np.clip(-np.log10(np.maximum(self.kappa, 1.0) * ROUNDING), 0.0, 16.0))
+
+    @property
+    def is_singular(self) -> bool:
+        """Whether M cannot be told from a singular matrix (NaN cannot either)."""
+        return not self.kappa * NEGLIGIBLE < 1.0
+
+
+class MassMatrixFactors:
+    """M (nu,nu) of one state as F F' in the order of u; every product costs O(N)."""
+
+    def __init__(
+        self, constants: Constants, workspace: Workspace, t: float, y: Real, held: Constants | None = None
+    ) -> None:
+        """Keeps `workspace` for itself; `status` says whether M was positive definite.
+
+        Speeds that `held` prescribes are left out; by default none is.
+        """
+        if held is None:
+            speed = constants.speed.copy()
+            speed["prescribed"] = -1
+            held = replace(constants, speed=speed)
+        self._c, self._w = held, workspace
+        self._x: Response = response(constants)
+        self._t = t
+        self.status: int = factorisation.factorise(t, y, constants, self._c, workspace)
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether a pivot is so small that it may be rounding."""
+        return bool(self._w.doubt[0])
+
+    @property
+    def fault(self) -> int:
+        """Number of the body whose D is not positive definite."""
+        return int(self._w.fault[0])
+
+    def solve(self, b: Real) -> Real:
+        """M^-1 b for b (nu,) or (nu,m); as of its kin, ValueError or TypeError for an array that is not that."""
+        return self._by_columns(factorisation.solve, b)
+
+    def half_solve(self, b: Real) -> Real:
+        """F^-1 b for b (nu,) or (nu,m): |F^-1 b|^2 = b' M^-1 b."""
+        return self._by_columns(factorisation.half_solve, b)
+
+    def half_multiply(self, y: Real) -> Real:
+        """F y for y (nu,) or (nu,m): what `half_solve` undoes; F itself of the unit matrix."""
+        return self._by_columns(factorisation.half_multiply, y)
+
+    def multiply(self, x: Real) -> Real:
+        """M x for x (nu,) or (nu,m)."""
+        return self._by_columns(factorisation.multiply, x)
+
+    @cached_property
+    def condition(self) -> Condition:
+        """How much M magnifies rounding: the power method on F^-1 S'S F'^-1, each step O(N)."""
+        free = self._c.speed["prescribed"] < 0
+        y = np.where(free, np.random.default_rng(0).normal(size=len(free)), 0.0)
+        kappa, size = 0.0, float(np.linalg.norm(y))
+        for _ in range(STEPS):
+            if not 0.0 < size < np.inf:
+                break
+            y /= size
+            factorisation.weigh(self._c, self._w, self._x, y)
+            before, size = size, float(np.linalg.norm(y))
+            kappa = size
+            if size <= CONVERGED * before:
+                break
+        return Condition(kappa, int(np.argmax(np.abs(y))) if len(y) else 0)
+
+    @property
+    def log_determinant(self) -> float:
+        """log det M."""
+        return float(factorisation.log_determinant(self._c, self._w))
+
+    def _by_columns(self, apply: Callable[..., None], b: Real) -> Real:
+        b = arguments.finite("the array", arguments.array("the array", b))
+        if b.ndim not in (1, 2) or len(b) != len(self._c.speed):
+            raise ValueError(f"this mass matrix has {len(self._c.speed)} rows, got an array of shape {b.shape}")
+        rows = np.array(np.atleast_2d(b.T), order="C")
+        apply(self._c, self._w, self._x, rows)
+        finite_result(rows, self._t)
+        found: Real = rows[0] if b.ndim == 1 else rows.T
+        return found

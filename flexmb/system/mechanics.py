@@ -1,0 +1,250 @@
+"""The equations of motion M udot + c = tau of a tree at one state: inverse dynamics, mass matrix and its factors."""
+
+from __future__ import annotations
+
+import warnings
+from functools import cached_property
+from typing import NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.entry import articulated, composite, unsplit
+from flexmb.entry.consistent import consistent_accelerations, held_hinges
+from flexmb.jain.places import Matrices, matrices
+from flexmb.jain.unsplit import Joint
+from flexmb.system.factors import MassMatrixFactors
+from flexmb.tables import arguments
+from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.state import DynamicsError, Layout, PrecisionWarning, State, finite_result
+from flexmb.tables.status import OK, Status
+from flexmb.tables.workspaces import workspace
+from flexmb.typing import Index, Real
+
+FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
+
+
+class _Doubting(Protocol):
+    """A workspace whose evaluations note small pivots."""
+
+    @property
+    def doubt(self) -> Index: ...
+
+
+class Precision(NamedTuple):
+    """What rounding leaves of the accelerations: `digits`, decimal and significant, 0 to 16.
+
+    status: OK, or that the inertia of a body is not positive definite; fault, body: its number and name, or those of
+    the body that costs most digits.
+    """
+
+    status: int
+    fault: int
+    body: str
+    digits: float
+
+    @property
+    def is_low(self) -> bool:
+        """Whether the accelerations exist, with few digits."""
+        return self.status == OK and self.digits < FEW_DIGITS
+
+    @property
+    def warning(self) -> str:
+        """What `PrecisionWarning` says."""
+        return (
+            f"about {self.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
+            f'"{self.body}" moves nearly vanishes beside what it is summed from; bring masses, inertias and lengths '
+            "closer together, or leave out the freedom"
+        )
+
+
+class ConsistentMotion(NamedTuple):
+    """accelerations (nu,) that need no modal forces, and the tau (nu,) of hinges and wheels that they need."""
+
+    accelerations: Real
+    tau: Real
+
+
+class Mechanics:
+    """What a `System` answers about its equations of motion. It writes into one workspace."""
+
+    constants: Constants
+    layout: Layout
+    nq: int
+    nu: int
+    _w: Workspace
+
+    def __init__(self) -> None:
+        self._matrices: Matrices | None = None
+        self._joint: Joint | None = None
+        self._held: tuple[Constants, Workspace] | None = None
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Bodies in the order of the dynamics, point masses last."""
+        raise NotImplementedError
+
+    def workspace(self) -> Workspace:
+        """A fresh workspace; one per thread."""
+        raise NotImplementedError
+
+    def composite_workspace(self) -> composite.CompositeWorkspace:
+        """A fresh workspace for runs by composite bodies; one per thread."""
+        return composite.CompositeWorkspace(self.workspace(), matrices(self.constants))
+
+    def mass_matrix(self, state: State) -> Real:
+        """M (nu,nu), by composite bodies."""
+        t, y = self.layout.entering(state)
+        M = np.empty((self.nu, self.nu))
+        composite.mass_matrix(t, y, self.constants, self._w, self._places(), M)
+        return finite_result(M, t)
+
+    def factorise(self, state: State) -> MassMatrixFactors:
+        """M = F F' by recursion: `solve`, `multiply`, their halves and `log_determinant`, each in O(N).
+
+        Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
+        """
+        factors = MassMatrixFactors(self.constants, self.workspace(), *self.layout.entering(state))
+        self._check(factors.status, factors.fault)
+        if factors.is_doubtful:
+            self._judge(self._precision(factors))
+        return factors
+
+    def digits_left(self, state: State) -> float:
+        """Significant decimal digits, 0 to 16, of the accelerations of the free speeds that rounding leaves: estimated.
+
+        From the largest magnification of a rounding of the inertias by M^-1 over all loads, in units that do not
+        matter (`flexmb.jain.precision`), in O(N). Single accelerations may be better. Of closed chains: those of the
+        tree. Raises DynamicsError where M is not positive definite, or cannot be told from a singular matrix.
+        """
+        precision = self.precision(state)
+        self._check(precision.status, precision.fault)
+        return precision.digits
+
+    def precision(self, state: State) -> Precision:
+        """The same without raising where M is not positive definite."""
+        return self._precision_at(*self.layout.entering(state))
+
+    def bias(self, state: State) -> Real:
+        """c (nu,) in M udot + c = tau: gyroscopic, gravity, elastic forces and node loads."""
+        return self.inverse_dynamics(state, np.zeros(self.nu))
+
+    def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
+        """tau (nu,) = M udot + c of accelerations (nu,), in O(N): Jain & Rodriguez (45).
+
+        Nothing drives a structure but its hinges and wheels: where the modal rows of tau (`modal_residual`) do not
+        vanish, the accelerations are not consistent with each other, and tau is not what motors would have to do.
+        `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
+        """
+        t, y = self.layout.entering(state)
+        return finite_result(self._inverse(t, y, self.layout.rates("accelerations", accelerations))[0], t)
+
+    def modal_residual(self, state: State, accelerations: Real) -> dict[str, Real]:
+        """Modal rows T^f of inverse dynamics by body: the modal forces that these accelerations would need."""
+        tau = self.inverse_dynamics(state, accelerations)
+        places = {name: self._modes(k) for k, name in enumerate(self.body_names)}
+        return {name: tau[place] for name, place in places.items() if place.stop > place.start}
+
+    def consistent_inverse_dynamics(self, state: State, accelerations: Real) -> ConsistentMotion:
+        """Inverse dynamics of hinges and wheels that accelerate as told, structures following without modal forces.
+
+        The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
+        """
+        t, y = self.layout.entering(state)
+        used = np.where(self._is_modal, 0.0, arguments.vector("accelerations", accelerations, self.nu))
+        rates = self.layout.rates("accelerations", used)
+        if self._held is None:
+            self._held = held_hinges(self.constants, self.workspace())
+        held, w = self._held
+        self._check(consistent_accelerations(t, y, rates, self.constants, held, w), int(w.fault[0]))
+        self._trust(t, y, w, held)
+        rates = w.speed["acceleration"].copy()
+        return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
+
+    def applied(self, state: State) -> Real:
+        """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
+        t, y = self.layout.entering(state)
+        self._check(articulated.accelerations(t, y, self.constants, self._w))
+        return finite_result(self._w.speed["applied"].copy(), t)
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """What a failure's number stands for: a body."""
+        return self.body_names[fault]
+
+    def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
+        self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
+        self._trust(t, y, self._w)
+        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
+
+    def _unsplit(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Accelerations (nu,) and drive loads (nu,) by the unsplit recursion."""
+        if self._joint is None:
+            self._joint = unsplit.joint(self.constants)
+        self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
+        self._trust(t, y, self._w)
+        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
+
+    def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
+        """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
+        tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
+        articulated.inverse_dynamics(t, y, rates, self.constants, self._w, tau, loads)
+        return tau, loads
+
+    def _places(self) -> Matrices:
+        """Made when first asked for: they are as large as the mass matrix."""
+        if self._matrices is None:
+            self._matrices = matrices(self.constants)
+        return self._matrices
+
+    @cached_property
+    def _is_modal(self) -> NDArray[np.bool_]:
+        """Which entries of u (nu,) are modal."""
+        found = np.zeros(self.nu, bool)
+        for k in range(len(self.constants.body)):
+            found[self._modes(k)] = True
+        return found
+
+    def _modes(self, k: int) -> slice:
+        body = self.constants.body[k]
+        return slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
+
+    def _precision_at(self, t: float, y: Real, held: Constants | None = None) -> Precision:
+        """`held`: the constants whose prescribed speeds are held, by default the scene's."""
+        held = self.constants if held is None else held
+        return self._precision(MassMatrixFactors(self.constants, workspace(held, self.nq, self.nu), t, y, held))
+
+    def _trust(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
+        """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""
+        if w.doubt[0]:
+            self._judge(self._precision_at(t, y, held))
+
+    def _judge(self, precision: Precision) -> None:
+        """DynamicsError where inertias are not positive definite beyond rounding, a warning where few digits stay."""
+        self._check(precision.status, precision.fault)
+        if precision.is_low:
+            warnings.warn(precision.warning, PrecisionWarning, stacklevel=4)
+
+    def _precision(self, factors: MassMatrixFactors) -> Precision:
+        if factors.status != OK:
+            return Precision(factors.status, factors.fault, self.body_names[factors.fault], 0.0)
+        condition = factors.condition
+        status = Status.NOT_POSITIVE_DEFINITE if condition.is_singular else Status.OK
+        owner = _owner(self.constants, condition.speed)
+        return Precision(int(status), owner, self.body_names[owner], condition.digits)
+
+    def _check(self, status: int, fault: int | None = None) -> None:
+        """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
+        if status != OK:
+            place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
+            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+
+
+def _owner(c: Constants, speed: int) -> int:
+    """Body whose hinge, mode or wheel has a speed."""
+    for k, body in enumerate(c.body):
+        wheels = c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]]
+        first, modes = body["u_index"], body["etad_index"]
+        if first <= speed < first + body["nv"] or modes <= speed < modes + body["modes"] or speed in wheels:
+            return k
+    return 0

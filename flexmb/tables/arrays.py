@@ -1,0 +1,260 @@
+"""The arrays kernels work on: one table of names, shapes and units.
+
+N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
+W wheels; L loads; F functions of time; m the largest number of modes; nq, nu lengths of q and u. Everything about a
+body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
+frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
+``c.body[k].parent``.
+
+A *port* is a frame fixed to a point of a body that may deform: where a hinge, wheel, load or marker sits.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flexmb.jit.bundle import bundle
+from flexmb.typing import Index, Real, Record
+
+RIGID, RUTHLESS, FULL, LINEAR, STIFFENED = range(5)
+EXPLICIT, WOODBURY, CONDENSED = range(3)
+FORCE, TORQUE = range(2)
+WORLD_AXES, NODE_AXES = range(2)
+
+_F, _I = np.float64, np.int64
+
+
+def _record(*fields: tuple) -> np.dtype:
+    return np.dtype(list(fields), align=True)
+
+
+BODY = _record(
+    ("parent", _I),  # -1 for ground
+    ("level", _I),  # RIGID, RUTHLESS, FULL, LINEAR or STIFFENED
+    ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
+    ("sequence", _I, (3,)),  # axis numbers of a gimbal
+    ("q_index", _I),  # first hinge coordinate in q
+    ("u_index", _I),  # first hinge speed in u
+    ("nv", _I),  # number of hinge speeds
+    ("modes", _I),  # number of modes
+    ("elimination", _I),  # of the modes: EXPLICIT, WOODBURY or CONDENSED
+    ("reduced", _I),  # row of the tables of ReducedConstants, where not EXPLICIT
+    ("node", _I),  # place of the inboard port among its parent's nodes, where the parent's elimination is not EXPLICIT
+    ("nodes", _I),  # number of such places: hinges of outboard bodies at ports that deform
+    ("orthogonal", _I),  # whether the modal masses are diagonal
+    ("uncoupled", _I),  # whether modal stiffness and damping are diagonal
+    ("eta_index", _I),  # first modal coordinate in q
+    ("etad_index", _I),  # first modal speed in u
+    ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming
+    ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
+    ("placement_position", _F, (3,)),  # O+ in the parent's frame
+    ("placement_rotation", _F, (9,)),  # R_parent_O+
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
+    # without the summed points
+    ("rigid", _F, (10,)),
+    ("product", _I),  # level full: row of `product`
+    ("slope", _I),  # level linear: row of `slope`
+    ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
+    ("ball_spring", _F),  # stiffness of a spherical hinge
+    ("point_start", _I),
+    ("point_stop", _I),
+    ("port_start", _I),
+    ("port_stop", _I),
+    ("wheel_start", _I),
+    ("wheel_stop", _I),
+    ("load_start", _I),
+    ("load_stop", _I),
+)
+MODE = _record(  # mode n of a body
+    ("mfr", _F, (6,)),  # coupling to [angular; linear] at rest
+    ("gyration", _F, (6,)),  # ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
+)
+PAIR = _record(  # modes n, i of a body
+    ("mff", _F),  # modal mass matrix
+    ("stiffness", _F),
+    ("damping", _F),
+)
+SLOPE = _record(  # level linear: mode n of a body by eta_k
+    ("mfr", _F, (6,)),  # d mfr_n / deta_k = [C1_kn; L1_kn]
+    ("coriolis", _F, (3,)),  # C1_kn - C1_nk, velocity-dependent force w . coriolis etad_k on the mode
+    ("gyration", _F, (6,)),  # symmetric G_nk = 1/2 d2J/(deta_n deta_k)
+)
+# Summed at run time: points with rotating inertia or an offset mass centre; level linear: wheels; level stiffened: all.
+POINT = _record(
+    ("mass", _F),  # 0 where the mass is in the polynomial part, or in points of its own
+    ("position", _F, (3,)),
+    ("offset", _F, (3,)),  # mass centre from the point, in point axes
+    ("inertia", _F, (6,)),  # about the mass centre
+    ("turning", _I),  # whether it has an inertia or an offset
+    ("second", _I),  # level stiffened: row of `second_shape`, else -1
+)
+PORT = _record(
+    ("position", _F, (3,)),
+    ("offset", _F, (3,)),  # in node axes (parallel to the body's at rest)
+    ("frame", _F, (9,)),  # rotation port -> node axes
+    ("second", _I),  # level stiffened: row of `second_shape`, else -1
+)
+SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # mode shape at a port or point
+WHEEL = _record(
+    ("port", _I),
+    ("q_index", _I),
+    ("u_index", _I),
+    ("axis", _F, (3,)),  # unit, in port axes
+    ("mass", _F),
+    ("axial", _F),
+    ("transverse", _F),
+)
+LOAD = _record(
+    ("port", _I),
+    ("type", _I),  # FORCE or TORQUE
+    ("frame", _I),  # WORLD_AXES or NODE_AXES
+    ("function", _I),
+    ("direction", _F, (3,)),
+)
+SPEED = _record(
+    ("coordinate", _I),  # its scalar coordinate's place in q; -1 for speeds of a quaternion or of a mode
+    ("motor", _I),  # function, -1 for none
+    ("prescribed", _I),  # function of the coordinate's value, -1 where it is free
+    ("stiffness", _F),
+    ("damping", _F),
+    ("rest", _F),
+    ("doubtful", _F),  # a pivot below is so small against all that the speed moves that it may be rounding
+)
+FUNCTION = _record(
+    ("kind", _I),
+    ("data", _F, (4,)),
+    ("start", _I),  # its rows of `table`
+    ("stop", _I),
+)
+
+
+@bundle
+class Constants:
+    """Everything that does not change in a run."""
+
+    gravity: Real  # (3,) World axes, m/s^2
+    body: Record  # (N,) BODY
+    mode: Record  # (N,m) MODE
+    pair: Record  # (N,m,m) PAIR
+    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.integrals` has it
+    slope: Record  # (bodies of level linear,m,m) SLOPE
+    mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
+    point: Record  # (S,) POINT
+    point_mode: Record  # (S,m) SHAPE
+    port: Record  # (P,) PORT
+    port_mode: Record  # (P,m) SHAPE
+    second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
+    wheel: Record  # (W,) WHEEL
+    load: Record  # (L,) LOAD
+    speed: Record  # (nu,) SPEED
+    function: Record  # (F,) FUNCTION
+    table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
+
+
+# Every reduced body has nodes i = 0..C-1 where outboard bodies are hinged; vectors of all of them are stacked (6C).
+REDUCED_NODE = _record(
+    ("port", _I),
+    ("theta", _F, (6, 6)),  # Theta = phi' - Pi Lam M_fr: acceleration of the node by that of the body, modes yielding
+)
+
+
+@bundle
+class ReducedConstants(Constants):
+    """Constants of a scene some of whose bodies are reduced: their D_f is not factorised at run time, Appendix B.
+
+    R reduced bodies; C the most nodes of one. Written for M_ff = L L'; Lam = M_ff^-1.
+    """
+
+    compliance: Real  # (R,m,m) condensed: L^-1; Woodbury: Lam
+    gain: Real  # (R,m,1+C,6) at rest: [Psi, Ups_1 .. Ups_C] of Psi = Lam M_fr, Ups = Lam Pi'; condensed: L' times it
+    node: Record  # (R,C) REDUCED_NODE at rest
+    root: Real  # (R,6C,6C) at rest: Omega = Pi Lam Pi' = root' root
+    rank: Index  # (R,) rows of root
+    zeta: Real  # (R,21) at rest: M_rf Lam M_fr, as a spatial inertia
+
+
+BODY_STATE = _record(
+    ("rotation", _F, (9,)),  # R_parent_body
+    ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
+    ("hinge_map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
+    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
+    ("velocity", _F, (6,)),  # of the body frame, body axes
+    ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
+    ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
+    ("accel_hinge", _F, (6,)),  # of O without the deformation part, minus gravity, body axes
+    ("pose_rotation", _F, (9,)),  # R_World_body
+    ("pose_position", _F, (3,)),
+    ("inertia", _F, (21,)),  # rigid block of the articulated inertia about the body origin
+    ("force", _F, (6,)),  # rigid part of the bias force
+    ("hinge_inertia", _F, (21,)),  # P_R about O
+    ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
+    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)' by free speed
+    ("hinge_factor", _F, (6, 6)),  # Cholesky factor of D_R
+    ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
+    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
+    ("free_count", _I),
+    ("load", _F, (6,)),  # load across the hinge on the body about O, body axes
+)
+MODE_STATE = _record(  # mode n of a body
+    ("eta", _F),  # as the level sees it: 0 for ruthless
+    ("etad", _F),
+    ("etadd", _F),
+    ("zf", _F),  # modal bias force, then L^-1 of it
+    ("pfr", _F, (6,)),  # coupling, then L^-1 of it
+)
+PORT_STATE = _record(
+    ("r", _F, (3,)),  # position from the body origin
+    ("R", _F, (9,)),  # R_body_port
+    ("v", _F, (6,)),  # velocity relative to the body
+    ("a", _F, (6,)),  # acceleration relative to the body at etaddot = 0
+)
+COLUMN = _record(("W", _F, (3,)), ("L", _F, (3,)))  # angular and linear velocity per modal speed
+SPEED_STATE = _record(
+    ("acceleration", _F),  # udot
+    ("applied", _F),  # spring + damper + motor
+    ("drive", _F),  # drive load of a prescribed coordinate, beyond springs and motors
+)
+
+
+@bundle
+class Workspace:
+    """What one evaluation writes. One workspace per thread."""
+
+    q: Real  # (nq,) quaternions normalised, prescribed coordinates exact
+    u: Real  # (nu,)
+    raw: Real  # (nq,) coordinates as the integrator has them
+    rate: Real  # (nq,) qdot
+    ground: Real  # (3,) acceleration of the ground, World axes: -gravity
+    body: Record  # (N,) BODY_STATE
+    mode: Record  # (N,m) MODE_STATE
+    pff: Real  # (N,m,m) modal block of the articulated inertia, then its Cholesky factor
+    port: Record  # (P,) PORT_STATE
+    port_mode: Record  # (P,m) COLUMN
+    point_mode: Record  # (m,) COLUMN, scratch of one summed point
+    integral: Real  # (12*m,) sums of one body's `product`
+    speed: Record  # (nu,) SPEED_STATE
+    function: Real  # (F,3) value, rate, acceleration
+    fault: Index  # (1,) body where an evaluation failed
+    doubt: Index  # (1,) whether an evaluation met a pivot that may be rounding
+    displaced: Index  # (1,) whether modes and ports of ruthless bodies may not be at rest
+
+
+NODE_STATE = _record(  # node of a reduced body, axes of the body
+    ("gamma", _F, (21,)),  # P_R^+ of the outboard body about the node: Gamma
+    ("force", _F, (6,)),  # z_R^+ of the outboard body about the node, then the force at the node without accelerations
+    ("theta", _F, (6, 6)),
+    ("carried", _F, (6, 6)),  # T Theta: force at the node by acceleration of the body
+    ("response", _F, (6,)),  # of the stacked right side
+)
+
+
+@bundle
+class ReducedWorkspace(Workspace):
+    """The workspace of a scene with reduced bodies. What does not change with the deformation is written once."""
+
+    gain: Real  # (R,m,1+C,6)
+    node: Record  # (R,C) NODE_STATE
+    root: Real  # (R,6C,6C)
+    rank: Index  # (R,)
+    zeta: Real  # (R,21)
+    scratch: Real  # (3,6C,6C): B = C^-1 root Gamma; C C' = 1 + root Gamma root'; T = Gamma - B'B
