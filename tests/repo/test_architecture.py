@@ -7,6 +7,7 @@ import re
 import pytest
 
 from tests.repo import architecture as a
+from tests.repo.project import ROOT
 
 PAGE = a.PAGE.read_text(encoding="utf-8")
 ORDER = [("report", "verify"), ("judging",), ("library",)]  # stands for a contract
@@ -41,8 +42,9 @@ def test_a_wrong_list_of_rooms_is_noticed(wrong: str, fault: str) -> None:
     assert any(each.startswith(fault) for each in a.faults_of_rooms(wrong, "crosscheck", ORDER))
 
 
-def test_every_file_and_name_exists() -> None:
-    assert not a.faults_of_names(PAGE)
+@pytest.mark.parametrize("page", ["docs/architecture.md", "CONTRIBUTING.md", "README.md"])
+def test_every_file_and_name_exists(page: str) -> None:
+    assert not a.faults_of_names((ROOT / page).read_text(encoding="utf-8"))
 
 
 @pytest.mark.parametrize(
