@@ -49,7 +49,7 @@ def _place(verdict: Verdict) -> str:
 
 
 def words(text: str, style: str = "") -> Text:
-    """Text as it stands, brackets and colons too: only `Text` is safe from rich's markup and emoji."""
+    """Text shown literally, with brackets and colons: only `Text` is safe from rich's markup and emoji."""
     return Text(printable(text), style)
 
 
