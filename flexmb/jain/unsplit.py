@@ -56,7 +56,16 @@ def _eliminate(c, w, x, k):
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     _mode_rows(c, w, x, k, a)
     rows = nm + find_free(c, w, k)
-    _hinge_rows(c, w, x, k, P, z)
+    for n in range(nm, rows):
+        j = w.body[k].free_speed[n - nm]
+        H = motion_column(c, w, k, j)
+        F = inertia_times(P, H)
+        store6(gain[n], 0, F)
+        residual[n] = less6(w.speed[c.body[k].u_index + j].applied, H, z)
+        for i in range(nm):
+            D[n, i] = dot6(vec6(gain[i], 0), H)
+        for i in range(nm, n + 1):
+            D[n, i] = dot6(F, motion_column(c, w, k, w.body[k].free_speed[i - nm]))
     if not cholesky(D, rows):
         return False
     note_modes(c, w, k, D)
@@ -82,7 +91,7 @@ def _eliminate(c, w, x, k):
 
 @helper
 def _mode_rows(c, w, x, k, a):
-    """Rows of the modes in D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
+    """The modes' rows of D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     for n in range(c.body[k].modes):
         P_fr = vec6(w.mode[k, n].pfr, 0)
@@ -90,22 +99,6 @@ def _mode_rows(c, w, x, k, a):
         residual[n] = -plus6(w.mode[k, n].zf, P_fr, a)
         for i in range(n + 1):
             D[n, i] = w.pff[k, n, i]
-
-
-@helper
-def _hinge_rows(c, w, x, k, P, z):
-    """The same rows of the hinge's free speeds, from P_rr and the rigid part of z + P a."""
-    D, gain, residual, nm = x.D[k], x.gain[k], x.residual[k], c.body[k].modes
-    for n in range(nm, nm + w.body[k].free_count):
-        j = w.body[k].free_speed[n - nm]
-        H = motion_column(c, w, k, j)
-        F = inertia_times(P, H)
-        store6(gain[n], 0, F)
-        residual[n] = less6(w.speed[c.body[k].u_index + j].applied, H, z)
-        for i in range(nm):
-            D[n, i] = dot6(vec6(gain[i], 0), H)
-        for i in range(nm, n + 1):
-            D[n, i] = dot6(F, motion_column(c, w, k, w.body[k].free_speed[i - nm]))
 
 
 @helper
