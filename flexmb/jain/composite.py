@@ -1,9 +1,10 @@
 """Composite-body inertias and the mass matrix of trees: Jain & Rodriguez (47)-(50), O(N^2 n^2); forward dynamics (46).
 
-R(k) is the modal inertia of all that body k carries, frozen. Every speed of body k has a force X = R H', which travels
-inward through the bodies that carry k; what they meet of it are the elements of M (50). All forces on the way through a
-body travel together: the speeds of what a body carries are neighbours in M when M is written in places (`Places`)
-instead of in the order of u. Rows of M are then filled from one end to the other.
+R(k) is the modal inertia of body k with all that it carries, as if frozen to it. A unit rate of a speed of body k asks
+for the force X = R H', which is passed inward through the bodies that carry k: its projections on their motions are the
+elements of M (50). All forces are passed through a body at once. For this M is written in places (`Places`) instead of
+in the order of u, so that the speeds of what a body carries are neighbours; rows of M are filled from one end to the
+other.
 
 A wheel is one more speed of its body, whose force is the torque I q on its node.
 """
@@ -42,7 +43,7 @@ def mass_matrix(c, w, m):
 def forward_dynamics(c, w, m):
     """Accelerations into w.speed.acceleration by (46), drive loads into w.speed.drive; returns a status code.
 
-    Prescribed speeds have their rates; what these cost is part of the bias. m keeps M, bias and factor.
+    The rates of prescribed speeds are given, and what they ask for is part of the bias. m keeps M, bias and factor.
     """
     hinge_forces(c, w)
     for j in range(w.u.shape[0]):
@@ -59,7 +60,7 @@ def forward_dynamics(c, w, m):
 
 @helper
 def _solve(c, w, m):
-    """M x = T - C for the free speeds, tips first: pivots as in articulated bodies, and no fill between branches."""
+    """M x = T - C for the free speeds, tips first: pivots are those of articulated bodies, branches do not fill in."""
     free = m.x.shape[0]
     _reverse(m, free)
     for a in range(free):
@@ -102,7 +103,7 @@ def _reverse(m, n):
 def composite_bodies(c, w, m):
     """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
 
-    Needs w.body.inertia, w.pff and w.mode.pfr of all bodies, M_m; leaves R there.
+    Needs M_m of all bodies in w.body.inertia, w.pff and w.mode.pfr, and leaves R there.
     """
     for k in range(c.body.shape[0] - 1, -1, -1):
         if c.body[k].outboard_port >= 0:
@@ -117,7 +118,7 @@ def composite_bodies(c, w, m):
 
 @helper
 def _own_forces(c, w, m, k):
-    """X of body k's own speeds about O into their columns of m.X, and the rows of its modes and wheels among them."""
+    """X of body k's own speeds about O into their columns of m.X, and M of its modes and wheels among themselves."""
     first, modes, wheels = m.hinge[k], m.modes[k], m.wheels[k]
     R = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].nv):
@@ -218,6 +219,7 @@ def _rotate(R, X, start, stop):
 
 @helper
 def _rotate3(R, x, y, z, start, stop):
+    """Vectors with components in rows x, y, z turned by R."""
     for j in range(start, stop):
         a, b, c = x[j], y[j], z[j]
         x[j] = R[0] * a + R[1] * b + R[2] * c

@@ -7,8 +7,8 @@ Theta = phi' - Pi Psi. The modes follow the body and the loads F at its nodes,
     F_0   = y - T (Ups' z_f + Omega y),
 
 hence P_R = M_rr - zeta + Theta' T Theta and z_R = z_r - Psi' z_f + Theta' F_0: no term knows how many modes there are.
-Kept are L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f, as this loses fewest digits. Where M_fr and Pi change with the
-deformation, the tables are made anew at each evaluation.
+What is kept is L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f, which loses the fewest digits. Where M_fr and Pi change with
+the deformation, the tables are made anew at each evaluation.
 """
 
 from math import sqrt
@@ -146,8 +146,8 @@ def _theta(rows, nm, j, r, theta):
 def semidefinite_root(a, diagonal, root, n):
     """Rows root[:rank] with a[:n,:n] = root' root to round-off; returns the rank. Overwrites a and diagonal (n,).
 
-    Cholesky, if there is a pivot everywhere. Else with complete pivoting, scaled to a unit diagonal: what is left
-    behind is smaller than the last pivot, and units do not matter.
+    By Cholesky where every pivot is positive; otherwise with complete pivoting of the matrix scaled to a unit diagonal,
+    so that what is left behind is smaller than the last pivot, and units do not matter.
     """
     for i in range(n):
         diagonal[i] = a[i, i]

@@ -1,7 +1,7 @@
 """Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
-tau holds inertia, gravity, elasticity and node loads; hinge springs and motors are what it is compared with. Modal rows
-vanish where the accelerations are consistent with an undriven structure.
+tau holds inertia, gravity, elasticity and node loads, but not hinge springs and motors: these are what it is compared
+with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
 """
 
 from flexmb.jain.explicit import force_to_parent

@@ -1,7 +1,8 @@
 """What outboard bodies do to the modes of a reduced body, kept at its nodes: of size 6 each, whatever the mode count.
 
 A node is a port that deforms and carries a hinge. With Gamma and y the articulated inertia and force of what is hinged
-there, A the node's acceleration, F its load on the body, modes included: F = Gamma A + y. Nodes are stacked.
+there, and A the acceleration of the node, its load on the body and its modes is F = Gamma A + y. Matrices of several
+nodes have six rows for each.
 """
 
 from math import sqrt

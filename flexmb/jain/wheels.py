@@ -1,6 +1,6 @@
-"""Wheels: one more speed each, and what they do to the nodes that carry them.
+"""Wheels: each is one more speed of its body, and acts on the node that carries it.
 
-The body holds the despun wheel: its mass, and its whole inertia as if it turned with the node.
+The mass matrix of the body holds the despun wheel: its mass and its inertia, as if it turned with the node.
 """
 
 from flexmb.jain.forces import add_port_torque

@@ -12,7 +12,7 @@ from flexmb.tables.functions import evaluate
 
 @helper
 def load_state(t, y, c, w):
-    """Copy q and u out of y = [q, u, ...]: functions of time at t, prescribed coordinates exact, quaternions unit."""
+    """Take q and u from y = [q, u, ...], functions of time at t: prescribed coordinates exact, quaternions unit."""
     for f in range(c.function.shape[0]):
         value, rate, acceleration = evaluate(
             c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
