@@ -49,7 +49,7 @@ def nested_constants(
 def _parameters(link: Link, errata: Set[Erratum]) -> ModeParameters:
     """(48)-(72) of one body; the tensors of its despun wheels are left to I_W (26), their masses are elements."""
     model = link.model
-    if link.level == a.STIFFENED:
+    if link.level.second_order:
         raise ValueError(
             f'body "{link.name}": these equations are of first order in the deformation and know no geometric '
             'stiffness, for which level "stiffened" stands; use level "linear" or "full", or algorithm "articulated"'

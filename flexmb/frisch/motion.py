@@ -9,6 +9,7 @@ exponential of the rotation shapes. As printed they move by constant shapes, (11
 from flexmb.frisch.tables import FIXED_SHAPES
 from flexmb.hinges import catalogue
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.levels.field import field_motion
 from flexmb.spatial.vector import (
     add,
@@ -24,14 +25,13 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
-from flexmb.tables.arrays import RUTHLESS
 
 
 @helper
 def relative_motion(c, w):
     """Poses, rates and kinematic biases of all bodies and ports, World axes, and the entries of S."""
     for k in range(c.body.shape[0]):
-        seen = c.body[k].level != RUTHLESS
+        seen = not is_at_rest(c.body[k].level)
         for n in range(c.body[k].modes):
             w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if seen else 0.0
             w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if seen else 0.0
@@ -99,7 +99,7 @@ def _across_hinge(c, w, k):
         alpha_node, a_node = vec3(w.port[i].alpha, 0), vec3(w.port[i].a, 0)
     kind, at_q, at_u, sequence = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index, c.body[k].sequence
     R_hinge, translation = catalogue.pose(kind, w.q, at_q, sequence)
-    w_hinge, v_hinge, alpha_hinge, a_hinge = catalogue.motion(
+    (w_hinge, v_hinge), (alpha_hinge, a_hinge) = catalogue.motion(
         kind, w.q, at_q, w.u, at_u, sequence, w.nest[k].hinge_map
     )
     arm = times(R, translation)

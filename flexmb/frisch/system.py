@@ -93,7 +93,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     """
     chain = links(scene)
     numbering = Numbering(chain, wheels_by_body(scene))
-    constants, _, _ = assemble(scene, chain, numbering, null_partitions)
+    constants = assemble(scene, chain, numbering, null_partitions).constants
     return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
 

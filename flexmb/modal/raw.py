@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.modal.model import FlexibleModel, ModalNode, undeforming_node
+from flexmb.modal.flexible_model import FlexibleModel, ModalNode, undeforming_node
 from flexmb.modal.raw_second_order import node_second_order, second_order
 from flexmb.scene.bodies import ModalBody, Vector
 from flexmb.scene.modal_data import modal_arrays

@@ -15,7 +15,7 @@ from flexmb.dense.jets import Frame
 from flexmb.dense.kinematics import Motion, member_frames, seat_frame
 from flexmb.dense.profiles import profile
 from flexmb.dense.tree import Seat
-from flexmb.modal.model import ModalNode
+from flexmb.modal.flexible_model import ModalNode
 from flexmb.scene import schema as s
 from flexmb.scene.tree import rest_frames
 from tests import trees

@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.flexible_model import FlexibleModel, ModalNode
 from tests.bounds import gamma
 
 RADIUS = 0.1

@@ -16,7 +16,7 @@ from flexmb.dense.kinematics import Motion, member_frames, on_body
 from flexmb.dense.profiles import profile
 from flexmb.dense.tree import Member, Rotor, Seat
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene import schema as s
 from tests.flexmb.frisch.contiguous import WORLD, hinge_point, seen_from
 

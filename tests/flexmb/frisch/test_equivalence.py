@@ -22,7 +22,7 @@ from flexmb.frisch.equivalence.relations import (
     turning_axis,
 )
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.flexible_model import FlexibleModel, ModalNode
 from flexmb.scene.bodies import TipMass
 from tests.bounds import gamma, observed_order, relative
 from tests.flexmb.modal.beam_references import beam, clamped_free_roots

@@ -10,7 +10,7 @@ import pytest
 from flexmb.frisch.normalisation import check_boundary, normalised
 from flexmb.frisch.parameters import mode_parameters
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import ModalNode
+from flexmb.modal.flexible_model import ModalNode
 from tests.bounds import gamma, relative
 from tests.flexmb.frisch import exact
 from tests.flexmb.modal.beam_references import beam
