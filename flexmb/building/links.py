@@ -19,6 +19,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, ModalNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -113,7 +114,7 @@ class Side:
 
 def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
     """Frames A and B of a closure."""
-    turn = z_to(closure.axis) if closure.type in ("revolute", "prismatic", "cylindrical") else np.eye(3)
+    turn = z_to(closure.axis) if closure.type in WITH_AXIS else np.eye(3)
     return (
         Side(closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a, turn),
         Side(closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b, turn),

@@ -13,9 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from flexmb.dense.first_order import FirstOrderBody, body_jacobian, first_order_body
+from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import Frame
 from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames, points, seat_frame
 from flexmb.dense.profiles import profile
@@ -131,10 +131,7 @@ class DenseSystem:
             if x.motor is not None:
                 tau[x.u] += profile(x.motor, t).value
         for member in self.tree.members:
-            if isinstance(member.hinge, s.Spherical):
-                theta = rotation_vector(q[member.q_hinge])
-                tau[member.u_hinge] -= member.hinge.stiffness_Nm_rad * theta
-                tau[member.u_hinge] -= member.hinge.damping_Nms_rad * u[member.u_hinge]
+            tau[member.u_hinge] += ball_torque(member.hinge, q[member.q_hinge], u[member.u_hinge])
         return tau
 
     def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:
@@ -222,9 +219,7 @@ class DenseSystem:
         for member in self.tree.members:
             eta = q[member.q_modes]
             strain += 0.5 * float(eta @ member.model.stiffness @ eta)
-            if isinstance(member.hinge, s.Spherical):
-                theta = rotation_vector(q[member.q_hinge])
-                spring += 0.5 * member.hinge.stiffness_Nm_rad * float(theta @ theta)
+            spring += ball_energy(member.hinge, q[member.q_hinge])
         return {
             "kinetic": kinetic + sum(body.kinetic for body in bodies),
             "strain": strain,
@@ -322,11 +317,6 @@ def _turned(chosen: Points, frames: Frame) -> Real:
     """Inertia tensors (P,3,3) in World axes."""
     R = frames.rotation.value
     return np.asarray(R @ chosen.inertia @ np.swapaxes(R, -1, -2))
-
-
-def rotation_vector(quaternion: Real) -> Real:
-    """Rotation vector (3,) of a scalar-first quaternion, of length at most pi."""
-    return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
 
 
 def _columns(frames: Frame) -> Jacobian:

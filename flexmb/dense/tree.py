@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from flexmb.dense.hinge_frames import hinge_sizes
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, ModalNode
 from flexmb.scene import schema as s
@@ -123,17 +124,6 @@ def build(scene: s.Scene, folder: Path | None = None) -> Tree:
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
     return replace(tree, sites=sites)
-
-
-def hinge_sizes(hinge: s.Hinge | s.PointMass) -> tuple[int, int]:
-    """Numbers of coordinates and speeds."""
-    match hinge:
-        case s.Spherical():
-            return 4, 3
-        case s.Free():
-            return 7, 6
-    count = len(coordinates(hinge))
-    return count, count
 
 
 def _append(

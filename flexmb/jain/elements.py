@@ -14,8 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.dense import hinge_frames
+from flexmb.dense.hinge_frames import hinge_frame
 from flexmb.dense.jets import skew
-from flexmb.dense.kinematics import Motion, field, hinge_frame, member_frames, on_body, seat_frame
+from flexmb.dense.kinematics import Motion, field, member_frames, on_body, seat_frame
 from flexmb.dense.tree import Member, Rotor, Seat, Tree, rigid_model
 from flexmb.scene import schema as s
 from flexmb.typing import Real
@@ -120,7 +122,7 @@ class Configuration:
         """Joint map (n,6): velocity of O_k relative to O_k+ for each hinge speed (8)."""
         member = self.tree.members[k]
         n = member.u_hinge.stop - member.u_hinge.start
-        found = hinge_frame(member, self._unit(member.u_hinge))
+        found = hinge_frame(member.hinge, self._unit(member.u_hinge).hinge(member))
         R = self.seat(member.parent, member.inboard)[1]
         angular = np.broadcast_to(found.angular_velocity()[:, 0], (n, 3))
         linear = np.broadcast_to(found.position.rate[:, 0], (n, 3))
@@ -198,16 +200,5 @@ def coordinate_rates(tree: Tree, q: Real, u: Real) -> Real:
     rates = np.zeros(tree.nq)
     for member in tree.members:
         rates[member.q_modes] = u[member.u_modes]
-        at, speeds = q[member.q_hinge], u[member.u_hinge]
-        if isinstance(member.hinge, s.Spherical):
-            speeds = _quaternion_rate(at, speeds)
-        elif isinstance(member.hinge, s.Free):
-            R = hinge_frame(member, Motion(q, np.zeros((1, tree.nu)), np.zeros((1, tree.nu)))).rotation.value[0, 0]
-            speeds = np.concatenate([R @ speeds[3:], _quaternion_rate(at[3:], speeds[:3])])
-        rates[member.q_hinge] = speeds
+        rates[member.q_hinge] = hinge_frames.coordinate_rates(member.hinge, q[member.q_hinge], u[member.u_hinge])
     return rates
-
-
-def _quaternion_rate(x: Real, w: Real) -> Real:
-    """1/2 x (0, w): scalar first, w in turning axes."""
-    return 0.5 * np.concatenate([[-x[1:] @ w], x[0] * w + np.cross(x[1:], w)])

@@ -100,9 +100,7 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
     """Every mass is a point to be summed, what turns another; the tables have the masses at rest."""
     i = modal_integrals(model)
     masses = np.flatnonzero((model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1))
-    return replace(
-        full.polynomial(i, model), product=None, summed=stacked(still_points(model, masses), i.turning)
-    )
+    return replace(full.polynomial(i, model), product=None, summed=stacked(still_points(model, masses), i.turning))
 
 
 LEVEL = FidelityLevel(

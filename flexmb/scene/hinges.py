@@ -10,7 +10,7 @@ A coordinate with `prescribed` follows that function of time; its drive load is 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector, _Strict
 from flexmb.scene.functions import Function
@@ -128,6 +128,10 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
 
 
 Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
+WITH_AXIS = tuple(
+    struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__
+)
+"""Kinds that have an axis of their own."""
 
 
 class Closure(_Strict, frozen=True, kw_only=True):

@@ -11,7 +11,7 @@ from flexmb.scene.bodies import _Strict
 from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
-from flexmb.scene.hinges import Z_AXIS, AngularCoordinate, Gimbal
+from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
@@ -31,7 +31,7 @@ def hinges(scene: Scene) -> Iterator[Problem]:
 def closures(scene: Scene) -> Iterator[Problem]:
     """A closure without an axis is not given one."""
     for place, closure in sound(scene, "closures"):
-        if closure.axis != Z_AXIS and closure.type not in ("revolute", "prismatic", "cylindrical"):
+        if closure.axis != Z_AXIS and closure.type not in WITH_AXIS:
             what = f"a {closure.type} closure has no axis of its own"
             yield Problem(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
 

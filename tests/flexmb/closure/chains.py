@@ -17,6 +17,7 @@ from flexmb.dense.profiles import profile
 from flexmb.dense.tree import Seat
 from flexmb.modal.flexible_model import ModalNode
 from flexmb.scene import schema as s
+from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.tree import rest_frames
 from tests import trees
 
@@ -163,7 +164,7 @@ def random_closure(
     """A closure between random nodes of two bodies, closed at the scene's initial coordinates."""
     bodies = {body.name: list(rest_frames(body)) for body in scene.bodies} | {"ground": ["origin"]}
     node = {body: str(rng.choice(bodies[body])) for body in (body_a, body_b)}
-    axis = trees.direction(rng) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0)
+    axis = trees.direction(rng) if kind in WITH_AXIS else (0.0, 0.0, 1.0)
     guess = s.Closure(
         name=name, type=kind, body_a=body_a, node_a=node[body_a], body_b=body_b, node_b=node[body_b],
         position_a_m=tuple(trees.vector(rng, 0.3)), quaternion_a=tuple(trees.quaternion(rng)), axis=tuple(axis),
