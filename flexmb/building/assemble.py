@@ -8,7 +8,7 @@ import numpy as np
 
 from flexmb.building.carried import moved_inertia
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
-from flexmb.building.links import Link, Port, closure_sides, port
+from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.numbering import Numbering
 from flexmb.hinges.catalogue import KINDS
 from flexmb.levels.body import LEVELS
@@ -38,7 +38,7 @@ class Functions:
 class Ports:
     """Ports by body; numbered when all are known."""
 
-    def __init__(self, chain: list[Link]) -> None:
+    def __init__(self, chain: list[BodyLink]) -> None:
         self.by_body: list[list[Port]] = [[] for _ in chain]
 
     def add(self, body: int, at: Port) -> tuple[int, int]:
@@ -56,7 +56,7 @@ class Ports:
         return [port for ports in self.by_body for port in ports]
 
 
-def body_port(link: Link, node: str, offset: s.Vector) -> Port:
+def body_port(link: BodyLink, node: str, offset: s.Vector) -> Port:
     """Port at a node of a link for wheels, loads and markers, in the link's frame."""
     return port(link.model, node, offset, IDENTITY, np.eye(3))
 
@@ -70,7 +70,7 @@ class Assembled:
     closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
 
 
-def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering, null_partitions: bool = False) -> Assembled:
+def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
     """The arrays of a scene, from its links and the places of its coordinates.
 
     `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
@@ -146,7 +146,7 @@ def assemble(scene: s.Scene, chain: list[Link], numbering: Numbering, null_parti
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
 
 
-def _moved(inboard: Port, parent: Link) -> Port:
+def _moved(inboard: Port, parent: BodyLink) -> Port:
     """An inboard port in its parent's link frame (the parent may have been referred to its own hinge frame)."""
     if parent.outboard.deforms:
         return inboard
@@ -182,7 +182,7 @@ def _loads(loads: list[s.Load], ports: list[int], functions: Functions) -> a.Rec
 
 
 def _speeds(
-    chain: list[Link], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
+    chain: list[BodyLink], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
 ) -> a.Record:
     """Springs, dampers, motors and prescribed motion by speed; isotropic springs of spherical hinges by body."""
     out = np.zeros(numbering.nu, a.SPEED)

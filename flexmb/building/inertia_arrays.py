@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.building.links import Link
+from flexmb.building.links import BodyLink
 from flexmb.levels.level import six
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.tables import arrays as a
 
 
 def inertia_arrays(
-    chain: list[Link], m: int
+    chain: list[BodyLink], m: int
 ) -> tuple[dict[str, a.Record], dict[str, a.Record], list[SecondOrder | None]]:
     """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
     second-order field of each."""

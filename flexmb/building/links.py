@@ -16,7 +16,7 @@ from flexmb.hinges.kind import HingeKind, z_to
 from flexmb.levels.body import BY_NAME
 from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.flexible_model import FlexibleModel, ModalNode, with_node
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import WITH_AXIS
@@ -28,7 +28,7 @@ from flexmb.typing import Real
 class Port:
     """A frame on a body: node, offset from it and rotation port -> body at rest, both in body axes."""
 
-    node: ModalNode
+    node: FlexibleNode
     offset: Real
     frame: Real
 
@@ -46,7 +46,7 @@ class Port:
 
 
 @dataclass(frozen=True)
-class Link:
+class BodyLink:
     """One body as the dynamics sees it, and the hinge that holds it.
 
     The last `wheels` points of its model are the despun wheels of the body.
@@ -65,7 +65,7 @@ class Link:
     scalar: tuple[NamedCoordinate, ...]
 
 
-def links(scene: s.Scene) -> list[Link]:
+def links(scene: s.Scene) -> list[BodyLink]:
     """All links base to tip: bodies depth-first, then point masses."""
     models = {GROUND: _ground()} | {body.name: _model(body) for body in scene.bodies}
     for wheel in scene.wheels:
@@ -74,7 +74,7 @@ def links(scene: s.Scene) -> list[Link]:
     for body, hinge in ordered(scene):
         kind, (sequence, turn) = kind_of(hinge)
         found.append(
-            Link(
+            BodyLink(
                 name=body.name,
                 hinge=hinge,
                 parent=hinge.parent,
@@ -148,7 +148,7 @@ def _rigid_model(mass: float, com: Real, inertia: Real, nodes: dict[str, tuple[R
         rotation=np.zeros((1, 3, 0)),
         stiffness=np.zeros((0, 0)),
         damping=np.zeros((0, 0)),
-        nodes={name: ModalNode(position, rotation, none, none) for name, (position, rotation) in nodes.items()},
+        nodes={name: FlexibleNode(position, rotation, none, none) for name, (position, rotation) in nodes.items()},
         clamped=True,
     )
 
@@ -200,11 +200,11 @@ def _with_wheel(model: FlexibleModel, wheel: s.Wheel) -> FlexibleModel:
     )
 
 
-def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> Link:
+def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> BodyLink:
     """A point mass as a body without rotary inertia on translations along its directions."""
     kind, (sequence, turn) = kind_of(mass)
     point = _rigid_model(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (np.zeros(3), np.eye(3))})
-    return Link(
+    return BodyLink(
         name=mass.name,
         hinge=mass,
         parent=mass.body,
@@ -219,7 +219,7 @@ def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> Link:
     )
 
 
-def _in_hinge_frame(link: Link) -> Link:
+def _in_hinge_frame(link: BodyLink) -> BodyLink:
     """Refer the body to its outboard hinge frame, unless that frame moves with the modes."""
     if link.outboard.deforms:
         return link

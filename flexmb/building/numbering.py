@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.building.links import Link
+from flexmb.building.links import BodyLink
 from flexmb.scene import schema as s
 from flexmb.tables.state import Layout
 
@@ -12,7 +12,7 @@ from flexmb.tables.state import Layout
 class Numbering:
     """Places of all coordinates in q and speeds in u, Jain & Rodriguez (3), (4): body by body hinge, modes, wheels."""
 
-    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
+    def __init__(self, chain: list[BodyLink], wheels: dict[str, list[s.Wheel]]) -> None:
         self.q: dict[str, slice] = {}
         self.u: dict[str, slice] = {}
         self.nq = self.nu = 0

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
-from flexmb.dense.jets import Frame, Jet, constant, product, rotation_about, skew
+from flexmb.dense.jets import Jet, MovingFrame, constant, product, rotation_about, skew
 from flexmb.scene import schema as s
 from flexmb.scene.tree import coordinates
 from flexmb.typing import Real
@@ -26,7 +26,7 @@ def hinge_sizes(hinge: Item) -> tuple[int, int]:
     return count, count
 
 
-def hinge_frame(hinge: Item, c: Jet) -> Frame:
+def hinge_frame(hinge: Item, c: Jet) -> MovingFrame:
     """Outboard hinge frame seen from the inboard one; c (B,1,n) are jets of its coordinates, rates its speeds."""
     match hinge:
         case s.Revolute(axis=axis):
@@ -44,35 +44,35 @@ def hinge_frame(hinge: Item, c: Jet) -> Frame:
         case s.PointMass(directions=directions):
             return moved(*((direction, c[..., n]) for n, direction in enumerate(directions)))
         case s.Spherical():
-            return Frame(moved().position, _attitude(c.value, c.rate, c.acceleration))
+            return MovingFrame(moved().position, _attitude(c.value, c.rate, c.acceleration))
         case s.Free():
             return _floating(c)
     return rotated()
 
 
-def rotated(*turns: tuple[ArrayLike, Jet]) -> Frame:
+def rotated(*turns: tuple[ArrayLike, Jet]) -> MovingFrame:
     """Successive rotations about carried axes."""
     rotation = constant(np.eye(3)[None, None])
     for axis, angle in turns:
         rotation = rotation @ rotation_about(axis, angle)
-    return Frame(constant(np.zeros((1, 1, 3))), rotation)
+    return MovingFrame(constant(np.zeros((1, 1, 3))), rotation)
 
 
-def moved(*steps: tuple[ArrayLike, Jet]) -> Frame:
+def moved(*steps: tuple[ArrayLike, Jet]) -> MovingFrame:
     """A sum of translations along fixed axes."""
     position = constant(np.zeros((1, 1, 3)))
     for axis, distance in steps:
         position = position + product(np.multiply, constant(axis), distance[..., None])
-    return Frame(position, constant(np.eye(3)[None, None]))
+    return MovingFrame(position, constant(np.eye(3)[None, None]))
 
 
-def _floating(c: Jet) -> Frame:
+def _floating(c: Jet) -> MovingFrame:
     """q = [p; quaternion], u = [w; v] in turning axes: p' = R v, p'' = R (w x v + dv/dt)."""
     w, v = c.rate[..., :3], c.rate[..., 3:]
     rotation = _attitude(c.value[..., 3:], w, c.acceleration[..., :3])
     back = np.swapaxes(rotation.value, -1, -2)
     position = Jet(c.value[..., :3], v @ back[0], (np.cross(w, v) + c.acceleration[..., 3:]) @ back[0])
-    return Frame(position, rotation)
+    return MovingFrame(position, rotation)
 
 
 def _attitude(quaternion: Real, w: Real, w_rate: Real) -> Jet:

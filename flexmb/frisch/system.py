@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.building.assemble import assemble
-from flexmb.building.links import Link, links
+from flexmb.building.links import BodyLink, links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
@@ -106,7 +106,7 @@ class NestedSystem:
     def __init__(
         self,
         constants: Constants,
-        chain: list[Link],
+        chain: list[BodyLink],
         layout: Layout,
         errata: Set[Erratum] = CORRECTED,
         null_partitions: bool = False,

@@ -19,7 +19,7 @@ from flexmb.scene.convert import ROOT, label, plain, to_struct
 from flexmb.scene.hinges import Z_AXIS
 from flexmb.scene.options import (
     Angle,
-    BeamModel,
+    BeamOptions,
     ClosureFrames,
     Displacement,
     ModalMatrices,
@@ -134,7 +134,7 @@ class SceneBuilder:
     def beam(
         self, name: str, *, length: float, elements: int, section: s.BeamStation | Sequence[s.BeamStation],
         modes: int | s.Modes, level: s.Level = "full", nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
-        **model: Unpack[BeamModel],
+        **model: Unpack[BeamOptions],
     ) -> Self:  # fmt: skip
         """A beam along +x of `length` (m), root at the body origin.
 

@@ -67,7 +67,7 @@ class SlidingHinge(Placement, Displacement, total=False):
     """Where a hinge sits, and its one displacement."""
 
 
-class BeamModel(TypedDict, total=False):
+class BeamOptions(TypedDict, total=False):
     """How a beam becomes points and modes, see `flexmb.scene.schema.BeamBody`: `theory`, `mass` matrix, inertia
     `points`; and rigid lumps fixed to it, `tip_masses`."""
 

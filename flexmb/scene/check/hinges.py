@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.scene.bodies import _Strict
+from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
@@ -66,7 +66,7 @@ def point_masses(scene: Scene) -> Iterator[Problem]:
         yield from _coordinates(place, item)
 
 
-def _springs(place: Place, item: _Strict) -> Iterator[Problem]:
+def _springs(place: Place, item: SceneStruct) -> Iterator[Problem]:
     for key in NOT_NEGATIVE:
         value = getattr(item, key, 0.0)
         if value < 0.0:
@@ -87,7 +87,7 @@ def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
     return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
 
 
-def _drive(place: Place, item: _Strict, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
+def _drive(place: Place, item: SceneStruct, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
     profile = getattr(item, motion)
     if profile is None:
         return
