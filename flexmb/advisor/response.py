@@ -24,7 +24,7 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.advisor.methods import Method, simulated
 from flexmb.closure.system import ClosureError
-from flexmb.dense.profiles import profile
+from flexmb.dense.function_jets import profile
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals

@@ -6,4 +6,4 @@ mass matrix is sum m v'v + w'Jw over all points; loads are Newton's and Euler's 
 Slow, short and independent: what the compiled recursions are checked against.
 """
 
-from flexmb.dense.system import DenseSystem as DenseSystem
+from flexmb.dense.dense_system import DenseSystem as DenseSystem

@@ -15,10 +15,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.dense import hinge_frames
+from flexmb.dense.body_frames import Motions, field, member_frames, on_body, seat_frame
 from flexmb.dense.hinge_frames import hinge_frame
 from flexmb.dense.jets import skew
-from flexmb.dense.kinematics import Motions, field, member_frames, on_body, seat_frame
-from flexmb.dense.tree import DenseTree, Member, Rotor, Seat, rigid_model
+from flexmb.dense.members import DenseTree, Member, Rotor, Seat, rigid_model
 from flexmb.scene import schema as s
 from flexmb.typing import Real
 

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from flexmb.dense.profiles import profile
-from flexmb.dense.system import DenseSystem, Instant
+from flexmb.dense.dense_system import DenseSystem, Instant
+from flexmb.dense.function_jets import profile
 from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
 from flexmb.scene import schema as s
 from flexmb.tables import arguments

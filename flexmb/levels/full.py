@@ -8,7 +8,7 @@ points is left. Points with rotating inertia, or with a mass centre off the poin
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.levels.integrals import AXIAL, NUMBERS, blocks_of_cross_products, sum_integrals, symmetric, vector
+from flexmb.levels.affine_integrals import AXIAL, NUMBERS, blocks_of_cross_products, sum_integrals, symmetric, vector
 from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point

@@ -10,9 +10,9 @@ from msgspec.structs import replace
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
+from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.equivalent import with_equivalent_masses
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder, undeforming_node
-from flexmb.modal.points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.raw import raw_model
 from flexmb.modal.reduce import beam_modes, damping_matrix
 from flexmb.modal.second_order import beam_second_order

@@ -137,7 +137,7 @@ class Constants:
     body: Record  # (N,) BODY
     mode: Record  # (N,m) MODE
     pair: Record  # (N,m,m) PAIR
-    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.integrals` has it
+    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.affine_integrals` has it
     slope: Record  # (bodies of level linear,m,m) SLOPE
     mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT

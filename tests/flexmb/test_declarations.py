@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from flexmb.building import assemble, carried
-from flexmb.dense import DenseSystem, kinematics
+from flexmb.dense import DenseSystem, body_frames
 from flexmb.dense.hinge_frames import hinge_frame, moved, rotated
 from flexmb.entry import articulated
 from flexmb.hinges import catalogue
@@ -117,7 +117,7 @@ def with_screw(monkeypatch):
     for name in ("pose", "motion", "rate", "retract"):
         monkeypatch.setattr(catalogue, name, numbered(name, [getattr(kind, name) for kind in kinds]))
     monkeypatch.setattr(catalogue, "_QUATERNION", np.array([kind.quaternion for kind in kinds]))
-    monkeypatch.setattr(kinematics, "hinge_frame", screw_frame)
+    monkeypatch.setattr(body_frames, "hinge_frame", screw_frame)
 
 
 def screwed(bodies: int = 4) -> s.Scene:

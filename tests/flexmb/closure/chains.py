@@ -11,10 +11,10 @@ from scipy.spatial.transform import Rotation
 
 import flexmb
 from flexmb.dense import DenseSystem
+from flexmb.dense.body_frames import Motions, member_frames, seat_frame
+from flexmb.dense.function_jets import profile
 from flexmb.dense.jets import MovingFrame
-from flexmb.dense.kinematics import Motions, member_frames, seat_frame
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Seat
+from flexmb.dense.members import Seat
 from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.hinges import WITH_AXIS

@@ -10,9 +10,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.dense.body_frames import Motions, member_frames, on_body, point_frames
 from flexmb.dense.jets import Jet, MovingFrame, constant
-from flexmb.dense.kinematics import Motions, member_frames, on_body, point_frames
-from flexmb.dense.tree import DenseTree, Member
+from flexmb.dense.members import DenseTree, Member
 
 WORLD = MovingFrame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
 

@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexmb.dense import DenseSystem
+from flexmb.dense.body_frames import Motions, member_frames, on_body
+from flexmb.dense.function_jets import profile
 from flexmb.dense.jets import Jet, MovingFrame, skew
-from flexmb.dense.kinematics import Motions, member_frames, on_body
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Member, Rotor, Seat
+from flexmb.dense.members import Member, Rotor, Seat
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene import schema as s

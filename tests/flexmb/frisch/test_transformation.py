@@ -15,8 +15,8 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.first_order import first_order_body
-from flexmb.dense.kinematics import Motions, member_frames, point_frames
+from flexmb.dense.body_frames import Motions, member_frames, point_frames
+from flexmb.dense.first_order_bodies import first_order_body
 from flexmb.frisch.system import RelativeMotion
 from flexmb.scene.schema import PointMass
 from tests.bounds import algebra, relative

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.system import Instant
+from flexmb.dense.dense_system import Instant
 from flexmb.jain.elements import undeformed
 from flexmb.jain.operators import Operators
 from flexmb.scene.modal_data import inertia_points

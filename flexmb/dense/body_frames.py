@@ -17,7 +17,7 @@ from flexmb.dense.jets import (
     rotation_exponential,
     turn,
 )
-from flexmb.dense.tree import DenseTree, Member, Rotor, Seat
+from flexmb.dense.members import DenseTree, Member, Rotor, Seat
 from flexmb.typing import Real
 
 

@@ -2,7 +2,7 @@
 
 At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
 Rodriguez, Appendix B); markers move with the true deformation. Bodies of level linear are not summed point by point:
-each has a modal mass matrix and bias of first order (`flexmb.dense.first_order`).
+each has a modal mass matrix and bias of first order (`flexmb.dense.first_order_bodies`).
 """
 
 from __future__ import annotations
@@ -14,12 +14,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flexmb.dense.first_order import FirstOrderBody, body_jacobian, first_order_body
+from flexmb.dense.body_frames import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
+from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
+from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import MovingFrame
-from flexmb.dense.kinematics import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import DenseTree, ScalarSpeed, Seat, build
+from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
 from flexmb.scene import schema as s
 from flexmb.typing import Real
 
@@ -79,7 +79,7 @@ class SiteMotion(NamedTuple):
 
 
 class DenseSystem:
-    """A scene for the dense route. q and u are ordered as in `flexmb.dense.tree`; SI, World axes."""
+    """A scene for the dense route. q and u are ordered as in `flexmb.dense.members`; SI, World axes."""
 
     def __init__(self, scene: s.Scene, folder: Path | None = None) -> None:
         self.scene = scene

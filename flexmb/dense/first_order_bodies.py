@@ -14,9 +14,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flexmb.dense.body_frames import Motions, field, on_body
 from flexmb.dense.jets import Jet, MovingFrame, constant, join, skew, vector
-from flexmb.dense.kinematics import Motions, field, on_body
-from flexmb.dense.tree import DenseTree, Member, Rotor
+from flexmb.dense.members import DenseTree, Member, Rotor
 from flexmb.typing import Real
 
 STEP = 2.0**-200
