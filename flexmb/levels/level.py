@@ -40,8 +40,8 @@ class FidelityLevel:
     """One fidelity level. `inertia_and_bias(c, w, k)` is its kernel, see `flexmb.levels`.
 
     `tables(model, wheels)` makes the tables of a body, whose last `wheels` points are its despun wheels.
-    `without_masses` is the same kernel where modal masses are at rest and their elimination does not ask for them (nor
-    at `at_rest` for the coupling): `inertia_and_bias` where nothing can be left out.
+    `without_masses` is that kernel without what is constant at this level and was taken care of before the run, where
+    modes are condensed: the modal masses, at rest the coupling too. It is `inertia_and_bias` where nothing is constant.
     """
 
     name: Level
