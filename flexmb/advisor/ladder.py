@@ -10,7 +10,7 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.linalg import eigvalsh
 
-from flexmb.advisor.models import COUNTS, FLEXIBLE, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies, levels
+from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies, levels
 from flexmb.jain.cost import articulated
 from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
@@ -67,12 +67,12 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
     found = [Rung("rigid"), Rung("sprung")]
     for families in sets:
-        for level in FLEXIBLE:
+        for level in LEVELS:
             found += [Rung("modes", n, level, False, families) for n in COUNTS]
             if carries:
                 found += [Rung("modes", n, level, True, families) for n in (0, 1, 2, 4)]
     found += [Rung("segments", pieces=n) for n in SEGMENTS]
-    found += [Rung("pieces", pieces=n, level=level) for n in PIECES for level in FLEXIBLE[-2:]]
+    found += [Rung("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
     return tuple(found)
 
 
@@ -91,8 +91,8 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
         if isinstance(body, ModalBody):
             return Rung("modes", flexible_model(body).mode_count, levels(body)[-1])
         if pieces and body.name in splits:
-            return Rung("pieces", 0, FLEXIBLE[-1], pieces=pieces)
-        return Rung("modes", body.modes.count + more, FLEXIBLE[-1], body.modes.static)
+            return Rung("pieces", 0, LEVELS[-1], pieces=pieces)
+        return Rung("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
     first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
     finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]

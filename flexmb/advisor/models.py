@@ -13,7 +13,7 @@ from msgspec.structs import replace
 
 from flexmb.advisor.modes import with_modes
 from flexmb.advisor.sprung import spring_hinged
-from flexmb.levels.body import LEVELS
+from flexmb.levels import body as fidelity
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.modal_data import modal_arrays
@@ -21,7 +21,7 @@ from flexmb.scene.problems import Place
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
 
-FLEXIBLE: tuple[Level, ...] = tuple(level.name for level in LEVELS if level.flexible)
+LEVELS: tuple[Level, ...] = tuple(level.name for level in fidelity.LEVELS if level.flexible)
 COUNTS = (1, 2, 3, 4, 6, 8)
 SEGMENTS = (2, 4, 8)
 PIECES = (2, 4, 8, 16)
@@ -72,9 +72,9 @@ def flexible_bodies(scene: Scene) -> tuple[BeamBody | ModalBody, ...]:
 def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
     """Levels that the body has data for: raw bodies seldom have a second-order field."""
     if isinstance(body, BeamBody):
-        return FLEXIBLE
+        return LEVELS
     stiffened = replace(body, level="stiffened")
-    return FLEXIBLE[:-1] if any(second_order(Place(), stiffened, modal_arrays(body))) else FLEXIBLE
+    return LEVELS[:-1] if any(second_order(Place(), stiffened, modal_arrays(body))) else LEVELS
 
 
 def built(scene: Scene, model: Model) -> Scene:

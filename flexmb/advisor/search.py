@@ -19,7 +19,7 @@ import numpy as np
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import Step, highest_frequency
 from flexmb.advisor.methods import Method
-from flexmb.advisor.models import FLEXIBLE, Model, Rung
+from flexmb.advisor.models import LEVELS, Model, Rung
 
 HOPELESS = 20.0
 """Models predicted to miss the tolerance by this factor are tried last on the way up and not at all on the way down."""
@@ -99,7 +99,7 @@ class _Walk:
         """For each highest frequency, lowest first, the rungs with the least predicted errors that have no higher."""
         before: Choice | None = None
         for highest in sorted({0.0} | {step.fastest for steps in self.ladders.values() for step in steps}):
-            choice = self.finest_below(highest, FLEXIBLE)
+            choice = self.finest_below(highest, LEVELS)
             if choice != before:
                 yield choice
             before = choice
@@ -126,7 +126,7 @@ class _Walk:
         """To cheaper choices that fit until there are none or the budget is spent: simpler levels for all bodies, the
         same rung for all, leaps, body by body."""
         highest = max((step.fastest for step in choice.values()), default=0.0)
-        simpler = (self.finest_below(highest, FLEXIBLE[:n]) for n in range(1, len(FLEXIBLE)))
+        simpler = (self.finest_below(highest, LEVELS[:n]) for n in range(1, len(LEVELS)))
         choice = next(filter(self.fits, simpler), choice)
         choice = self.first_cheaper(choice, sorted(self.alike(choice), key=self.expected)) or choice
         while True:

@@ -27,7 +27,7 @@ from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
 from flexmb.advisor.methods import FINEST, Method, ladders, operations, simulated, steps_within
-from flexmb.advisor.models import FLEXIBLE, Model, Rung, built, flexible_bodies, levels
+from flexmb.advisor.models import LEVELS, Model, Rung, built, flexible_bodies, levels
 from flexmb.advisor.quantity import error, measured, scales
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
@@ -205,7 +205,7 @@ def choices(steps_of: dict[str, tuple[Step, ...]], chosen: Model) -> Iterator[Mo
 
 def plain(rung: Rung) -> bool:
     """At the simplest level, with 0, 1, 2, 4, 8 modes."""
-    return rung.level in ("rigid", FLEXIBLE[0]) and rung.modes & (rung.modes - 1) == 0
+    return rung.level in ("rigid", LEVELS[0]) and rung.modes & (rung.modes - 1) == 0
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.ladder import highest_frequency, references, rungs
-from flexmb.advisor.models import FLEXIBLE, Rung, built, levels
+from flexmb.advisor.models import LEVELS, Rung, built, levels
 from flexmb.advisor.sprung import fitted_hinge, spring_hinged
 from flexmb.modal import flexible_model
 from flexmb.surrogate import modal_points
@@ -88,8 +88,8 @@ def test_raw_modes_take_their_second_order_field_along() -> None:
     scene = turned(1.0, 0.5)
     stiff = replace(scene, bodies=(replace(scene.bodies[0], level="stiffened"),))
     raw = modal_points(stiff)
-    assert levels(raw.bodies[0]) == FLEXIBLE
-    assert levels(modal_points(scene).bodies[0]) == FLEXIBLE[:-1]
+    assert levels(raw.bodies[0]) == LEVELS
+    assert levels(modal_points(scene).bodies[0]) == LEVELS[:-1]
     rung = (("arm", Rung("modes", 2, "stiffened")),)
     one, two = (fm.compile(built(each, rung)) for each in (stiff, raw))
     q, u = one.initial_state.q.copy(), one.initial_state.u.copy()
