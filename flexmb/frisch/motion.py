@@ -10,6 +10,7 @@ translation shapes, turned by the exponential of the rotation shapes. As printed
 from flexmb.frisch.tables import FIXED_SHAPES
 from flexmb.hinges import catalogue
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.levels.field import field_motion
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, shift_motion, store6, sum6, times6, vec6
 from flexmb.spatial.vector import (
@@ -26,14 +27,13 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
-from flexmb.tables.arrays import RUTHLESS
 
 
 @helper
 def relative_motion(c, w):
     """Poses, rates and kinematic biases of all bodies and ports, World axes, and the entries of S."""
     for k in range(c.body.shape[0]):
-        seen = c.body[k].level != RUTHLESS
+        seen = not is_at_rest(c.body[k].level)
         for n in range(c.body[k].modes):
             w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if seen else 0.0
             w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if seen else 0.0
@@ -102,7 +102,7 @@ def _across_hinge(c, w, k):
     r, R, V_node, A_node = _inboard_node(c, w, k, R_parent)
     kind, at_q, at_u, sequence = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index, c.body[k].sequence
     R_hinge, translation = catalogue.pose(kind, w.q, at_q, sequence)
-    w_hinge, v_hinge, alpha_hinge, a_hinge = catalogue.motion(
+    (w_hinge, v_hinge), (alpha_hinge, a_hinge) = catalogue.motion(
         kind, w.q, at_q, w.u, at_u, sequence, w.nest[k].hinge_map
     )
     arm = times(R, translation)

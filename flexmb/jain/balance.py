@@ -1,6 +1,5 @@
 """Energy, momentum and power of a whole system, from the same modal mass matrices that move it."""
 
-from flexmb.hinges.catalogue import SPHERICAL
 from flexmb.jain.forces import load_at_port
 from flexmb.jain.ports import port_velocity
 from flexmb.jain.wheels import spin_axis
@@ -33,7 +32,7 @@ def energy_and_momentum(c, w, energy, momentum):
         if i >= 0:
             energy[SPRING] += 0.5 * c.speed[j].stiffness * (w.q[i] - c.speed[j].rest) ** 2
     for k in range(c.body.shape[0]):
-        if c.body[k].hinge_kind == SPHERICAL:
+        if c.body[k].ball_spring != 0.0:
             i = c.body[k].q_index
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)

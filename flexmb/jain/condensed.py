@@ -17,10 +17,10 @@ from flexmb.jain.explicit import cholesky, refer_rigid
 from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, dot6, plus6, scale6, store6, sub6, vec6
 from flexmb.spatial.vector import add_outer, vec3
-from flexmb.tables.arrays import RUTHLESS
 
 NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
 
@@ -30,7 +30,7 @@ def eliminate_modes(c, w, k):
     """P_R and z_R of (63), (64) from the constants of (B4); False where T does not exist."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
-    if c.body[k].level != RUTHLESS:
+    if not is_at_rest(c.body[k].level):
         _tables(c, w, k)
     elif c.body[k].outboard_port >= 0:
         refer_rigid(c, w, k)
