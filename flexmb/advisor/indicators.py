@@ -26,7 +26,7 @@ from flexmb.advisor.response import FAMILIES, Response, RigidRun, eigenmodes
 from flexmb.advisor.sprung import fitted_hinge
 from flexmb.frisch.equivalence.advice import coupling_error
 from flexmb.frisch.equivalence.appendage import appendage_of
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

@@ -12,13 +12,12 @@ from scipy.linalg import eigvalsh
 
 from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies, levels
 from flexmb.jain.cost import articulated
+from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
 from flexmb.scene.schema import Scene
 
-LEVEL_COST = {"rigid": 1.0, "ruthless": 1.0, "linear": 1.25, "full": 1.4, "stiffened": 1.8}
-"""Operations of a body relative to a ruthless one, counted with four modes."""
 STEP_AT_HIGHEST = 3.4
 """Step of DOP853 times the highest frequency, where that frequency limits the step (measured)."""
 STAGES = 12
@@ -114,7 +113,7 @@ def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None
-    each = sum(LEVEL_COST[level] * articulated([n]).total for n, level in counts)
+    each = sum(BY_NAME[level].cost * articulated([n]).total for n, level in counts)
     return Step(rung, error, float(each), fastest)
 
 

@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from flexmb.advisor.modes import with_modes
 from flexmb.advisor.sprung import spring_hinged
+from flexmb.levels import body as fidelity
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.modal_data import modal_arrays
@@ -20,7 +21,7 @@ from flexmb.scene.problems import Place
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
 
-LEVELS: tuple[Level, ...] = ("ruthless", "linear", "full", "stiffened")
+LEVELS: tuple[Level, ...] = tuple(level.name for level in fidelity.LEVELS if level.flexible)
 COUNTS = (1, 2, 3, 4, 6, 8)
 SEGMENTS = (2, 4, 8)
 PIECES = (2, 4, 8, 16)

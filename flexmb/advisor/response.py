@@ -24,10 +24,10 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.advisor.methods import Method, simulated
 from flexmb.closure.system import ClosureError
-from flexmb.dense.profiles import profile
+from flexmb.dense.function_jets import profile
 from flexmb.modal import flexible_model
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.modal.model import FlexibleModel
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.schema import Load, Marker, Scene

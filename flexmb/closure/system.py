@@ -15,8 +15,9 @@ from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
+from flexmb.levels.body import LEVELS
 from flexmb.scene.schema import Closure
-from flexmb.tables.arrays import RUTHLESS, Constants, Workspace
+from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
 from flexmb.tables.status import OUT_OF_RANGE
 from flexmb.typing import Index, Real
@@ -76,7 +77,7 @@ class Closures:
         c = self.constants[0]
         if algorithm == "composite":
             return matrices(c)
-        if np.any((c.body["level"] == RUTHLESS) & (c.body["modes"] > 0)):
+        if any(LEVELS[body["level"]].at_rest and body["modes"] for body in c.body):
             return response(c)
         return Recursion()
 

@@ -12,7 +12,7 @@ from flexmb.jain.kinematics import (
 from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import helper, kernel
-from flexmb.motion.coordinates import configuration_rate, load_state
+from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
 from flexmb.tables.status import OK
 
@@ -25,14 +25,7 @@ def rhs(t, y, dy, c, w):
     if status != OK:
         return status
     drive_loads(c, w)
-    configuration_rate(c, w)
-    nq = w.q.shape[0]
-    nu = w.u.shape[0]
-    for i in range(nq):
-        dy[i] = w.rate[i]
-    for j in range(nu):
-        dy[nq + j] = w.speed[j].acceleration
-    dy[nq + nu] = power(c, w)
+    store_slope(c, w, power(c, w), dy)
     return OK
 
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.building.assemble import assemble
-from flexmb.building.links import Link, links
+from flexmb.building.links import BodyLink, links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.frisch import evaluation
 from flexmb.frisch.constants import nested_constants
@@ -93,7 +93,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
     """
     chain = links(scene)
     numbering = Numbering(chain, wheels_by_body(scene))
-    constants, _, _ = assemble(scene, chain, numbering, null_partitions)
+    constants = assemble(scene, chain, numbering, null_partitions).constants
     return NestedSystem(constants, chain, numbering.layout, errata, null_partitions)
 
 
@@ -106,7 +106,7 @@ class NestedSystem:
     def __init__(
         self,
         constants: Constants,
-        chain: list[Link],
+        chain: list[BodyLink],
         layout: Layout,
         errata: Set[Erratum] = CORRECTED,
         null_partitions: bool = False,

@@ -6,20 +6,16 @@ Scenes with other choices have ReducedConstants: the kernels are compiled again 
 from flexmb.jain import condensed, explicit, woodbury
 from flexmb.jain.reduced import to_node
 from flexmb.jit.kernel import by_bundle, helper
-from flexmb.levels import full
-from flexmb.levels.body import body_inertia
-from flexmb.levels.ruthless import rigid_block_and_bias
-from flexmb.tables.arrays import CONDENSED, EXPLICIT, FULL, RUTHLESS, WOODBURY
+from flexmb.levels.body import body_inertia, inertia_without_masses
+from flexmb.tables.arrays import CONDENSED, EXPLICIT, WOODBURY
 
 
 @helper
 def _inertia(c, w, k):
-    if c.body[k].elimination != EXPLICIT and c.body[k].level == RUTHLESS:
-        rigid_block_and_bias(c, w, k)
-    elif c.body[k].elimination == CONDENSED and c.body[k].level == FULL:
-        full.coupling_and_bias(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
-    else:
+    if c.body[k].elimination == EXPLICIT:
         body_inertia(c, w, k)
+    else:
+        inertia_without_masses(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
 
 
 @helper

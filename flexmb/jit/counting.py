@@ -144,7 +144,7 @@ class _Interpreter:
 
     def __init__(self, scalar: Any) -> None:
         self._scalar = scalar
-        self._namespaces: dict[str, dict[str, Any]] = {}
+        self._namespaces: dict[int, dict[str, Any]] = {}
 
     def __call__(self, thing: Any) -> Any:
         """The twin of a function, of a module of the package, of a function of `math`; all else is its own."""
@@ -170,9 +170,8 @@ class _Interpreter:
         return twin
 
     def _namespace(self, original: dict[str, Any]) -> dict[str, Any]:
-        name = original["__name__"]
-        if name not in self._namespaces:
-            space = self._namespaces[name] = {}
+        if id(original) not in self._namespaces:
+            space = self._namespaces[id(original)] = {}
             for key, value in original.items():
                 space[key] = self(value)
-        return self._namespaces[name]
+        return self._namespaces[id(original)]

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flexmb.building.assemble import assemble
-from flexmb.building.links import Link, links
+from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
@@ -94,7 +94,8 @@ class System(Mechanics):
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
-        self.constants, self._markers, self._closure_ports = assemble(scene, self._links, self._numbering)
+        assembled = assemble(scene, self._links, self._numbering)
+        self.constants, self._markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
         self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
@@ -133,7 +134,8 @@ class System(Mechanics):
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         q, u = np.zeros(self.nq), np.zeros(self.nu)
         for link in self._links:
-            _initial_hinge(link, q[self.coordinate(link.hinge.name)], u[self.speed(link.hinge.name)])
+            name = link.hinge.name
+            q[self.coordinate(name)], u[self.speed(name)] = link.kind.state(link.hinge)
         for wheel in self.scene.wheels:
             q[self.coordinate(wheel.name)], u[self.speed(wheel.name)] = wheel.angle_rad, wheel.speed_rad_s
         for modal in self.scene.modal_states:
@@ -360,18 +362,3 @@ def _find(places: dict[str, slice], name: str) -> slice:
     if name not in places:
         raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
     return places[name]
-
-
-def _initial_hinge(link: Link, q: Real, u: Real) -> None:
-    """Initial coordinates and speeds of one hinge, in place."""
-    match link.hinge:
-        case s.Spherical(quaternion=quaternion, angular_velocity_rad_s=w):
-            q[:], u[:] = quaternion, w
-        case s.Free(position_m=p, quaternion=quaternion, angular_velocity_rad_s=w, velocity_m_s=v):
-            q[:], u[:] = (*p, *quaternion), (*w, *v)
-        case _:
-            for n, (_, c) in enumerate(link.scalar):
-                if isinstance(c, s.AngularCoordinate):
-                    q[n], u[n] = c.angle_rad, c.rate_rad_s
-                else:
-                    q[n], u[n] = c.position_m, c.rate_m_s

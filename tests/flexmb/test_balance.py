@@ -14,7 +14,7 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.profiles import profile
+from flexmb.dense.function_jets import profile
 from flexmb.scene import schema as s
 from flexmb.system.system import Evaluation, System
 from tests import trees

@@ -98,7 +98,7 @@ def in_exudyn(scene: s.Scene, markers: dict[str, flexmb.system.system.MarkerMoti
 
 def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]], axis: tuple | None) -> None:
     """A joint whose markers' z is the axis, which has the same components on both sides."""
-    from crosscheck.engines.exudyn.joints import Link
+    from crosscheck.engines.exudyn.joints import Connection
 
     shop = loop.shop
     turn = np.eye(3) if ball else Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])[0].as_matrix()
@@ -107,7 +107,7 @@ def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]]
     ]
     kind = shop.items.SphericalJoint if ball else shop.items.RevoluteJointZ
     joint = shop.mbs.AddObject(kind(markerNumbers=markers))
-    loop.links[name] = Link(name, (), ((joint, True),), markers[1])
+    loop.links[name] = Connection(name, (), ((joint, True),), markers[1])
 
 
 def solved(loop: Loop) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -5,28 +5,23 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
+from flexmb.dense.hinge_frames import hinge_frame, rotated
 from flexmb.dense.jets import (
-    Frame,
     Jet,
+    MovingFrame,
     constant,
     join,
-    product,
     quadratic,
-    rotation_about,
     rotation_exponential,
-    skew,
     turn,
 )
-from flexmb.dense.tree import Member, Rotor, Seat, Tree
-from flexmb.scene import schema as s
+from flexmb.dense.members import DenseTree, Member, Rotor, Seat
 from flexmb.typing import Real
 
-AXES = dict(zip("xyz", np.eye(3), strict=True))
 
-
-class Motion(NamedTuple):
+class Motions(NamedTuple):
     """B motions from one configuration: coordinates q (nq,), speeds u (B,nu), rates of the speeds (B,nu)."""
 
     q: Real
@@ -49,7 +44,7 @@ class Motion(NamedTuple):
         return Jet(self.q[None, None, q], self.u[:, None, u], self.rates[:, None, u])
 
 
-class Points(NamedTuple):
+class InertiaPoints(NamedTuple):
     """All P inertia points: mass (P,), inertia (P,3,3) about the mass centre in point axes, their member (P,)."""
 
     mass: Real
@@ -57,103 +52,45 @@ class Points(NamedTuple):
     member: NDArray[np.int64]
 
 
-def points(tree: Tree) -> Points:
+def points(tree: DenseTree) -> InertiaPoints:
     """The inertia points of all members, then those of the wheels."""
     models, rotors = [member.model for member in tree.members], tree.rotors
     counts = [len(model.mass) for model in models]
-    return Points(
+    return InertiaPoints(
         np.concatenate([*(model.mass for model in models), np.array([r.wheel.mass_kg for r in rotors])]),
         np.concatenate([*(model.inertia for model in models), *(r.inertia[None] for r in rotors)]),
         np.concatenate([np.repeat(np.arange(len(models)), counts), np.array([r.member for r in rotors], dtype=int)]),
     )
 
 
-def member_frames(tree: Tree, motion: Motion) -> list[Frame]:
+def member_frames(tree: DenseTree, motion: Motions) -> list[MovingFrame]:
     """Body frames in World, base to tip: World -> inboard seat -> hinge -> back through the outboard seat."""
-    frames: list[Frame] = []
+    frames: list[MovingFrame] = []
     for member in tree.members:
         inboard = seat_frame(tree, frames, member.parent, member.inboard, motion)
-        outboard = inboard.carry(hinge_frame(member, motion))
+        outboard = inboard.carry(hinge_frame(member.hinge, motion.hinge(member)))
         frames.append(outboard.carry(on_body(member.outboard, motion.modes(member)).inverse()))
     return frames
 
 
-def seat_frame(tree: Tree, frames: list[Frame], k: int, seat: Seat, motion: Motion) -> Frame:
+def seat_frame(tree: DenseTree, frames: list[MovingFrame], k: int, seat: Seat, motion: Motions) -> MovingFrame:
     """A seat on member k (-1: ground) in World."""
     if k < 0:
         return on_body(seat, constant(np.zeros((1, 1, 0))))
     return frames[k].carry(on_body(seat, motion.modes(tree.members[k])))
 
 
-def point_frames(tree: Tree, frames: list[Frame], motion: Motion) -> Frame:
+def point_frames(tree: DenseTree, frames: list[MovingFrame], motion: Motions) -> MovingFrame:
     """Mass centres and axes of all inertia points in World, in the order of `points`."""
     found = [frame.carry(field(member, motion)) for frame, member in zip(frames, tree.members, strict=True)]
     for rotor in tree.rotors:
-        spin = _rotated((rotor.wheel.axis, motion.spin(rotor)))
+        spin = rotated((rotor.wheel.axis, motion.spin(rotor)))
         found.append(seat_frame(tree, frames, rotor.member, rotor.seat, motion).carry(spin))
     count = len(motion.u)
-    return Frame(join([f.position for f in found], count), join([f.rotation for f in found], count))
+    return MovingFrame(join([f.position for f in found], count), join([f.rotation for f in found], count))
 
 
-def hinge_frame(member: Member, motion: Motion) -> Frame:
-    """Outboard hinge frame seen from the inboard one."""
-    c = motion.hinge(member)
-    match member.hinge:
-        case s.Revolute(axis=axis):
-            return _rotated((axis, c[..., 0]))
-        case s.Prismatic(axis=axis):
-            return _moved((axis, c[..., 0]))
-        case s.Cylindrical(axis=axis):
-            return _moved((axis, c[..., 1])).carry(_rotated((axis, c[..., 0])))
-        case s.Universal():
-            return _rotated((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1]))
-        case s.Gimbal(sequence=sequence):
-            return _rotated(*((AXES[axis], c[..., n]) for n, axis in enumerate(sequence)))
-        case s.Planar():
-            return _moved((AXES["x"], c[..., 0]), (AXES["y"], c[..., 1])).carry(_rotated((AXES["z"], c[..., 2])))
-        case s.PointMass(directions=directions):
-            return _moved(*((direction, c[..., n]) for n, direction in enumerate(directions)))
-        case s.Spherical():
-            return Frame(_moved().position, _attitude(c.value, c.rate, c.acceleration))
-        case s.Free():
-            return _floating(c)
-    return _rotated()
-
-
-def _rotated(*turns: tuple[ArrayLike, Jet]) -> Frame:
-    """Successive rotations about carried axes."""
-    rotation = constant(np.eye(3)[None, None])
-    for axis, angle in turns:
-        rotation = rotation @ rotation_about(axis, angle)
-    return Frame(constant(np.zeros((1, 1, 3))), rotation)
-
-
-def _moved(*steps: tuple[ArrayLike, Jet]) -> Frame:
-    """A sum of translations along fixed axes."""
-    position = constant(np.zeros((1, 1, 3)))
-    for axis, distance in steps:
-        position = position + product(np.multiply, constant(axis), distance[..., None])
-    return Frame(position, constant(np.eye(3)[None, None]))
-
-
-def _floating(c: Jet) -> Frame:
-    """q = [p; quaternion], u = [w; v] in turning axes: p' = R v, p'' = R (w x v + dv/dt)."""
-    w, v = c.rate[..., :3], c.rate[..., 3:]
-    rotation = _attitude(c.value[..., 3:], w, c.acceleration[..., :3])
-    back = np.swapaxes(rotation.value, -1, -2)
-    position = Jet(c.value[..., :3], v @ back[0], (np.cross(w, v) + c.acceleration[..., 3:]) @ back[0])
-    return Frame(position, rotation)
-
-
-def _attitude(quaternion: Real, w: Real, w_rate: Real) -> Jet:
-    """R of a scalar-first quaternion with angular velocity w in turning axes: R' = R w~, R'' = R (w~ w~ + dw/dt~)."""
-    q0, qv = quaternion[0, 0, 0], quaternion[0, 0, 1:]
-    R = (q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)
-    R = R[None, None] / np.sum(quaternion**2)
-    return Jet(R, R @ skew(w), R @ (skew(w) @ skew(w) + skew(w_rate)))
-
-
-def on_body(seat: Seat, eta: Jet) -> Frame:
+def on_body(seat: Seat, eta: Jet) -> MovingFrame:
     """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset.
 
     At level stiffened the second-order parts are added to phi eta and psi eta.
@@ -165,10 +102,11 @@ def on_body(seat: Seat, eta: Jet) -> Frame:
         moved = moved + quadratic(node.second.translation, eta[..., None, :])
         turned = turned + quadratic(node.second.rotation, eta[..., None, :])
     rotation = rotation_exponential(turned) @ constant(node.rotation)
-    return Frame(constant(node.position) + moved, rotation).carry(Frame(constant(seat.offset), constant(seat.rotation)))
+    fixed = MovingFrame(constant(seat.offset), constant(seat.rotation))
+    return MovingFrame(constant(node.position) + moved, rotation).carry(fixed)
 
 
-def field(member: Member, motion: Motion) -> Frame:
+def field(member: Member, motion: Motions) -> MovingFrame:
     """Mass centres and axes of a member's inertia points seen from its body: Jain & Rodriguez (2), turned exactly."""
     model, eta = member.model, motion.modes(member)[:, 0]
     moved = eta.map(lambda x: np.einsum("pam,bm->bpa", model.translation, x))
@@ -177,4 +115,4 @@ def field(member: Member, motion: Motion) -> Frame:
         moved = moved + quadratic(model.second.translation, eta[:, None, None])
         turned = turned + quadratic(model.second.rotation, eta[:, None, None])
     rotation = rotation_exponential(turned)
-    return Frame(constant(model.position) + moved + turn(rotation, constant(model.com_offset)), rotation)
+    return MovingFrame(constant(model.position) + moved + turn(rotation, constant(model.com_offset)), rotation)

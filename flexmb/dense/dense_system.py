@@ -2,7 +2,7 @@
 
 At level ruthless everything but elasticity and damping is taken at eta = etadot = 0 of the ruthless bodies (Jain and
 Rodriguez, Appendix B); markers move with the true deformation. Bodies of level linear are not summed point by point:
-each has a modal mass matrix and bias of first order (`flexmb.dense.first_order`).
+each has a modal mass matrix and bias of first order (`flexmb.dense.first_order_bodies`).
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
-from flexmb.dense.first_order import FirstOrderBody, body_jacobian, first_order_body
-from flexmb.dense.jets import Frame
-from flexmb.dense.kinematics import Motion, Points, member_frames, point_frames, points, seat_frame
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Scalar, Seat, Tree, build
+from flexmb.dense.body_frames import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
+from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
+from flexmb.dense.function_jets import profile
+from flexmb.dense.hinge_frames import ball_energy, ball_torque
+from flexmb.dense.jets import MovingFrame
+from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
 from flexmb.scene import schema as s
 from flexmb.typing import Real
 
@@ -45,15 +45,15 @@ class Wrenches(NamedTuple):
         return np.concatenate([torque.sum(axis=0), force.sum(axis=0)])
 
 
-class Snapshot:
+class Instant:
     """One motion at one instant: q (nq,), u (nu,), rates of the speeds (nu,)."""
 
-    def __init__(self, tree: Tree, q: Real, u: Real, rates: Real) -> None:
-        self._tree, self._motion = tree, Motion(q, u[None], rates[None])
+    def __init__(self, tree: DenseTree, q: Real, u: Real, rates: Real) -> None:
+        self._tree, self._motion = tree, Motions(q, u[None], rates[None])
         self._frames = member_frames(tree, self._motion)
 
     @property
-    def points(self) -> Frame:
+    def points(self) -> MovingFrame:
         """Mass centres and axes of all inertia points, (P, ...)."""
         return point_frames(self._tree, self._frames, self._motion).first
 
@@ -63,10 +63,10 @@ class Snapshot:
         tree = self._tree
         return {k: first_order_body(tree, k, self._frames[k], self._motion) for k in tree.linear}
 
-    def seat(self, k: int, seat: Seat) -> Frame:
+    def seat(self, k: int, seat: Seat) -> MovingFrame:
         """One frame on member k."""
         found = seat_frame(self._tree, self._frames, k, seat, self._motion).first
-        return Frame(found.position[0], found.rotation[0])
+        return MovingFrame(found.position[0], found.rotation[0])
 
 
 class SiteMotion(NamedTuple):
@@ -79,26 +79,26 @@ class SiteMotion(NamedTuple):
 
 
 class DenseSystem:
-    """A scene for the dense route. q and u are ordered as in `flexmb.dense.tree`; SI, World axes."""
+    """A scene for the dense route. q and u are ordered as in `flexmb.dense.members`; SI, World axes."""
 
     def __init__(self, scene: s.Scene, folder: Path | None = None) -> None:
         self.scene = scene
-        self.tree: Tree = build(scene, folder)
+        self.tree: DenseTree = build(scene, folder)
         self.nq, self.nu = self.tree.nq, self.tree.nu
         self._gravity = np.array(scene.gravity_m_s2)
 
     @cached_property
-    def points(self) -> Points:
+    def points(self) -> InertiaPoints:
         """All inertia points."""
         return points(self.tree)
 
     @cached_property
-    def _summed(self) -> Points:
+    def _summed(self) -> InertiaPoints:
         """The same without bodies of level linear, of which only the rotary inertia of their wheels is left."""
         truncated = np.isin(self.points.member, self.tree.linear)
         elements = truncated & (np.arange(len(truncated)) < len(truncated) - len(self.tree.rotors))
         inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
-        return Points(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
+        return InertiaPoints(np.where(truncated, 0.0, self.points.mass), inertia, self.points.member)
 
     def mass_matrix(self, q: Real) -> Real:
         """M (nu,nu) = sum over points m v'v + w' J w, and S' M_m S of bodies of level linear."""
@@ -131,10 +131,7 @@ class DenseSystem:
             if x.motor is not None:
                 tau[x.u] += profile(x.motor, t).value
         for member in self.tree.members:
-            if isinstance(member.hinge, s.Spherical):
-                theta = rotation_vector(q[member.q_hinge])
-                tau[member.u_hinge] -= member.hinge.stiffness_Nm_rad * theta
-                tau[member.u_hinge] -= member.hinge.damping_Nms_rad * u[member.u_hinge]
+            tau[member.u_hinge] += ball_torque(member.hinge, q[member.q_hinge], u[member.u_hinge])
         return tau
 
     def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:
@@ -200,7 +197,7 @@ class DenseSystem:
     def markers(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, SiteMotion]:
         """Motion of all markers, with the true deformation at every level."""
         q, u = self.on_profile(q, u, t)
-        now = Snapshot(self.tree, q, u, rates)
+        now = Instant(self.tree, q, u, rates)
         found = {}
         for marker in self.scene.markers:
             f = now.seat(*self.tree.sites[f"marker:{marker.name}"])
@@ -222,9 +219,7 @@ class DenseSystem:
         for member in self.tree.members:
             eta = q[member.q_modes]
             strain += 0.5 * float(eta @ member.model.stiffness @ eta)
-            if isinstance(member.hinge, s.Spherical):
-                theta = rotation_vector(q[member.q_hinge])
-                spring += 0.5 * member.hinge.stiffness_Nm_rad * float(theta @ theta)
+            spring += ball_energy(member.hinge, q[member.q_hinge])
         return {
             "kinetic": kinetic + sum(body.kinetic for body in bodies),
             "strain": strain,
@@ -244,7 +239,7 @@ class DenseSystem:
         return total
 
     @property
-    def _prescribed(self) -> list[Scalar]:
+    def _prescribed(self) -> list[ScalarSpeed]:
         return [x for x in self.tree.scalars if x.prescribed is not None]
 
     def _undeformed(self, q: Real) -> Real:
@@ -255,21 +250,21 @@ class DenseSystem:
                 q[member.q_modes] = 0.0
         return q
 
-    def _seen(self, q: Real, u: Real, rates: Real) -> Snapshot:
+    def _seen(self, q: Real, u: Real, rates: Real) -> Instant:
         """The motion as inertia sees it: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
             if member.level == "ruthless":
                 u[member.u_modes] = 0.0
-        return Snapshot(self.tree, self._undeformed(q), u, rates)
+        return Instant(self.tree, self._undeformed(q), u, rates)
 
-    def _at(self, q: Real, u: Real | None = None) -> Snapshot:
+    def _at(self, q: Real, u: Real | None = None) -> Instant:
         """Configuration and velocities: eta = 0 for ruthless bodies, at rest without u."""
         zero = np.zeros(self.nu)
-        return Snapshot(self.tree, self._undeformed(q), zero if u is None else u, zero)
+        return Instant(self.tree, self._undeformed(q), zero if u is None else u, zero)
 
-    def _unit_motions(self, q: Real) -> Motion:
-        return Motion(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
+    def _unit_motions(self, q: Real) -> Motions:
+        return Motions(self._undeformed(q), np.eye(self.nu), np.zeros((self.nu, self.nu)))
 
     def _jacobian(self, q: Real) -> Jacobian:
         """Of all inertia points."""
@@ -287,7 +282,7 @@ class DenseSystem:
         frames = member_frames(self.tree, motion)
         return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
-    def _inertial(self, now: Snapshot, chosen: Points) -> Wrenches:
+    def _inertial(self, now: Instant, chosen: InertiaPoints) -> Wrenches:
         """The wrench that the motion of each point needs beyond gravity: m (a - g), J alpha + w x J w."""
         frames = now.points
         J, w, alpha = _turned(chosen, frames), frames.angular_velocity(), frames.angular_acceleration()
@@ -318,18 +313,13 @@ class DenseSystem:
         return found
 
 
-def _turned(chosen: Points, frames: Frame) -> Real:
+def _turned(chosen: InertiaPoints, frames: MovingFrame) -> Real:
     """Inertia tensors (P,3,3) in World axes."""
     R = frames.rotation.value
     return np.asarray(R @ chosen.inertia @ np.swapaxes(R, -1, -2))
 
 
-def rotation_vector(quaternion: Real) -> Real:
-    """Rotation vector (3,) of a scalar-first quaternion, of length at most pi."""
-    return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
-
-
-def _columns(frames: Frame) -> Jacobian:
+def _columns(frames: MovingFrame) -> Jacobian:
     """Column j is the velocity of the K frames for u = e_j."""
     rates = np.broadcast_to(frames.position.rate, frames.angular_velocity().shape)
     return Jacobian(np.moveaxis(frames.angular_velocity(), 0, -1), np.moveaxis(rates, 0, -1))

@@ -13,8 +13,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from flexmb.dense.hinge_frames import hinge_sizes
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
@@ -27,7 +28,7 @@ LEVELS = ("rigid", "ruthless", "linear", "full", "stiffened")
 class Seat:
     """A frame fixed to a node: `offset` (3,) m and `rotation` (3,3) frame -> node, in node axes."""
 
-    node: ModalNode
+    node: FlexibleNode
     offset: Real
     rotation: Real
 
@@ -68,7 +69,7 @@ class Rotor:
 
 
 @dataclass(frozen=True)
-class Scalar:
+class ScalarSpeed:
     """A speed that is the rate of one coordinate, with what acts on it; `q`, `u` are its places."""
 
     owner: str
@@ -82,12 +83,12 @@ class Scalar:
 
 
 @dataclass(frozen=True)
-class Tree:
+class DenseTree:
     """The scene in the dense route's terms."""
 
     members: list[Member]
     rotors: list[Rotor]
-    scalars: list[Scalar]
+    scalars: list[ScalarSpeed]
     sites: dict[str, tuple[int, Seat]]  # of loads ("load:<name>") and markers ("marker:<name>")
     nq: int
     nu: int
@@ -102,11 +103,11 @@ class Tree:
         return -1 if name == GROUND else [member.name for member in self.members].index(name)
 
 
-def build(scene: s.Scene, folder: Path | None = None) -> Tree:
+def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     """The tree of a scene; `.npz` files are looked up in `folder`."""
     models = {GROUND: rigid_model(0.0, np.zeros(3), np.zeros((3, 3)), {"origin": (ZERO, IDENTITY)})}
     models |= {body.name: _model(body, folder) for body in scene.bodies}
-    tree = Tree([], [], [], {}, 0, 0)
+    tree = DenseTree([], [], [], {}, 0, 0)
     for body, hinge in ordered(scene):
         inboard = _seat(models[hinge.parent], hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
         outboard = _seat(models[body.name], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
@@ -125,21 +126,10 @@ def build(scene: s.Scene, folder: Path | None = None) -> Tree:
     return replace(tree, sites=sites)
 
 
-def hinge_sizes(hinge: s.Hinge | s.PointMass) -> tuple[int, int]:
-    """Numbers of coordinates and speeds."""
-    match hinge:
-        case s.Spherical():
-            return 4, 3
-        case s.Free():
-            return 7, 6
-    count = len(coordinates(hinge))
-    return count, count
-
-
 def _append(
-    tree: Tree, name: str, parent: str, hinge: s.Hinge | s.PointMass, inboard: Seat, outboard: Seat,
+    tree: DenseTree, name: str, parent: str, hinge: s.Hinge | s.PointMass, inboard: Seat, outboard: Seat,
     model: FlexibleModel, level: s.Level,
-) -> Tree:  # fmt: skip
+) -> DenseTree:  # fmt: skip
     (nq, nu), m = hinge_sizes(hinge), model.mode_count
     q, u = tree.nq, tree.nu
     member = Member(
@@ -152,19 +142,21 @@ def _append(
     )
 
 
-def _append_wheel(tree: Tree, wheel: s.Wheel, seat: Seat) -> Tree:
+def _append_wheel(tree: DenseTree, wheel: s.Wheel, seat: Seat) -> DenseTree:
     rotor = Rotor(wheel, len(tree.members) - 1, seat, tree.nq, tree.nu)
     friction, motor, prescribed = wheel.friction_Nms_rad, wheel.torque_Nm, wheel.prescribed_rad
-    scalar = Scalar(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, motor, prescribed)
+    scalar = ScalarSpeed(wheel.name, tree.nq, tree.nu, 0.0, friction, 0.0, motor, prescribed)
     return replace(
         tree, rotors=[*tree.rotors, rotor], scalars=[*tree.scalars, scalar], nq=tree.nq + 1, nu=tree.nu + 1
     )
 
 
-def _scalar(owner: str, q: int, u: int, c: Coordinate) -> Scalar:
+def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
     if isinstance(c, s.AngularCoordinate):
-        return Scalar(owner, q, u, c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad, c.torque_Nm, c.prescribed_rad)
-    return Scalar(owner, q, u, c.stiffness_N_m, c.damping_Ns_m, c.rest_m, c.force_N, c.prescribed_m)
+        spring, drive = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), (c.torque_Nm, c.prescribed_rad)
+    else:
+        spring, drive = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), (c.force_N, c.prescribed_m)
+    return ScalarSpeed(owner, q, u, *spring, *drive)
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
@@ -191,7 +183,7 @@ def rigid_model(
     """A body without modes: one point at its centre of mass."""
     none = np.zeros((3, 0))
     nodes = {
-        name: ModalNode(np.array(position, dtype=float), _matrix(quaternion), none, none)
+        name: FlexibleNode(np.array(position, dtype=float), _matrix(quaternion), none, none)
         for name, (position, quaternion) in frames.items()
     }
     return FlexibleModel(

@@ -31,7 +31,7 @@ class SecondOrder:
 
 
 @dataclass(frozen=True)
-class ModalNode:
+class FlexibleNode:
     """A node: rest position (3,) m, rest rotation (3,3) node->body, mode shapes translation and rotation (3, m).
 
     `second` (3,m,m): its second-order field, where the body has one.
@@ -43,9 +43,9 @@ class ModalNode:
     rotation_modes: Real
     second: SecondOrder | None = None
 
-    def seen_from(self, origin: Real, turn: Real) -> ModalNode:
+    def seen_from(self, origin: Real, turn: Real) -> FlexibleNode:
         """The same node in axes R_new_old = `turn` about `origin` (3,), old axes."""
-        return ModalNode(
+        return FlexibleNode(
             turn @ (self.position - origin),
             turn @ self.rotation,
             turn @ self.translation,
@@ -54,10 +54,10 @@ class ModalNode:
         )
 
 
-def undeforming_node(modes: int) -> ModalNode:
+def undeforming_node(modes: int) -> FlexibleNode:
     """The body frame as a node, which no mode moves."""
     none = np.zeros((3, modes))
-    return ModalNode(np.zeros(3), np.eye(3), none, none)
+    return FlexibleNode(np.zeros(3), np.eye(3), none, none)
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class FlexibleModel:
     rotation: Real
     stiffness: Real
     damping: Real
-    nodes: dict[str, ModalNode]
+    nodes: dict[str, FlexibleNode]
     clamped: bool
     second: SecondOrder | None = None
 
@@ -96,7 +96,7 @@ def join_second(first: SecondOrder | None, then: SecondOrder | None) -> SecondOr
     )
 
 
-def with_node(model: FlexibleModel, node: ModalNode) -> SecondOrder | None:
+def with_node(model: FlexibleModel, node: FlexibleNode) -> SecondOrder | None:
     """The second-order field of the points of `model` and, as one more point, of `node`; None where it has none.
 
     A node without a field of its own does not deform.

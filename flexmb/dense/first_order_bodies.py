@@ -15,9 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from flexmb.dense.jets import Frame, Jet, constant, join, skew, vector
-from flexmb.dense.kinematics import Motion, field, on_body
-from flexmb.dense.tree import Member, Rotor, Tree
+from flexmb.dense.body_frames import Motions, field, on_body
+from flexmb.dense.jets import Jet, MovingFrame, constant, join, skew, vector
+from flexmb.dense.members import DenseTree, Member, Rotor
 from flexmb.typing import Real
 
 STEP = 2.0**-200
@@ -57,7 +57,7 @@ class FirstOrderBody:
         return (self.rotation @ rows[-6:-3])[None], (self.rotation @ rows[-3:])[None], self.position[None]
 
 
-def first_order_body(tree: Tree, k: int, frame: Frame, motion: Motion) -> FirstOrderBody:
+def first_order_body(tree: DenseTree, k: int, frame: MovingFrame, motion: Motions) -> FirstOrderBody:
     """Member k, whose body frame is `frame` (1,1,...) along one motion."""
     member = tree.members[k]
     R = frame.rotation.value[0, 0]
@@ -72,7 +72,7 @@ def first_order_body(tree: Tree, k: int, frame: Frame, motion: Motion) -> FirstO
     )  # fmt: skip
 
 
-def body_jacobian(member: Member, frame: Frame, nu: int) -> Real:
+def body_jacobian(member: Member, frame: MovingFrame, nu: int) -> Real:
     """(m+6,nu): a member's modal speeds and the velocity of its frame, body axes, for u = e_j; `frame` along those."""
     modes = np.eye(nu)[member.u_modes]
     R = frame.rotation.value[0, 0]
@@ -80,7 +80,7 @@ def body_jacobian(member: Member, frame: Frame, nu: int) -> Real:
     return np.vstack([modes, (frame.angular_velocity()[:, 0] @ R).T, (linear[:, 0] @ R).T])
 
 
-def _mass_and_bias(tree: Tree, k: int, eta: Real, etad: Real, w: Real) -> tuple[Real, Real]:
+def _mass_and_bias(tree: DenseTree, k: int, eta: Real, etad: Real, w: Real) -> tuple[Real, Real]:
     """M and bias at the body's own state, the sum over its elements made twice real."""
     member, rotors = tree.members[k], [rotor for rotor in tree.rotors if rotor.member == k]
     model, m = member.model, member.model.mode_count
@@ -100,21 +100,21 @@ def _mass_and_bias(tree: Tree, k: int, eta: Real, etad: Real, w: Real) -> tuple[
 
 
 def _elements(
-    tree: Tree, member: Member, rotors: list[Rotor], eta: Real, etad: ArrayLike, w: Real, v: Real
-) -> Frame:
+    tree: DenseTree, member: Member, rotors: list[Rotor], eta: Real, etad: ArrayLike, w: Real, v: Real
+) -> MovingFrame:
     """Elements at i h eta along B motions: etad (B,m), w and v (B,3) of the body frame, none of which changes."""
     count = len(w)
     q, u = np.zeros(tree.nq, complex), np.zeros((count, tree.nu), complex)
     q[member.q_modes], u[:, member.u_modes] = 1j * STEP * eta, etad
-    motion = Motion(q, u, np.zeros_like(u))
+    motion = Motions(q, u, np.zeros_like(u))
     turn, none = skew(w)[:, None], np.zeros((count, 1, 3))
-    body = Frame(Jet(none, v[:, None], none), Jet(np.broadcast_to(np.eye(3), turn.shape), turn, turn @ turn))
+    body = MovingFrame(Jet(none, v[:, None], none), Jet(np.broadcast_to(np.eye(3), turn.shape), turn, turn @ turn))
     parts = [field(member, motion)]
     for rotor in rotors:
         seat = on_body(rotor.seat, motion.modes(member))
-        parts.append(Frame(seat.position, constant(np.eye(3)[None, None])))
+        parts.append(MovingFrame(seat.position, constant(np.eye(3)[None, None])))
     positions, rotations = join([f.position for f in parts], count), join([f.rotation for f in parts], count)
-    return body.carry(Frame(positions, rotations))
+    return body.carry(MovingFrame(positions, rotations))
 
 
 def _first_order(x: NDArray[np.complex128]) -> Real:

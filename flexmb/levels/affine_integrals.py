@@ -5,7 +5,11 @@ mode i, that of their slopes P1_ni by eta_i. In a block the number varies before
 3x3 matrix sum m a b': [xx yy zz xy xz yz] of its symmetric part, and its axial vector sum m b x a.
 """
 
+import numpy as np
+
 from flexmb.jit.kernel import helper
+from flexmb.levels.level import sixes
+from flexmb.typing import Real
 
 AXIAL = 6  # where the axial vector starts
 NUMBERS = 9
@@ -59,3 +63,21 @@ def _add(s, a, y):
     """y += s a."""
     for j in range(y.shape[0]):
         y[j] += s * a[j]
+
+
+def blocks_of_cross_products(at_rest: Real, slope: Real) -> Real:
+    """A row of `Constants.product` from sum m x~' phi_n~ (n,3,3) and sum m phi_n~' phi_i~ (n,n,3,3)."""
+    blocks, slopes = _nine(_products(at_rest)), _nine(_products(slope))
+    return np.concatenate([blocks[None], np.swapaxes(slopes, 0, 1)]).swapaxes(1, 2).ravel()
+
+
+def _products(J: Real) -> Real:
+    """sum m a b' from sum m a~' b~ = (a.b) 1 - b a', over the leading axes."""
+    half_trace = 0.5 * np.trace(J, axis1=-2, axis2=-1)
+    return np.swapaxes(half_trace[..., None, None] * np.eye(3) - J, -1, -2)
+
+
+def _nine(P: Real) -> Real:
+    """Matrices (...,3,3) as nine numbers (...,9): [xx yy zz xy xz yz] of the symmetric part, the axial vector."""
+    axial = [P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]]
+    return np.concatenate([sixes(0.5 * (P + np.swapaxes(P, -1, -2))), np.stack(axial, axis=-1)], axis=-1)
