@@ -16,7 +16,8 @@ from importlib.metadata import PackageNotFoundError, version
 import numpy as np
 
 from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
-from flexmb.integrate.settings import FIXED, LINEARISING, Method
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
@@ -59,7 +60,7 @@ class NativeEngine:
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         """A ladder of tolerances, by which adaptive methods find the steps that fit the scene; or of steps."""
-        if self._method in FIXED:
+        if INTEGRATORS[self._method].fixed:
             return tuple(Effort("step", value, self._method) for value in _STEPS)
         return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
@@ -73,7 +74,7 @@ class NativeEngine:
             system.route(self._algorithm, 0.0)
         if self._algorithm in ERRATA:
             system.nested(self._algorithm)
-        if scene.closures and self._method in LINEARISING:
+        if scene.closures and INTEGRATORS[self._method].linearises:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         return NativeModel(system, self._algorithm, self._method)
 
@@ -123,7 +124,7 @@ class NativeModel:
 
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
-        effort = Effort("step" if self._method in FIXED else "tolerance", 1e-3, self._method)
+        effort = Effort("step" if INTEGRATORS[self._method].fixed else "tolerance", 1e-3, self._method)
         self.simulate(Run(np.array([0.0, 1e-6])), effort)
 
     def evaluate(self) -> Snapshot:

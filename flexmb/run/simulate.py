@@ -13,11 +13,12 @@ from scipy.spatial.transform import Rotation
 
 from flexmb.entry import composite
 from flexmb.frisch import evaluation as nested_evaluation
-from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES, STOP
-from flexmb.integrate.jacobians import COUNTS, FACTORISATIONS, JACOBIANS
-from flexmb.integrate.settings import LINEARISING, Method, Settings
+from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED, SAMPLES, STOP
+from flexmb.integrate.integrator import Method
+from flexmb.integrate.problem import Clock
+from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted, interruptible
-from flexmb.run.propagate import Route, Run
+from flexmb.run.propagate import Integration, Route
 from flexmb.run.trajectory import MarkerPath, Statistics, Trajectory
 from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.check.walk import values
@@ -102,7 +103,7 @@ def simulate(
     times = _sample_times(samples, t_end)
     system = scene if isinstance(scene, System) else assembled(scene)
     _refuse_too_many(len(times), system)
-    if method in LINEARISING:
+    if settings.integrator.linearises:
         _refuse_without_jacobian(system, algorithm, method)
     route, start = _route(system, algorithm, stabilise), system.precision(system.initial_state)
     if start.status != Status.OK:
@@ -207,9 +208,9 @@ def _integrate(system: System, route: Route, times: Real, settings: Settings) ->
         y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
         counts = np.zeros(COUNTS, np.int64)
         begun = perf_counter()
-        solve = Run(route, settings, system.constants, system.nq, system.nu)
+        solve = Integration(route, settings, system.constants, system.nq, system.nu)
         start = perf_counter()
-        (status, t), interrupted = call(solve, (y, times, ends, out, counts), counts[STOP : STOP + 1])
+        (status, t), interrupted = call(solve, (y, Clock(times, ends), out, counts), counts[STOP : STOP + 1])
         end = perf_counter()
         return _Raw(
             out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start,
