@@ -29,7 +29,8 @@ if TYPE_CHECKING:
     from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
     from flexmb.run.trajectory import Trajectory
-    from flexmb.system.system import Evaluation, System, compile
+    from flexmb.system.evaluation import Evaluation
+    from flexmb.system.system import System, compile
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
     from flexmb.tables.status import Status
 
@@ -49,7 +50,7 @@ _LATER = {
     "simulate": "flexmb.run.simulate",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
-    "Evaluation": "flexmb.system.system",
+    "Evaluation": "flexmb.system.evaluation",
     "PrecisionWarning": "flexmb.tables.state",
     "State": "flexmb.tables.state",
     "System": "flexmb.system.system",

@@ -21,8 +21,8 @@ from flexmb.integrate.integrator import Method
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
-from flexmb.system.closed import ClosedSystem
-from flexmb.system.system import ERRATA, Algorithm, System, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.system import System, compile
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)
@@ -70,10 +70,7 @@ class NativeEngine:
         NotImplementedError where an algorithm or method has no loops.
         """
         system = compile(scene)
-        if isinstance(system, ClosedSystem):
-            system.route(self._algorithm, 0.0)
-        if self._algorithm in ERRATA:
-            system.nested(self._algorithm)
+        system.route(self._algorithm)
         if scene.closures and INTEGRATORS[self._method].linearises:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         return NativeModel(system, self._algorithm, self._method)

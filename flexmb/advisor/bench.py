@@ -16,17 +16,19 @@ from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure import dynamics as closed
 from flexmb.closure.system import ClosureError
-from flexmb.entry import articulated, composite
-from flexmb.jain.places import matrices
 from flexmb.jit.counting import count
 from flexmb.scene.schema import Scene
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.system import Algorithm, System, compile
+from flexmb.system.system import System, compile
 from flexmb.tables.state import pack
 from flexmb.tables.status import Status
 
 SAMPLES = 401
 MAX_STEPS = 400_000
+EXACT = tuple(each.name for each in ALGORITHMS.values() if each.route is not None and not each.is_first_order)
+"""Algorithms that run what the model says."""
 AROUND = 4e8
 """What compiling a model and evaluating the output of its run take (0.2 s), as operations."""
 
@@ -81,8 +83,7 @@ class Bench:
 
     def algorithm(self, model: Model) -> Algorithm:
         """The algorithm with fewer operations; both give the same accelerations."""
-        found: tuple[Algorithm, ...] = ("articulated", "composite")
-        return min(found, key=lambda algorithm: self.operations(model, algorithm))
+        return min(EXACT, key=lambda algorithm: self.operations(model, algorithm))
 
     def run(self, model: Model, method: Method, most: float = np.inf) -> Outcome:
         """The run, made at the first call; it ends where it has executed about `most` operations."""
@@ -117,13 +118,7 @@ def _operations(system: System, algorithm: Algorithm) -> int:
     state = system.initial_state
     y = pack(state)
     if isinstance(system, ClosedSystem):
-        chain = system.closures.chain("composite" if algorithm == "composite" else "articulated")
+        chain = system.closures.chain(algorithm)
         return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
-    if algorithm == "composite":
-        places = matrices(system.constants)
-        return count(
-            composite.accelerations, 0.0, y, system.constants, system.workspace(), places
-        ).operations.total
-    return count(
-        articulated.accelerations, 0.0, y, system.recursion_constants, system.recursion_workspace()
-    ).operations.total
+    kernel, tables = ALGORITHMS[algorithm].kernel(system)
+    return count(kernel, 0.0, y, *tables).operations.total

@@ -1,24 +1,38 @@
-"""Compiled runs: the integrators applied to the equations of motion. Here the two rooms meet; nothing else happens."""
+"""Compiled runs: the integrators applied to the equations of motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import perf_counter
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flexmb.entry import articulated, tangent
+from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.motion import coordinates, retraction
+from flexmb.run.interruption import interruptible
+from flexmb.run.segments import switch_times
+from flexmb.system.algorithm import Route
+from flexmb.system.system import System
 from flexmb.tables.arrays import Constants
+from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
 
-class Route(NamedTuple):
-    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold."""
+class Raw(NamedTuple):
+    """What an integrator leaves: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
 
-    tables: Callable[[], tuple[Any, Any]]
-    rhs: Any = articulated.rhs
-    project: Any = coordinates.project
+    states: Real
+    status: Status
+    fault: int
+    t: float
+    counts: list[int]
+    compile_s: float
+    run_s: float
+    interrupted: bool
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -48,3 +62,25 @@ class Integration:
     def fault(self) -> int:
         """Where an evaluation failed."""
         return int(self._workspace.fault[0])
+
+
+def integrate(system: System, route: Route, times: Real, settings: Settings) -> Raw:
+    """Run once over no time at all, which compiles, and then in earnest."""
+    initial = system.initial_state
+    ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
+
+    def run(times: Real, ends: Real, call: Callable[..., tuple[Any, bool]]) -> Raw:
+        y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
+        counts = np.zeros(COUNTS, np.int64)
+        begun = perf_counter()
+        solve = Integration(route, settings, system.constants, system.nq, system.nu)
+        start = perf_counter()
+        (status, t), interrupted = call(solve, (y, Clock(times, ends), out, counts), counts[STOP : STOP + 1])
+        end = perf_counter()
+        return Raw(
+            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start,
+            interrupted,
+        )  # fmt: skip
+
+    compiled = run(times[:1], ends[:0], lambda solve, arguments, _: (solve(*arguments), False))
+    return run(times, ends, interruptible)._replace(compile_s=compiled.compile_s)

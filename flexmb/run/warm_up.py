@@ -21,11 +21,11 @@ from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
-from flexmb.system.system import Algorithm, System, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
+from flexmb.system.system import System, compile
 
 Kind = Literal["tree", "condensed", "closed"]
-RUNNING: tuple[Algorithm, ...] = ("articulated", "composite", "frisch", "frisch_as_printed")
-ON_CHAINS: tuple[Algorithm, ...] = ("articulated", "composite")
 
 
 def pendulum() -> Scene:
@@ -84,7 +84,7 @@ def _check(what: str, names: Sequence[str], known: Sequence[str]) -> None:
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
     """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
-    if INTEGRATORS[method].linearises and (kind == "closed" or algorithm != "articulated"):
+    if INTEGRATORS[method].linearises and (kind == "closed" or algorithm not in WITH_JACOBIAN):
         return False
     if kind == "closed":
         return algorithm in ON_CHAINS

@@ -11,78 +11,31 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal, NamedTuple, get_args
+from collections.abc import Iterable, Iterator
+from typing import get_args
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from flexmb.building.assemble import assemble
 from flexmb.building.links import Link, links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.frisch.errata import AS_PRINTED, CORRECTED
+from flexmb.entry.observation import Outputs, observe_motion
 from flexmb.frisch.system import NestedSystem, Partitions
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.scene.check import check_scene
+from flexmb.system import algorithms
+from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.evaluation import Evaluation, Names, Observation
 from flexmb.system.mechanics import Mechanics
+from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.workspaces import workspace
-from flexmb.typing import Real
-
-Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
-ERRATA = {"frisch": CORRECTED, "frisch_as_printed": AS_PRINTED}
-ENERGIES = ("kinetic", "strain", "spring", "gravity")
-
-
-@dataclass(frozen=True)
-class MarkerMotion:
-    """World axes: position (3,), rotation (3,3) marker -> World, velocity and classical acceleration (6,) [w; v]."""
-
-    position: Real
-    rotation: Real
-    velocity: Real
-    acceleration: Real
-
-    @property
-    def quaternion(self) -> Real:
-        """Scalar first, unit."""
-        return Rotation.from_matrix(self.rotation).as_quat(scalar_first=True, canonical=True)
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Everything observable at one state.
-
-    accelerations (nu,); markers by name; loads by hinge (6,) [torque; force] on the outboard body about the outboard
-    hinge point, World axes; wheel_loads by wheel (6,) about its centre; drives by hinge, point mass or wheel (k,), one
-    for each prescribed coordinate; energy by kind (J); momentum (6,) [angular about the World origin; linear].
-    """
-
-    accelerations: Real
-    markers: dict[str, MarkerMotion]
-    loads: dict[str, Real]
-    wheel_loads: dict[str, Real]
-    drives: dict[str, Real]
-    energy: dict[str, float]
-    momentum: Real
-
-
-class _Outputs(NamedTuple):
-    """Arrays of an evaluation, parts of `every`: rates (nu,), markers (K,24), loads (N,6), wheel loads (W,6) ..."""
-
-    rates: Real
-    markers: Real
-    loads: Real
-    wheel_loads: Real
-    energy: Real
-    momentum: Real
-    every: Real
+from flexmb.typing import Index, Real
 
 
 class System(Mechanics):
@@ -94,15 +47,14 @@ class System(Mechanics):
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
-        self.constants, self._markers, self._closure_ports = assemble(scene, self._links, self._numbering)
+        self.constants, markers, self._closure_ports = assemble(scene, self._links, self._numbering)
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
-        self._marker_body = np.array([body for body, _ in self._markers.values()], dtype=np.int64)
-        self._marker_port = np.array([port for _, port in self._markers.values()], dtype=np.int64)
         self._w = self.workspace()
         self.recursion_constants = with_elimination(self.constants, elimination)
         self._recursion_w = self.recursion_workspace()
-        self._driven = self._driven_places()
+        hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
+        self._observation = Observation(Names(markers, hinges, wheels, self._driven([*hinges, *wheels])), self.nu)
         self.rhs, self.project = articulated.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
         self._operators: SpatialOperators | None = None
@@ -166,10 +118,9 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
-        if algorithm not in ERRATA:
-            raise ValueError(f"algorithm must be one of {', '.join(ERRATA)}, not {algorithm!r}")
+        errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
-            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, ERRATA[algorithm])
+            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
         return self._nested[algorithm]
 
     def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
@@ -200,22 +151,18 @@ class System(Mechanics):
         return finite_result(self._accelerations(t, y, algorithm), t)
 
     def _accelerations(self, t: float, y: Real, algorithm: Algorithm) -> Real:
-        if algorithm == "articulated":
-            c, w = self.recursion_constants, self._recursion_w
-            self._check(articulated.accelerations(t, y, c, w), int(w.fault[0]))
-            self._trust(t, y, w)
-            return w.speed["acceleration"].copy()
-        if algorithm in ERRATA:
-            nested = self.nested(algorithm)
-            status, rates = nested.accelerations(t, y)
-            self._check(status, nested.fault)
-            self._trust(t, y, nested)
-            return rates
-        if algorithm == "composite":
-            return self._composite(t, y)[0]
-        if algorithm == "unsplit":
-            return self._unsplit(t, y)[0]
-        raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
+        return algorithms.chosen(algorithm).accelerations(self, t, y)
+
+    def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
+        """The algorithm as runs see it; `stabilise` is for closed chains.
+
+        ValueError for an algorithm that is for single states, or does not apply to the scene.
+        """
+        if arguments.number("stabilise", stabilise) != 0.0:
+            raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures: leave it out")
+        made = algorithms.chosen(algorithm, algorithms.RUNNING).route
+        assert made is not None  # of those that run
+        return made(self)
 
     def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
         """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
@@ -251,78 +198,25 @@ class System(Mechanics):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        out = self._outputs()
-        if algorithm == "articulated":
-            c, w = self.recursion_constants, self._recursion_w
-            status = articulated.observe(
-                t, y, self._marker_body, self._marker_port, c, w,
-                out.markers, out.loads, out.wheel_loads, out.energy, out.momentum,
-            )  # fmt: skip
-            self._check(status, int(w.fault[0]))
-            self._trust(t, y, w)
-            out.rates[:] = w.speed["acceleration"]
-            return self._evaluation(t, w.speed["drive"], out)
-        if algorithm in ERRATA:
-            nested = self.nested(algorithm)
-            status, motion = nested.motion(t, y)
-            self._check(status, nested.fault)
-            self._trust(t, y, nested)
-            out.loads[:] = motion.loads
-            self._observe_motion(t, y, motion.accelerations, out)
-            out.wheel_loads[:, :3] = motion.wheel_torques
-            return self._evaluation(t, motion.drives, out)
-        if algorithm not in ("composite", "unsplit"):
-            raise ValueError(f"algorithm must be one of {', '.join(get_args(Algorithm))}, not {algorithm!r}")
-        rates, drives = self._composite(t, y) if algorithm == "composite" else self._unsplit(t, y)
-        out.loads[:] = self._inverse(t, y, rates)[1]
-        self._observe_motion(t, y, rates, out)
-        return self._evaluation(t, drives, out)
+        algorithms.chosen(algorithm).observe(self, t, y, self._observation.out)
+        return self._observation.evaluation(t)
 
-    def _observe_motion(self, t: float, y: Real, rates: Real, out: _Outputs) -> None:
-        """Markers, wheel loads, energy and momentum of accelerations found elsewhere."""
-        out.rates[:] = rates
-        articulated.observe_motion(
-            t, y, rates, self._marker_body, self._marker_port, self.constants, self._w,
-            out.markers, out.wheel_loads, out.energy, out.momentum,
-        )  # fmt: skip
+    def _observe_motion(self, t: float, y: Real, out: Outputs) -> None:
+        """Markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
+        observe_motion(t, y, self.constants, self._w, out)
 
-    def _outputs(self) -> _Outputs:
-        """To be filled."""
-        markers, loads, wheels = len(self._markers), len(self._links), len(self.constants.wheel)
-        a = self.nu + 24 * markers
-        b, c = a + 6 * loads, a + 6 * loads + 6 * wheels
-        every = np.zeros(c + 10)
-        return _Outputs(
-            every[: self.nu], every[self.nu : a].reshape(markers, 24), every[a:b].reshape(loads, 6),
-            every[b:c].reshape(wheels, 6), every[c : c + 4], every[c + 4 :], every,
-        )  # fmt: skip
+    def _observe_forced(self, t: float, y: Real, out: Outputs) -> None:
+        """The same, and the loads of hinges by inverse dynamics."""
+        out.loads[:] = self._inverse(t, y, out.rates)[1]
+        self._observe_motion(t, y, out)
 
-    def _evaluation(self, t: float, drive: Real, out: _Outputs) -> Evaluation:
-        finite_result(out.every, t)
-        return Evaluation(
-            accelerations=out.rates,
-            markers={
-                name: MarkerMotion(row[:3], row[3:12].reshape(3, 3), row[12:18], row[18:24])
-                for name, row in zip(self._markers, out.markers, strict=True)
-            },
-            loads=self._by_hinge(out.loads),
-            wheel_loads=dict(zip(self._wheel_names, out.wheel_loads, strict=True)),
-            drives=self._drives(drive),
-            energy=dict(zip(ENERGIES, out.energy.tolist(), strict=True)),
-            momentum=out.momentum,
-        )
+    def _wheel_names(self) -> Iterator[str]:
+        yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))
 
-    @property
-    def _wheel_names(self) -> list[str]:
-        return [wheel.name for link in self._links for wheel in self._wheels.get(link.name, ())]
-
-    def _drives(self, drive: Real) -> dict[str, Real]:
-        return {name: drive[places] for name, places in self._driven.items()}
-
-    def _driven_places(self) -> dict[str, NDArray[np.intp]]:
+    def _driven(self, names: Iterable[str]) -> dict[str, Index]:
         """Places in u of the prescribed coordinates, by hinge or wheel."""
         found = {}
-        for name in [*(link.hinge.name for link in self._links), *self._wheel_names]:
+        for name in names:
             place = self.speed(name)
             driven = self.constants.speed["prescribed"][place] >= 0
             if np.any(driven):
@@ -347,8 +241,7 @@ def compile(scene: s.Scene, elimination: Elimination = "fastest") -> System:  # 
 
 def assembled(scene: s.Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that was checked before."""
-    if elimination not in get_args(Elimination):
-        raise ValueError(f"elimination is {elimination!r}: use one of {', '.join(map(repr, get_args(Elimination)))}")
+    arguments.one_of("elimination", elimination, get_args(Elimination))
     if scene.closures:
         from flexmb.system.closed import ClosedSystem  # a tree needs none of it
 

@@ -25,7 +25,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX 
 PRESSED = """
 import os, signal, sys, threading, time
 import flexmb as fm
-import flexmb.run.simulate as simulation
+import flexmb.run.propagate as propagation
 from flexmb.run.warm_up import pendulum
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs tests in the background ignores Ctrl-C
@@ -39,7 +39,7 @@ def watched(*given):
     threading.Timer(0.3, press).start()
     return whole(*given)
 
-whole, simulation.interruptible = simulation.interruptible, watched
+whole, propagation.interruptible = propagation.interruptible, watched
 """
 PROBE = """
 method, options = sys.argv[1], eval(sys.argv[2])

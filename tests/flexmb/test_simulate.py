@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from flexmb.run.simulate import sample_bytes, switch_times
+from flexmb.run.samples import sample_bytes
+from flexmb.run.segments import switch_times
 from flexmb.tables.status import Status
 from tests.trees import random_scene
 
