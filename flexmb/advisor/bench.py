@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.methods import Method, operations, simulated, steps_within
+from flexmb.advisor.methods import RunMethod, operations, simulated, steps_within
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure import dynamics as closed
@@ -34,7 +34,7 @@ AROUND = 4e8
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BenchRun:
     """One run. `signals` as far as it got; `message`: why it stopped, or "" if it finished. `operations` counted,
     `seconds` measured of the integration alone. `cut`: it would have taken more operations than it was allowed."""
 
@@ -58,7 +58,7 @@ class Bench:
         self.times = np.linspace(0.0, t_end, samples)
         self.spent = 0.0  # operations of all runs and of what is around them
         self._systems: dict[Model, System | str] = {}
-        self._outcomes: dict[tuple[Model, Method], Outcome] = {}
+        self._outcomes: dict[tuple[Model, RunMethod], BenchRun] = {}
         self._operations: dict[tuple[Model, Algorithm], int] = {}
 
     def system(self, model: Model) -> System | str:
@@ -85,7 +85,7 @@ class Bench:
         """The algorithm with fewer operations; both give the same accelerations."""
         return min(EXACT, key=lambda algorithm: self.operations(model, algorithm))
 
-    def run(self, model: Model, method: Method, most: float = np.inf) -> Outcome:
+    def run(self, model: Model, method: RunMethod, most: float = np.inf) -> BenchRun:
         """The run, made at the first call; it ends where it has executed about `most` operations."""
         found = self._outcomes.get((model, method))
         if found is None or (found.cut and most > found.operations):
@@ -93,18 +93,18 @@ class Bench:
             self.spent += found.operations + AROUND
         return found
 
-    def _run(self, model: Model, method: Method, most: float) -> Outcome:
+    def _run(self, model: Model, method: RunMethod, most: float) -> BenchRun:
         system = self.system(model)
         if isinstance(system, str):
-            return Outcome({}, system, 0, 0.0, 0.0)
+            return BenchRun({}, system, 0, 0.0, 0.0)
         each = self.operations(model, method.algorithm)
         steps = steps_within(method, each, most)
         try:
             done = simulated(system, self.times, method, min(steps, MAX_STEPS))
         except ClosureError as error:  # nothing of it moves
-            return Outcome({}, str(error), 0, 0.0, 0.0)
+            return BenchRun({}, str(error), 0, 0.0, 0.0)
         cost = done.statistics
-        return Outcome(
+        return BenchRun(
             signals=measured(self.wanted, done) if len(done.t) else {},
             message="" if done.finished else done.message,
             evaluations=cost.evaluations,

@@ -16,7 +16,7 @@ from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
 from flexmb.run.segments import switch_times
 from flexmb.system.algorithm import Route
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.typing import Real
 

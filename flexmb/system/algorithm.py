@@ -12,7 +12,7 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.closure.system import ClosedMotion, Closures
     from flexmb.entry.observation import Outputs
-    from flexmb.system.system import System
+    from flexmb.system.tree_system import System
 
 Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
 """Names of the algorithms, for type checkers: a test holds them to the list."""

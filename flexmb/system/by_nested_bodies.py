@@ -12,7 +12,7 @@ from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
-    from flexmb.system.system import System
+    from flexmb.system.tree_system import System
 
 
 def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:

@@ -12,7 +12,7 @@ from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.system import ClosedMotion, Closures
-    from flexmb.system.system import System
+    from flexmb.system.tree_system import System
 
 
 def _accelerations(system: System, t: float, y: Real) -> Real:

@@ -10,7 +10,7 @@ from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
-    from flexmb.system.system import System
+    from flexmb.system.tree_system import System
 
 
 def _accelerations(system: System, t: float, y: Real) -> Real:

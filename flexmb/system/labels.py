@@ -5,7 +5,7 @@ from __future__ import annotations
 from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical
 from flexmb.scene.schema import PointMass
 from flexmb.scene.tree import coordinates
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 
 Names = tuple[tuple[str, str], ...]
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.interruption import interruptible
 from flexmb.run.warm_up import pendulum
 from flexmb.tables.status import Status
@@ -50,11 +51,7 @@ except KeyboardInterrupt as stopped:
     print(time.process_time() - pressed, run.status.name, run.stopped_at, len(run.t), run.t[-1], stopped)
 """
 METHODS = {
-    "rk4": {"step": 1e-6},
-    "dop853": {"rtol": 1e-12, "atol": 1e-14},
-    "radau5": {"rtol": 1e-12, "atol": 1e-14},
-    "exponential": {"rtol": 1e-12, "atol": 1e-14},
-    "generalised_alpha": {"step": 1e-6},
+    name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()
 }
 
 

@@ -13,7 +13,7 @@ import pytest
 
 import flexmb
 from flexmb.entry import observation
-from flexmb.frisch.system import Motion, NestedSystem
+from flexmb.frisch.system import NestedMotion, NestedSystem
 from tests import trees
 from tests.bounds import algebra, backward_error
 from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
@@ -35,7 +35,7 @@ class Pair:
     system: flexmb.System
     nested: NestedSystem
     state: flexmb.State
-    motion: Motion
+    motion: NestedMotion
     M: np.ndarray
     right: np.ndarray  # applied less bias, by the recursion
     size: float  # of the generalised forces before they cancel
