@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
     from flexmb.run.trajectory import Trajectory
-    from flexmb.system.evaluation import Evaluation
+    from flexmb.system.observables import Evaluation
     from flexmb.system.system import compile
     from flexmb.system.tree_system import System
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
@@ -51,7 +51,7 @@ _LATER = {
     "simulate": "flexmb.run.simulate",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
-    "Evaluation": "flexmb.system.evaluation",
+    "Evaluation": "flexmb.system.observables",
     "PrecisionWarning": "flexmb.tables.state",
     "State": "flexmb.tables.state",
     "System": "flexmb.system.tree_system",

@@ -22,6 +22,7 @@ from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.system import System, compile
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
@@ -177,12 +178,11 @@ def _approximation(scene: Scene, algorithm: Algorithm) -> str:
     flexible = [body for body in scene.bodies if not isinstance(body, RigidBody) and body.level != "rigid"]
     full = [f'"{body.name}"' for body in flexible if body.level == "full"]
     first_order = f'level "full" of {", ".join(full)} to first order in the modal coordinates' if full else ""
-    match algorithm:
-        case "frisch":
-            return first_order
-        case "frisch_as_printed" if flexible:
-            return f"{first_order}; the print's errors included" if full else "the print's errors included"
-    return ""
+    declared = ALGORITHMS[algorithm]
+    if not declared.is_first_order:
+        return ""
+    errors = "the print's errors included" if declared.errata and flexible else ""
+    return "; ".join(part for part in (first_order, errors) if part)
 
 
 def _status(done: NativeTrajectory) -> Status:

@@ -1,7 +1,7 @@
 """Entry points of what is observed at one state: markers, loads, energy and momentum, by any algorithm.
 
 A new output starts here: a member of `Outputs`, its shape in `shapes`, and the lines of a kernel that fill it. Its
-names are given in `flexmb.system.evaluation`, its course through time in `flexmb.run.trajectory`.
+names are given in `flexmb.system.observables`, its course through time in `flexmb.run.trajectory`.
 """
 
 from __future__ import annotations

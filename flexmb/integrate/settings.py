@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb.integrate.catalogue import integrator
+from flexmb.integrate.catalogue import INTEGRATORS, integrator
 from flexmb.integrate.integrator import Integrator, Method
 from flexmb.integrate.problem import Accuracy
 from flexmb.tables import arguments
@@ -79,7 +79,8 @@ class Settings:
             )
         if self.spectral_radius is not None:
             if not method.damps:
-                raise ValueError(f'spectral_radius is for method "generalised_alpha": leave it out for "{self.method}"')
+                damping = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if each.damps)
+                raise ValueError(f'spectral_radius is for method {damping}: leave it out for "{self.method}"')
             if not 0.0 <= self.spectral_radius <= 1.0:
                 raise ValueError(
                     f"spectral_radius is {self.spectral_radius:g}: from 0 (what is not resolved dies in a step) to 1 "

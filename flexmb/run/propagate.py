@@ -14,7 +14,7 @@ from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
-from flexmb.run.segments import switch_times
+from flexmb.run.switching import switch_times
 from flexmb.system.algorithm import Route
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants

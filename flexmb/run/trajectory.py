@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.system.evaluation import ENERGIES, Evaluation, MarkerMotion
+from flexmb.system.observables import ENERGIES, Evaluation, MarkerMotion
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 

@@ -16,7 +16,7 @@ from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.evaluation import Evaluation
+from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result, pack

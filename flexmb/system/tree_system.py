@@ -20,15 +20,15 @@ from flexmb.building.links import Link, links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
 from flexmb.entry.observation import Outputs, observe_motion
-from flexmb.frisch.system import NestedSystem, Partitions
+from flexmb.frisch.nested_system import NestedSystem, Partitions
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.evaluation import Evaluation, Names, Observation
 from flexmb.system.mechanics import Mechanics
+from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result

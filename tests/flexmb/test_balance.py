@@ -16,7 +16,7 @@ import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.profiles import profile
 from flexmb.scene import schema as s
-from flexmb.system.evaluation import Evaluation
+from flexmb.system.observables import Evaluation
 from flexmb.system.system import System
 from tests import trees
 from tests.bounds import algebra, observed_order

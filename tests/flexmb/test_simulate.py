@@ -11,7 +11,7 @@ import pytest
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.samples import sample_bytes
-from flexmb.run.segments import switch_times
+from flexmb.run.switching import switch_times
 from flexmb.tables.status import Status
 from tests.trees import random_scene
 

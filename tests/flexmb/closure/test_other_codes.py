@@ -18,7 +18,7 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.tree import GROUND, node_frame, ordered
-from flexmb.system.evaluation import MarkerMotion
+from flexmb.system.observables import MarkerMotion
 from tests.bounds import UNIT_ROUNDOFF, algebra, gamma, observed_order, relative
 from tests.flexmb.closure import mechanisms as m
 

@@ -13,7 +13,7 @@ import pytest
 
 import flexmb
 from flexmb.entry import observation
-from flexmb.frisch.system import NestedMotion, NestedSystem
+from flexmb.frisch.nested_system import NestedMotion, NestedSystem
 from tests import trees
 from tests.bounds import algebra, backward_error
 from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
