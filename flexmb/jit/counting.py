@@ -18,6 +18,8 @@ from typing import Any
 
 import numpy as np
 
+_OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
+
 
 @dataclass(frozen=True)
 class Operations:
@@ -154,7 +156,7 @@ class _Interpreter:
             return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
         if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
             return self(thing.of_reals)
-        if isinstance(thing, ModuleType) and thing.__name__.startswith(f"{__package__}."):
+        if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
             return self._scalar.square_root if thing is math.sqrt else self._scalar.elementary(thing)
