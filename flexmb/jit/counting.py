@@ -13,12 +13,13 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from types import BuiltinFunctionType, FunctionType, ModuleType, SimpleNamespace
+from types import BuiltinFunctionType, CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 _OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
+_CHOOSERS = f"{__package__}.kernel"  # where `by_bundle` and `by_number` make functions that choose; it needs numba
 
 
 @dataclass(frozen=True)
@@ -151,11 +152,8 @@ class _Interpreter:
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if hasattr(thing, "variants"):  # flexmb.jit.kernel.by_bundle
-            array, having, lacking = map(self, thing.variants)
-            return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
-        if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
-            return self(thing.of_reals)
+        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ == _CHOOSERS:
+            return self._function(thing)
         if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
@@ -164,7 +162,8 @@ class _Interpreter:
 
     def _function(self, function: FunctionType) -> FunctionType:
         space = self._namespace(function.__globals__)
-        twin = FunctionType(function.__code__, space, function.__name__, function.__defaults__, function.__closure__)
+        cells = tuple(CellType(self(cell.cell_contents)) for cell in function.__closure__ or ())
+        twin = FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
         twin.__kwdefaults__ = function.__kwdefaults__
         return twin
 
