@@ -9,14 +9,12 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
 
-from flexmb.entry import articulated
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
-from flexmb.jit.kernel import cache_directory
+from flexmb.jit.folder import cache_directory
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -116,8 +114,7 @@ def main(words: Sequence[str] | None = None) -> None:
         ("articulated", *(asked.algorithm or ())),
         ("tree", *(asked.scene or ())),
     )
-    kept = cache_directory(Path(articulated.__file__))
-    print(f"compiled in {seconds:.1f} s, kept in {Path(kept).parent if kept else 'memory only: no folder is writable'}")
+    print(f"compiled in {seconds:.1f} s, kept in {cache_directory() or 'memory only: no folder is writable'}")
 
 
 if __name__ == "__main__":
