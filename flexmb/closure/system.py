@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -64,7 +64,7 @@ class Closures:
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
 
-    def chain(self, algorithm: Literal["articulated", "composite"], rate: float = 0.0) -> Closed:
+    def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
         bodies, modes = c.mode.shape

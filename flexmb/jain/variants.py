@@ -7,7 +7,7 @@ from flexmb.jain import condensed, explicit, woodbury
 from flexmb.jain.reduced import to_node
 from flexmb.jit.kernel import by_bundle, helper
 from flexmb.levels.body import body_inertia, inertia_without_masses
-from flexmb.tables.arrays import CONDENSED, EXPLICIT, WOODBURY
+from flexmb.tables.arrays import CONDENSED, EXPLICIT, WOODBURY, ReducedConstants
 
 
 @helper
@@ -45,7 +45,7 @@ def _modal_accelerations(c, w, k, A):
         explicit.modal_accelerations(c, w, k, A)
 
 
-inertia = by_bundle("compliance", _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
-eliminate_modes = by_bundle("compliance", _eliminate_modes, explicit.eliminate_modes)
-to_parent = by_bundle("compliance", _to_parent, explicit.to_parent)
-modal_accelerations = by_bundle("compliance", _modal_accelerations, explicit.modal_accelerations)
+inertia = by_bundle(ReducedConstants, _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
+eliminate_modes = by_bundle(ReducedConstants, _eliminate_modes, explicit.eliminate_modes)
+to_parent = by_bundle(ReducedConstants, _to_parent, explicit.to_parent)
+modal_accelerations = by_bundle(ReducedConstants, _modal_accelerations, explicit.modal_accelerations)

@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-_PACKAGE = f"{__name__.partition('.')[0]}."  # modules whose functions are interpreted too
+_OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
+_CHOOSERS = f"{__package__}.kernel"  # where `by_bundle` and `by_number` make functions that choose; it needs numba
 
 
 @dataclass(frozen=True)
@@ -151,12 +152,9 @@ class _Interpreter:
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if hasattr(thing, "variants"):  # flexmb.jit.kernel.by_bundle
-            array, having, lacking = map(self, thing.variants)
-            return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
-        if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
-            return self(thing.of_reals)
-        if isinstance(thing, ModuleType) and thing.__name__.startswith(_PACKAGE):
+        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ == _CHOOSERS:
+            return self._function(thing)
+        if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
             return self._scalar.square_root if thing is math.sqrt else self._scalar.elementary(thing)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from flexmb.hinges.catalogue import kind_of
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 
 Names = tuple[tuple[str, str], ...]
 

@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from flexmb.frisch.equivalence.advice import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
 from flexmb.frisch.equivalence.appendage import Appendage, appendage
+from flexmb.frisch.equivalence.comparison import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
 from flexmb.frisch.equivalence.mode_count import directions
 from flexmb.frisch.equivalence.relations import (
     acceleration_relations,

@@ -16,7 +16,7 @@ import flexmb
 from flexmb.dense import DenseSystem
 from flexmb.dense.body_frames import Motions, member_frames, point_frames
 from flexmb.dense.first_order_bodies import first_order_body
-from flexmb.frisch.system import Partitions
+from flexmb.frisch.nested_system import Partitions
 from tests.bounds import algebra, relative
 from tests.flexmb.frisch import contiguous, labels
 from tests.flexmb.frisch.nested_reference import Blocks, Expansion, Nests, partitions

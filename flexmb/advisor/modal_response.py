@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh, expm
 from scipy.spatial.transform import Rotation
 
-from flexmb.advisor.methods import Method, simulated
+from flexmb.advisor.methods import RunMethod, simulated
 from flexmb.closure.system import ClosureError
 from flexmb.dense.function_jets import profile
 from flexmb.modal import flexible_model
@@ -64,7 +64,7 @@ class RigidRun:
 
 
 @dataclass(frozen=True)
-class Response:
+class ModalResponse:
     """Modal response of one body with m eigenmodes: `model` in them, of unit modal mass; `frequencies` (m,) rad/s;
     `family` (m,) index of what moves most, as in `FAMILIES`, or -1; force Q (T,m), eta, etad, etadd (T,m); motion of
     the body (T,3) in body axes: `w`, `alpha`, `acceleration` less gravity; `loads`: (node, torque, force) (T,3)."""
@@ -92,13 +92,13 @@ def rigid_run(scene: Scene, times: Real) -> RigidRun | str:
     ]
     try:
         system = compile(replace(still, markers=(*still.markers, *extra)))
-        run = simulated(system, times, Method("dop853", _RTOL))
+        run = simulated(system, times, RunMethod("dop853", _RTOL))
     except (ClosureError, ValueError, NotImplementedError) as error:
         return f"all bodies rigid: {error}"
     return RigidRun(still, system, run) if run.finished else f"all bodies rigid: {run.message}"
 
 
-def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) -> Response:
+def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) -> ModalResponse:
     """The response of the eigenmodes of `body`, the lowest `MODES` of a beam, all of a raw body."""
     model = eigenmodes(body)
     path = rigid.run.markers[_body(body.name)]
@@ -118,7 +118,7 @@ def modal_response(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody) ->
     omega = np.sqrt(np.maximum(np.diag(model.stiffness), 0.0))
     eta, etad = _oscillators(omega, np.diag(model.damping), force, rigid.run.t, _initial(scene, body, model))
     etadd = force - eta * omega**2 - etad * np.diag(model.damping)
-    return Response(
+    return ModalResponse(
         body, model, omega, _families(model), force, eta, etad, etadd, w, alpha, acceleration, loads
     )
 

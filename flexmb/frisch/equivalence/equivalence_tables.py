@@ -7,7 +7,7 @@ from rich.console import Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from flexmb.frisch.equivalence.advice import BEST, Equivalence, percent
+from flexmb.frisch.equivalence.comparison import BEST, Equivalence, percent
 from flexmb.frisch.equivalence.mode_count import Direction
 from flexmb.frisch.equivalence.relations import Fit, Relation, displacement_relations, modal_effective_inertia
 from flexmb.typing import Real

@@ -21,7 +21,7 @@ AT_CLAMP, BEST, GIVEN = "hinge at the clamp", "best hinge", "given hinge"
 
 
 @dataclass(frozen=True)
-class Verdict:
+class Preference:
     """`better` is "rigid" for the spring-hinged rigid body, "flexible" for modes; `reason` has the numbers."""
 
     question: str
@@ -42,7 +42,7 @@ class Equivalence:
     accuracy: float
     fits: dict[str, Fit]
     directions: tuple[Direction, ...]
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[Preference, ...]
 
 
 def equivalence(
@@ -87,7 +87,7 @@ def coupling_error(body: Appendage, fit: Fit) -> float:
     return float(max(errors, default=0.0))
 
 
-def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]:
+def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Preference, ...]:
     f = body.frequencies / (2.0 * np.pi)
     first = min(fit.modes)
     mismatch = max(relation.mismatch for group in fit.relations for relation in group)
@@ -95,7 +95,7 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]
     follows = max(mismatch, coupling) <= accuracy
     named = " and ".join(f"{f[mode]:.4g} Hz" for mode in sorted(fit.modes))
     verdicts = [
-        Verdict(
+        Preference(
             f"vibration at {named} and what it does to the base",
             "either" if follows else "flexible",
             f"(149)-(151) agree within {percent(mismatch)}, effective mass and inertia within {percent(coupling)}",
@@ -105,7 +105,7 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]
     if others:
         left = _beyond(body, fit)
         verdicts.append(
-            Verdict(
+            Preference(
                 f"vibration at other frequencies, from {f[others[0]]:.4g} Hz",
                 "flexible",
                 f"the hinge has none; modes other than {_listed(fit.modes)} have {percent(left[1])} of the mass across "
@@ -114,12 +114,12 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]
         )
     angle = np.sqrt(2.0 * accuracy)
     verdicts += [
-        Verdict(
+        Preference(
             f"deflections beyond {angle:.2g} rad at the hinge",
             "rigid",
             f"modes leave out terms of second order, 1 - cos = {percent(accuracy)} there; the hinge turns exactly",
         ),
-        Verdict(
+        Preference(
             f"base spinning faster than {np.sqrt(accuracy) * f[first]:.3g} Hz",
             "rigid",
             f"modes without second-order shapes do not stiffen, an error of (spin / {f[first]:.4g} Hz)^2 in the "

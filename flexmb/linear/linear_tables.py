@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from flexmb.linear.campbell import Campbell
-from flexmb.linear.model import LinearModel, Mode
+from flexmb.linear.linear_model import LinearModel, Mode
 
 _COLOURS = {"asymptotically stable": "green", "neutral": "yellow", "unstable": "bold red"}
 _DOMINANT = 3  # displacements named per mode

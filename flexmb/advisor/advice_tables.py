@@ -14,7 +14,7 @@ from flexmb.advisor.advice import Advice, Trial
 _SHOWN = 20
 
 
-def verdict(advice: Advice, trials: bool = True) -> RenderableType:
+def advice_tables(advice: Advice, trials: bool = True) -> RenderableType:
     """Tables and lines of one advice; `trials`: also every model that was run, cheapest first."""
     parts: list[RenderableType] = [_asked(advice)]
     if advice.accepted:

@@ -76,7 +76,7 @@ class RelativeMotion(NamedTuple):
     bias: Real
 
 
-class Motion(NamedTuple):
+class NestedMotion(NamedTuple):
     """Accelerations (nu,), drive loads (nu,) of prescribed speeds, loads (N,6) of hinges, torques (W,3) of wheels."""
 
     accelerations: Real
@@ -125,12 +125,13 @@ class NestedSystem:
         status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self._w)
         return status, self._w.speed["acceleration"].copy()
 
-    def motion(self, t: float, y: Real) -> tuple[int, Motion]:
+    def motion(self, t: float, y: Real) -> tuple[int, NestedMotion]:
         """Status code, and accelerations with everything the suppressed rows give."""
         w = self._w
         status = evaluation.loads(*self._layout.whole(t, y), self.constants, w)
         drives = np.where(self.constants.speed["prescribed"] >= 0, w.speed["drive"], 0.0)
-        return status, Motion(w.speed["acceleration"].copy(), drives, w.nest["load"].copy(), w.wheel["torque"].copy())
+        rates, loads, torques = w.speed["acceleration"].copy(), w.nest["load"].copy(), w.wheel["torque"].copy()
+        return status, NestedMotion(rates, drives, loads, torques)
 
     @property
     def doubt(self) -> Index:
@@ -170,7 +171,7 @@ class NestedSystem:
         )
 
     def relative_motion(self, t: float, y: Real) -> RelativeMotion:
-        """Motion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
+        """NestedMotion of contiguous bodies at y, every row of it, those without inertia of their own too (117)."""
         w, c = self._w, self.constants
         t, y = self._layout.whole(t, y)
         evaluation.assemble(t, y, c, w)

@@ -1,6 +1,7 @@
 """The cache of compiled kernels: whatever happens to its files, results stay right and nothing ends in a traceback."""
 
 import os
+import shutil
 import subprocess
 import sys
 import warnings
@@ -9,10 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import flexmb.jit.kernel
-from flexmb.jit.cache import warn_once
+from flexmb.jit import folder as folders
+from flexmb.jit import hooks
+from flexmb.jit.folder import cache_directory, forget, warn_once
+from flexmb.jit.kernel import kernel
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TINY = """
 from flexmb.tables.soundness import unsound as kernel
 import numpy as np
@@ -80,9 +83,10 @@ def weighted(values, weight):
 
 def hits(cache: Path, monkeypatch) -> int:
     """Versions of the kernel that were found in a cache: of two."""
-    monkeypatch.setattr(flexmb.jit.kernel, "cache_directory", lambda source: str(cache / "sources"))
+    monkeypatch.setattr(hooks, "cache_directory", lambda: cache / "sources")
     warn_once.cache_clear()
-    fresh = flexmb.jit.kernel.kernel(weighted)
+    forget.cache_clear()
+    fresh = kernel(weighted)
     assert fresh(np.arange(4), 2.0) == 12.0
     assert fresh(np.array([0.5, 0.25]), 2.0) == 1.5
     return sum(fresh.stats.cache_hits.values())
@@ -150,13 +154,27 @@ def test_a_kernel_that_cannot_be_kept_runs_with_one_warning(tmp_path, monkeypatc
 
 
 def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
-    monkeypatch.setattr(flexmb.jit.kernel.config, "CACHE_DIR", str(tmp_path))
-    source = Path(flexmb.jit.kernel.__file__)
-    folder = flexmb.jit.kernel.cache_directory.__wrapped__(source)
-    Path(folder).rmdir()
-    Path(folder).write_text("no folder")
-    assert flexmb.jit.kernel.cache_directory.__wrapped__(source) == folder
-    assert Path(folder).is_dir()
+    monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path))
+    place = cache_directory.__wrapped__()
+    place.rmdir()
+    place.write_text("no folder")
+    assert cache_directory.__wrapped__() == place
+    assert place.is_dir()
+
+
+def test_kernels_that_nobody_uses_are_forgotten_when_others_are_compiled(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
+    earlier = tmp_path / "sources" / "of-earlier-sources.kernel"
+    earlier.write_text("")
+    compiled = sorted((tmp_path / "sources").glob("weighted-*"))
+    for file in (earlier, *compiled):
+        os.utime(file, (0, 0))
+    assert hits(tmp_path, monkeypatch) == 2
+    assert earlier.exists()  # nothing was compiled
+    compiled[0].unlink()
+    assert hits(tmp_path, monkeypatch) == 1
+    assert not earlier.exists()
+    assert kernels(tmp_path) == compiled
 
 
 def test_where_nothing_can_be_written_a_warning_says_so_and_kernels_run(tmp_path):
@@ -190,3 +208,43 @@ def test_without_the_compiler_one_line_says_why():
     command = f"['flexmb', 'simulate', {str(scene)!r}, '--t-end', '1']"
     words = stderr(f"import sys; sys.argv = {command}; import flexmb.cli; flexmb.cli.main()")
     assert len(words.splitlines()) == 1 and "NUMBA_DISABLE_JIT is set" in words
+
+
+EDITED = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
+ENTRY = """
+from flexmb.jit.kernel import kernel
+from flexmb.part import part
+
+@kernel
+def entry(x):
+    return part(x)
+"""
+PART = """
+from flexmb.jit.kernel import helper
+
+@helper
+def part(x):
+    "{words}"
+    return {factor} * x
+"""
+
+
+def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(tmp_path):
+    """A package of its own: the room jit, a kernel, and a helper in another file."""
+    package = tmp_path / "flexmb"
+    shutil.copytree(ROOT / "flexmb" / "jit", package / "jit")
+    (package / "__init__.py").write_text("")
+    (package / "entry.py").write_text(ENTRY)
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(factor: float, words: str) -> str:
+        (package / "part.py").write_text(PART.format(factor=factor, words=words))
+        command = [sys.executable, "-c", EDITED]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert run(2.0, "Times two.") == "2.0 0"
+    assert run(2.0, "Times two.") == "2.0 1"
+    assert run(2.0, "Two times what it takes.") == "2.0 1"
+    assert run(3.0, "Two times what it takes.") == "3.0 0"
+    assert run(2.0, "Two times.") == "2.0 1"

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-from flexmb.frisch.equivalence.advice import Equivalence
+from flexmb.frisch.equivalence.comparison import Equivalence
 from flexmb.output.printable import chart_text
 from flexmb.typing import Real
 

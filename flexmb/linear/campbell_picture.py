@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from flexmb.linear.campbell import Campbell
 from flexmb.output.printable import chart_text
+
+if TYPE_CHECKING:
+    from flexmb.linear.campbell import Campbell
 
 _SIZE = (9.0, 7.0)  # inches
 _RESOLUTION = 120  # dots per inch
