@@ -28,7 +28,7 @@ _AS_PART: dict[str, Any] = SEMANTICS | HOOKS.parts
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` as an entry point, cached on disk."""
     compiled = njit(**SEMANTICS)(function)
-    HOOKS.keep(compiled, compiled.py_func)
+    HOOKS.keep(compiled, function)
     return compiled
 
 
