@@ -20,13 +20,15 @@ from crosscheck.library.selection import without_part
 from crosscheck.records.lock import FolderInUseError, locked
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
-from crosscheck.report.console import cases_table, engines_table, print_outcome, words
-from crosscheck.running.engine_list import describe_engines
-from crosscheck.running.live import LiveProgress
-from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.installed import describe_engines
+from crosscheck.running.pool import TIME_LIMIT_S, Limits
 from crosscheck.running.sweep import sweep
-from crosscheck.verify.table import channels_table
-from crosscheck.verify.verify import sample_times_csv, verify_csv
+from crosscheck.terminal.csv_channels import channels_table
+from crosscheck.terminal.listings import cases_table, engines_table, maps_table
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.text import words
+from crosscheck.terminal.verdicts import print_outcome
+from crosscheck.verify.against_case import sample_times_csv, verify_csv
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import closest
 
@@ -110,10 +112,10 @@ def run(
         _refuse(idle)
     with _sole_writer(out):
         with LiveProgress(console) as live:
+            limits = Limits(jobs, time_limit)
             sweep(
-                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, time_limit_s=time_limit,
-                listener=live.hear,
-            )  # fmt: skip
+                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear
+            )
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
         _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
 
@@ -221,21 +223,21 @@ def stability(
     **Examples**: `crosscheck stability list` · `crosscheck stability vibrating_hinge --depth 5` ·
     `crosscheck stability all --pictures docs/pictures`
     """
-    from crosscheck.stability.console import run_and_draw, show_maps  # they load the compiler
     from crosscheck.stability.run import PROVIDER, maps_of
+    from crosscheck.terminal.map_runs import run_and_draw  # they load the compiler
 
     _check_limit(time_limit)
     known = maps_of(PROVIDER)
     if maps == ["list"]:
-        return show_maps(console, known.values())
+        console.print(maps_table(known.values()))
+        return
     chosen = list(known) if maps == ["all"] else maps
     for name in chosen:
         if name not in known:
             _refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
     with _sole_writer(out):
-        code = run_and_draw(
-            console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs, time_limit_s=time_limit
-        )
+        limits = Limits(jobs, time_limit)
+        code = run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits)
     raise typer.Exit(code)
 
 

@@ -92,7 +92,7 @@ class MarkerPath:
 class Trajectory:
     """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
 
-    All this is checked before it is recorded (`crosscheck.running.checked`); an answer that breaks it counts as
+    All this is checked before it is recorded (`crosscheck.engines.answers`); an answer that breaks it counts as
     *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
     does not offer.
     `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work

@@ -9,7 +9,8 @@ import numpy as np
 
 from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
-from crosscheck.records.records import BrokenLine, CaseRecord, Environment, Packed, Record, RunRecord, RunStatus, unpack
+from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
+from crosscheck.records.packing import Packed, unpack
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 

@@ -23,8 +23,8 @@ from typing import Literal, get_args
 import msgspec
 import numpy as np
 
-from crosscheck.judging.accepted import Figure
 from crosscheck.judging.uncertainty import Uncertainty
+from crosscheck.library.accepted import Figure
 from flexmb.run.channels import distance, family, signal_range
 from flexmb.typing import Real
 
@@ -39,6 +39,7 @@ Status = Literal[
     "crashed",
     "did not run",
 ]
+VerdictKind = Literal["comparison", "control", "conservation"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 # The gravest first: what stands for several.
 GRAVITY: tuple[Status, ...] = (
@@ -57,7 +58,7 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     case: str
     comparison: str
-    kind: Literal["comparison", "control", "conservation"]
+    kind: VerdictKind
     channel: str
     variant_a: str
     engine_a: str
@@ -80,6 +81,13 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     def sides(self) -> tuple[tuple[str, str], tuple[str, str]]:
         """Variant and engine of its two sides."""
         return (self.variant_a, self.engine_a), (self.variant_b, self.engine_b)
+
+    @property
+    def pair(self) -> str:
+        """Who is compared with whom, in words."""
+        if self.variant_a == self.variant_b:
+            return f"{self.engine_a} – {self.engine_b}"
+        return f"{self.engine_a} ({self.variant_a}) – {self.engine_b} ({self.variant_b})"
 
     @property
     def ok(self) -> bool:

@@ -99,9 +99,9 @@ Every key, those with a default in brackets with it; the structs below say more 
   ``diverged_s``, ``because`` and ``reason``, as above;
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
 
-``case_check.py`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
+``library/check`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
 that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
-the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.judging.accepted`).
+the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.library.accepted`).
 """
 
 from __future__ import annotations
@@ -216,6 +216,12 @@ class Comparison(_Strict, frozen=True, kw_only=True):
     because: str = ""
     reason: str = ""
 
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """Both sides of a comparison that is one pair, as `selection.select` leaves them."""
+        assert self.a is not None and self.b is not None
+        return self.a, self.b
+
 
 class Control(_Strict, frozen=True, kw_only=True):
     """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; they must come out *differ*.
@@ -233,6 +239,11 @@ class Control(_Strict, frozen=True, kw_only=True):
     b: Side
     goals: dict[str, float]
     scales: dict[str, float] = {}
+
+    @property
+    def sides(self) -> tuple[Side, Side]:
+        """The faulty side, and the true one."""
+        return self.a, self.b
 
 
 class Conservation(_Strict, frozen=True, kw_only=True):

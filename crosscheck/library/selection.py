@@ -14,7 +14,7 @@ from itertools import combinations
 import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.library.case import Chart, Comparison, Conservation, RunFile, Side, Variant
+from crosscheck.library.case import Chart, Comparison, Conservation, Control, RunFile, Side, Variant
 from flexmb.scene.problems import closest
 
 
@@ -22,10 +22,11 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The reduced run file; variants keep the engines that something needs, and go where nothing does."""
     run = _joined(run, asked)
     comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison)]
-    kept = tuple(pair for pair in comparisons if _wanted(asked, (pair.a.engine, pair.b.engine)))
-    controls = tuple(control for control in run.controls if _wanted(asked, (control.a.engine, control.b.engine)))
+    kept = tuple(pair for pair in comparisons if _wanted(asked, pair.sides))
+    controls = tuple(control for control in run.controls if _wanted(asked, control.sides))
     conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
-    needed = {(side.variant, side.engine) for item in (*kept, *controls) for side in (item.a, item.b)}
+    pairs: tuple[Comparison | Control, ...] = (*kept, *controls)
+    needed = {(side.variant, side.engine) for pair in pairs for side in pair.sides}
     needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
     needed |= {(v.name, engine) for v in run.variants for engine in _all(v) if engine in asked or not asked}
     variants = tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines)
@@ -79,12 +80,14 @@ def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
     ]
 
 
-def _wanted(asked: tuple[str, ...], involved: tuple[str, str]) -> bool:
+def _wanted(asked: tuple[str, ...], sides: tuple[Side, Side]) -> bool:
+    """Whether two sides are compared when these engines are asked for."""
+    involved = {side.engine for side in sides}
     if not asked:
         return True
     if len(asked) == 1:
         return asked[0] in involved
-    return set(involved) <= set(asked)
+    return involved <= set(asked)
 
 
 def _narrowed(run: RunFile, item: Conservation, asked: tuple[str, ...]) -> Conservation | None:

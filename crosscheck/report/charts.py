@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judging.judge import drift_of
+from crosscheck.judging.case_verdicts import drift_of
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
 from crosscheck.report.animation import animations

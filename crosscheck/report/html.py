@@ -12,10 +12,10 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
+from crosscheck.judging.outcome import Outcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import STATUSES
 from crosscheck.report.charts import payload
-from crosscheck.report.outcome import Outcome
 from crosscheck.report.views import comparison_tables, conservation_table, control_table, overview
 from flexmb.output.printable import printable
 

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.judging.verdict import GRAVITY, Status, Verdict
-from crosscheck.report.summary import pair
+from crosscheck.judging.verdict import GRAVITY, Verdict
 from flexmb.run.channels import family
 
-SYMBOLS: dict[Status, str] = {
+SYMBOLS: dict[str, str] = {
     "agree": "✓",
     "differ": "≠",
     "unresolved": "?",
@@ -128,17 +127,17 @@ def control_table(verdicts: list[Verdict]) -> Table | None:
 
 
 def _comparison_table(name: str, group: list[Verdict]) -> Table:
-    columns = list(dict.fromkeys(pair(verdict) for verdict in group))
+    columns = list(dict.fromkeys(verdict.pair for verdict in group))
     kinds = dict.fromkeys(_kind(verdict.channel) for verdict in group)
     rows = []
     for kind in kinds:
         inside = [verdict for verdict in group if _kind(verdict.channel) == kind]
         channels = dict.fromkeys(verdict.channel for verdict in inside)
         below = tuple(
-            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], pair))
+            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], _pair))
             for channel in channels
         )
-        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, pair), below))
+        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, _pair), below))
     expected = group[0].expected
     note = "" if expected == "agree" else f"Expected here: {expected}, because {group[0].expected_reason}"
     return Table(name, note, tuple(columns), tuple(rows))
@@ -156,7 +155,7 @@ def _cell(group: list[Verdict]) -> Cell:
     worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
     good = worst.status == "agree" or worst.kind == "control"
     look = "bad" if bad else "good" if good else "expected"
-    text = worst.status
+    text: str = worst.status
     if worst.kind == "control" and worst.status in ("differ", "agree"):
         text = "noticed" if worst.ok else "missed"
     if worst.kind == "conservation" and worst.status in ("differ", "agree"):
@@ -170,7 +169,7 @@ def _cell(group: list[Verdict]) -> Cell:
     if grown:
         text += ", worse than recorded" if len(grown) == len(group) else f", {len(grown)} worse than recorded"
     shown = bad or grown or [verdict for verdict in group if verdict.status == worst.status]
-    reasons = tuple(f"{verdict.channel}, {pair(verdict)}: {_reason(verdict)}" for verdict in shown[:12])
+    reasons = tuple(f"{verdict.channel}, {verdict.pair}: {_reason(verdict)}" for verdict in shown[:12])
     return Cell(worst.status, look, text, _numbers(worst), reasons)
 
 
@@ -195,6 +194,10 @@ def _numbers(verdict: Verdict) -> str:
 
 def _kind(channel: str) -> str:
     return FAMILIES.get(family(channel), channel)
+
+
+def _pair(verdict: Verdict) -> str:
+    return verdict.pair
 
 
 def _column(verdict: Verdict) -> str:

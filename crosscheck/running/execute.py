@@ -12,11 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
-from crosscheck.engines.registry import home
-from crosscheck.records.made_by import made_by
-from crosscheck.records.records import Confirmed, RunRecord, pack
-from crosscheck.running.checked import (
+from crosscheck.engines.answers import (
     BrokenContract,
     checked_ladder,
     checked_model,
@@ -25,6 +21,11 @@ from crosscheck.running.checked import (
     checked_version,
     clean,
 )
+from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
+from crosscheck.engines.registry import home
+from crosscheck.records.kinds import Confirmed, RunRecord
+from crosscheck.records.made_by import made_by
+from crosscheck.records.packing import pack
 from crosscheck.running.plan import Done, Job
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene

@@ -39,6 +39,27 @@ Function = Callable[[Any, Callable[[Any], None]], None]
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What running many jobs may take; None leaves it to the machine, to the case or to `TIME_LIMIT_S`.
+
+    `workers` is the number of processes (by default one per core), `time_s` how long a job may take, and `memory_bytes`
+    how much a worker may hold (by default an equal part of what the machine has).
+    """
+
+    workers: int | None = None
+    time_s: float | None = None
+    memory_bytes: float | None = None
+
+    @property
+    def processes(self) -> int:
+        """How many workers there are."""
+        return self.workers or os.cpu_count() or 1
+
+
+BY_DEFAULT = Limits()
+
+
+@dataclass(frozen=True)
 class Event:
     """What happened to job number `job`: it started, emitted `content`, ended, crashed or was stopped at a limit.
 

@@ -8,13 +8,14 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from crosscheck.judging.accepted import Accepted
+from crosscheck.judging.outcome import Outcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
+from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import RunFile
 from crosscheck.library.selection import select
-from crosscheck.records.records import CaseRecord, RunRecord, VariantInfo, pack
-from crosscheck.report.outcome import Outcome, conclude
+from crosscheck.records.kinds import CaseRecord, RunRecord, VariantInfo
+from crosscheck.records.packing import pack
 from flexmb.typing import Real
 
 TIMES = np.linspace(0.0, 1.0, 11)

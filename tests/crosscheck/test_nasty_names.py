@@ -19,20 +19,23 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
+from crosscheck.judging.outcome import Absence, Outcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.case import Comparison, Side
 from crosscheck.library.find import load_case
-from crosscheck.records.records import Archive, BrokenLine, RunRecord, environment, read
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import BrokenLine, RunRecord
+from crosscheck.records.machine import environment
 from crosscheck.report import write_all
-from crosscheck.report.console import cases_table, engines_table, print_outcome
+from crosscheck.report.ci import write_junit, write_summary
 from crosscheck.report.html import embedded
-from crosscheck.report.outcome import Absence, Outcome, conclude
-from crosscheck.report.summary import write_junit, write_summary
-from crosscheck.running.engine_list import EngineState
-from crosscheck.running.live import LiveProgress
+from crosscheck.running.installed import EngineState
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import Event
+from crosscheck.terminal.listings import cases_table, engines_table
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.verdicts import print_outcome
 from flexmb.output.printable import chart_text, printable
 from tests.crosscheck.sessions import CASE, PROVIDER
 

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.stability.judge import judge
+from crosscheck.stability.boundary import judge
 from crosscheck.stability.map import Axis, Overlay, StabilityMap
-from crosscheck.stability.records import CellRecord
+from crosscheck.stability.map_records import CellRecord
 from crosscheck.stability.refine import Cell, Mesh
 from tests.crosscheck.stability.synthetic import CIRCLE
 

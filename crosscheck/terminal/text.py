@@ -1,0 +1,17 @@
+"""Text for the terminal that stands as it is, whatever is in it."""
+
+from __future__ import annotations
+
+from rich.text import Text
+
+from flexmb.output.printable import printable
+
+
+def words(text: str, style: str = "") -> Text:
+    """Text as it stands, brackets and colons too: only `Text` is safe from rich's markup and emoji."""
+    return Text(printable(text), style)
+
+
+def marked(mark: str, style: str, text: str) -> Text:
+    """A coloured sign, and text."""
+    return Text.assemble((mark, style), " ", words(text))
