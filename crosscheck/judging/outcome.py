@@ -1,4 +1,4 @@
-"""The outcome of a session: its verdicts, what did not run, and the one question whether all is as expected."""
+"""The outcome of a session: its verdicts, what did not run, and the answer whether all is as expected."""
 
 from __future__ import annotations
 
@@ -28,9 +28,9 @@ class Absence:
 
 @dataclass(frozen=True)
 class Outcome:
-    """All verdicts of a session, by case; all absences; lines of the records that are none, in words.
+    """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
-    `strict`: figures worse than recorded, or of which none are recorded, are not as expected.
+    `strict`: figures that are worse than recorded, or not recorded, are not as expected.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -50,7 +50,7 @@ class Outcome:
 
     @property
     def idle(self) -> list[str]:
-        """Cases without any verdict, such as those in which the engines asked for have no part."""
+        """Cases without any verdict, such as those that none of the requested engines takes part in."""
         return [case for case, group in self.verdicts.items() if not group]
 
     @property
@@ -65,9 +65,9 @@ class Outcome:
 
     @property
     def lost(self) -> list[Absence]:
-        """What was asked for and did not run, or failed where no verdict is there to say so.
+        """Runs that were asked for and did not happen, or failed where no verdict shows it.
 
-        An engine that refuses or diverges has answered: a case that compares it with nothing expects nothing of it.
+        An engine that refuses or diverges has answered; a case that compares it with nothing expects nothing of it.
         """
         judged = {(verdict.case, *side) for verdict in self.all for side in verdict.sides}
         return [
@@ -79,7 +79,7 @@ class Outcome:
 
     @property
     def ok(self) -> bool:
-        """Every verdict is the expected one, everything asked for ran, nothing is lost, and there was something."""
+        """Every verdict is the expected one, everything asked for ran, nothing is lost, and there is a verdict."""
         sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken
         return sound and not (self.strict and (self.worse or self.unrecorded))
 
@@ -115,7 +115,7 @@ class Outcome:
         return Counter(verdict.status for verdict in self.all if verdict.kind != "control")
 
     def controls(self) -> tuple[int, int]:
-        """How many negative controls' channels were noticed, and how many there are."""
+        """In how many channels the negative controls were noticed, and how many there are."""
         noticed = [verdict.ok for verdict in self.all if verdict.kind == "control"]
         return sum(noticed), len(noticed)
 

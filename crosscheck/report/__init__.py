@@ -1,4 +1,4 @@
-"""Everything a session leaves behind: verdicts.json, report.html, summary.md, junit.xml, from its records alone."""
+"""The outputs of a session, made from its records alone: verdicts.json, report.html, summary.md, junit.xml."""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -22,7 +22,7 @@ def write_all(
 ) -> tuple[Outcome, Path]:
     """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
 
-    `strict`: what is worse than recorded, or not recorded, is not as expected.
+    `strict`: figures that are worse than recorded, or not recorded, are not as expected.
     """
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)

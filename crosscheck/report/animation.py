@@ -1,4 +1,4 @@
-"""What the animation draws: lines between points that markers carry, and the markers' motion."""
+"""The content of an animation: lines between points that markers carry, and the markers' motion."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from crosscheck.report.store import Store
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
-    """One animation a variant that can be drawn, of the first of its engines whose finest run got anywhere."""
+    """One animation for each variant that can be drawn, by the first of its engines whose finest run has samples."""
     found = []
     for variant in case.case.run.variants:
         drawing = case.case.variants[variant.name].drawing

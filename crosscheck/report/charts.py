@@ -22,8 +22,8 @@ from flexmb.run.channels import distance, family, matches, signal_range, unit
 from flexmb.typing import Real
 
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
-RUNAWAY = 20.0  # a signal that many times as large as another has run away from it
-STILL, BAND = 1e-3, 0.05  # a signal that moves less than that part of its size is still, and shown in such a band
+RUNAWAY = 20.0  # a signal this many times as large as another has run away from it
+STILL, BAND = 1e-3, 0.05  # a signal that moves by less than this part of its size is still, and is shown in such a band
 PANELS = (
     ("Motion", "marker"),
     ("Energy", "energy"),
@@ -81,7 +81,7 @@ def _sides(case: CaseResults, verdict: Verdict) -> tuple[Result, Result]:
 
 
 def _first(views: list[dict[str, Any]]) -> int:
-    """Number of the channel to show first: of those that measure the same as the first, the one that moves most."""
+    """Number of the channel to show first: of those that measure what the first does, the one that moves most."""
     alike = [i for i, view in enumerate(views) if family(view["name"]) == family(views[0]["name"])]
     still = all(views[i]["size"] == 0.0 for i in alike)
     return max(range(len(views)) if still else alike, key=lambda i: views[i]["size"])

@@ -16,7 +16,7 @@ from crosscheck.judging.verdict import STATUSES, Verdict
 from flexmb.output.printable import printable
 
 SHOWN = 40
-# What means something to Markdown within a line: an underscore not between letters, a sign of a list at the beginning.
+# Characters with a meaning in Markdown: within a line (an underscore only beside a gap), and list signs at its start.
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
 
 
@@ -55,11 +55,11 @@ def write_summary(outcome: Outcome, file: Path) -> None:
 
 
 def write_junit(outcome: Outcome, file: Path) -> None:
-    """junit.xml: a suite a case, a test case a verdict, and one that fails for each run that is lost.
+    """junit.xml: one suite for each case, one test for each verdict, and one failing test for each run that is lost.
 
-    Verdicts that wait for a lost run are skipped: its failure stands for them.
+    Verdicts that need a lost run are skipped, because the failing test of that run stands for them.
 
-    What is worse than recorded says so in its output, and fails where that is asked for.
+    A verdict that is worse than recorded says so in its output, and fails if the session is strict.
     """
     suites = ElementTree.Element("testsuites", name="crosscheck")
     for case, verdicts in outcome.verdicts.items():
@@ -84,13 +84,13 @@ def write_junit(outcome: Outcome, file: Path) -> None:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
         test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
         ElementTree.SubElement(test, "failure", type="nothing", message=outcome.headline)
-    for element in suites.iter():  # XML has no way to write most control characters: they are written out
+    for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
         element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
     ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
 
 
 def _complaint(outcome: Outcome, verdict: Verdict) -> str:
-    """What a strict session has against a verdict that is as expected."""
+    """Why a strict session rejects a verdict that is as expected."""
     if not outcome.strict or not verdict.ok:
         return ""
     if verdict.worse:
@@ -118,7 +118,7 @@ def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bo
 
 
 def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -> list[str]:
-    """A section with a row for each verdict, as far as they are shown; nothing if there are none."""
+    """A section with a row for each verdict, up to the number that is shown; nothing if there are none."""
     if not verdicts:
         return []
     lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
@@ -148,7 +148,7 @@ def _role(role: str) -> str:
 
 
 def _flat(text: str) -> str:
-    """Text on one line, of which Markdown makes nothing but that text."""
+    """Text on one line, escaped so that Markdown shows just that text."""
     return MARKDOWN.sub(r"\\\g<0>", printable(" ".join(text.split())))
 
 

@@ -1,4 +1,4 @@
-"""report.html: one file that shows everything and needs nothing, no network and no engine."""
+"""report.html: one file that shows everything and needs neither network nor engine."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def _templates() -> Environment:
 
 
 def embedded(data: Any) -> Markup:
-    """Data as JSON that may stand in a script element: nothing in it looks like the end of one or of a line."""
+    """Data as JSON that is safe in a script element: nothing in it looks like the end of the element or of a line."""
     text = msgspec.json.encode(data).decode()
     for character in "<>&\u2028\u2029":
         text = text.replace(character, f"\\u{ord(character):04x}")
@@ -64,7 +64,7 @@ def embedded(data: Any) -> Markup:
 
 
 def _shown(value: Any) -> Any:
-    """What a template prints: of plain text only what prints; markup is our own."""
+    """Text as a template prints it: plain text without control characters; markup is our own."""
     return printable(value) if type(value) is str else value
 
 

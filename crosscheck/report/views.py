@@ -1,4 +1,4 @@
-"""What the report's tables show: verdicts arranged by comparison, kind of channel and pair of engines."""
+"""The tables of the report: verdicts arranged by comparison, kind of channel and pair of engines."""
 
 from __future__ import annotations
 
@@ -112,7 +112,7 @@ def conservation_table(verdicts: list[Verdict]) -> Table | None:
 
 
 def control_table(verdicts: list[Verdict]) -> Table | None:
-    """Negative controls, the channels that must notice them beneath."""
+    """Negative controls; beneath them the channels that must notice them."""
     if not verdicts:
         return None
     groups: dict[str, list[Verdict]] = {}
@@ -148,7 +148,7 @@ def _cells(columns: Iterable[str], group: list[Verdict], column: Callable[[Verdi
 
 
 def _cell(group: list[Verdict]) -> Cell:
-    """Summary of some verdicts: the gravest unexpected one counts, else the gravest."""
+    """Summary of some verdicts by the gravest unexpected one, or else by the gravest."""
     if not group:
         return EMPTY
     bad = [verdict for verdict in group if not verdict.ok]
@@ -174,7 +174,7 @@ def _cell(group: list[Verdict]) -> Cell:
 
 
 def _reason(verdict: Verdict) -> str:
-    """Why, and what was accepted."""
+    """The reason of a verdict, and the accepted figures."""
     if verdict.worse:
         return f"{verdict.reason}; worse than recorded: {verdict.worse}"
     if verdict.accepted is None:

@@ -1,10 +1,10 @@
 """Speed against accuracy: the error of every engine, variant and effort in one observable, against wall time.
 
-One chart has one reference for all: the most certain result of its reference variant, of an engine that represents the
-scene exactly if there is one; where several are as certain within a factor `RESOLVED`, that of the engine named first.
-The error of a run is its largest distance from the reference over the run, relative to the reference's range. The
-reference cannot judge errors below its own uncertainty; its own finest run is shown at that uncertainty. Runs that
-failed have no error and are kept as such.
+One chart has one reference for all: the most certain result of its reference variant, if possible of an engine that
+represents the scene exactly. Among results that are equally certain within a factor `RESOLVED`, it is that of the
+engine named first. The error of a run is its largest distance from the reference over the run, relative to the
+reference's range. The reference cannot judge errors below its own uncertainty; its own finest run is shown at that
+uncertainty. Runs that failed have no error and are kept as such.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from crosscheck.library.case import Chart
 from crosscheck.records.kinds import RunRecord
 from flexmb.run.channels import distance, signal_range
 
-RESOLVED = 2.0  # estimates of U are no better than that
+RESOLVED = 2.0  # estimates of U are no more accurate than this factor
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ def _point(run: RunRecord, observable: str, reference: Result, scale: float, dou
 
 
 def _with_front(points: list[Point], doubt: float) -> list[Point]:
-    """The points by wall time, those marked `best` than which no faster one is as accurate as far as can be told."""
+    """The points by wall time; a point is marked `best` if no faster one is known to be as accurate."""
     smallest = np.inf
     marked = []
     for point in sorted(points, key=lambda point: point.wall_s):

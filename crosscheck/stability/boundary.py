@@ -1,4 +1,4 @@
-"""Does a map's boundary lie where the overlay has it? Agreement is within one cell of the finest size."""
+"""Does a map's boundary lie where the overlay has it? It agrees within one cell of the finest size."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ WRONG, NO_EVIDENCE = -1, -2  # instead of the number of a class
 class MapVerdict(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The judgement of a map.
 
-    `status`: "agree", "differ", or "did not run" where cells did not or none says anything. `distance` is the largest
-    distance, in cells of the finest size, from a place to the nearest that the overlay puts into its class and back
-    (-1: there is none).
-    `worst` says where that is. `cells` counts cells by class or status.
+    `status`: "agree", "differ", or "did not run" where some cells did not run or none is evidence. `distance`, in cells
+    of the finest size, is the largest distance between a place and the nearest place to which the overlay gives the
+    same class, in both directions (-1: there is none). `worst` says where that is. `cells` counts cells by class or
+    status.
     """
 
     map: str
@@ -72,7 +72,7 @@ def judge(what: StabilityMap, mesh: Mesh, records: dict[Cell, CellRecord]) -> Ma
 
 
 def measured_class(what: StabilityMap, record: CellRecord) -> int:
-    """Number of a cell's class; `WRONG` where it has none, `NO_EVIDENCE` where that says nothing."""
+    """Number of a cell's class; `WRONG` where it has none, `NO_EVIDENCE` where having none means nothing."""
     if record.status == "measured":
         return what.kind(record.value) if record.value is not None and math.isfinite(record.value) else WRONG
     if record.status == "did not finish" and what.skips:
@@ -81,15 +81,17 @@ def measured_class(what: StabilityMap, record: CellRecord) -> int:
 
 
 def label(what: StabilityMap, record: CellRecord) -> str:
-    """What a cell is called and coloured by: its class, or its status where there is no value."""
+    """The name by which a cell is coloured: its class, or its status where there is no value."""
     if record.status == "measured" and record.value is not None and math.isfinite(record.value):
         return what.kinds[what.kind(record.value)].name
     return record.status
 
 
 def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Of each place: how far it is, in cells, from where its class is expected, and its expected class from where it
-    was measured; whichever is more. With a bound, only how far it is from where so high a class is allowed."""
+    """For each place, in cells, the larger of two distances: to the nearest place where its class is expected, and from
+    its expected class to the nearest place where that was measured. With a bound, only the distance to the nearest
+    place where so high a class is allowed.
+    """
     worst = np.zeros(measured.shape, np.intp)
     if what.overlay.bound:
         for kind in range(len(what.kinds)):
@@ -103,7 +105,7 @@ def _distances(what: StabilityMap, measured: NDArray[np.intp], expected: NDArray
 
 
 def _to(wanted: NDArray[np.bool_], what: StabilityMap) -> NDArray[np.intp]:
-    """Distance of every place from the nearest wanted one, diagonals counting one; never across categories."""
+    """Distance of every place from the nearest wanted one; a diagonal step counts one; never across categories."""
     if what.y.categories or what.x.categories:
         lines = wanted.T if what.y.categories else wanted
         found = np.array([_chessboard(line[None])[0] for line in lines])

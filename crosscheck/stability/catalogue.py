@@ -1,4 +1,4 @@
-"""All stability maps by name: every module in `maps` has them as `MAPS`."""
+"""All stability maps by name; every module in `maps` lists its own as `MAPS`."""
 
 from __future__ import annotations
 

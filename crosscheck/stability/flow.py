@@ -1,7 +1,7 @@
-"""The flow of a scene near a motion, by runs: growth of small disturbances, and amplitudes over long times.
+"""The flow of a scene near a motion, found by runs: growth of small disturbances, and amplitudes over long times.
 
-A disturbance of size `SIZE` of each chosen coordinate or speed is followed through a time; what comes back is, to
-SIZE^2 and to rounding over SIZE, the transition matrix of the linearised motion; its eigenvalues are Floquet's
+Each chosen coordinate or speed is disturbed by `SIZE` and followed for some time. The disturbances at the end give the
+transition matrix of the linearised motion, up to SIZE^2 and to rounding over SIZE. Its eigenvalues are Floquet's
 multipliers if that time is a period.
 """
 
@@ -25,7 +25,7 @@ MAX_STEPS = 1_000_000
 
 
 class StoppedError(ArithmeticError):
-    """A run that did not reach its end; `status` says why."""
+    """A run did not reach its end; `status` says why."""
 
     def __init__(self, status: Status) -> None:
         super().__init__(status.advice)
@@ -44,7 +44,7 @@ def flow(system: System, start: Real, time: float) -> Real:
 
 
 def transition_matrix(system: System, places: Sequence[int], time: float) -> Real:
-    """(n,n): how disturbances of the states at `places` of the scene's motion have changed after `time` (s)."""
+    """(n,n): the change of disturbances of the states at `places` of the scene's motion after `time` (s)."""
     start = pack(system.initial_state)
     columns = []
     for place in places:

@@ -1,4 +1,4 @@
-"""What a stability map is: one family of scenes with two parameters, one quantity, two named axes, one overlay."""
+"""The definition of a stability map: one family of scenes with two parameters, one quantity, two axes, one overlay."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from flexmb.typing import Real
 CellStatus = Literal["measured", "failed", "did not finish", "did not run"]
 
 NO_PREDICTION = -3  # instead of the number of a class
-STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours for the classes of maps that ask nothing but that
+STABLE, UNSTABLE = "#9ecae1", "#f4a582"  # colours of maps that ask only whether a motion is stable
 DIGITS = ("#08519c", "#4292c6", "#9ecae1", "#fdae6b", "#e6550d")  # from many digits to few
 
 
 class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """A parameter from `low` to `high` in `cells` coarse cells, equal in its logarithm if `log`.
 
-    With `categories` it is one row of cells for each of them, which are not divided, and its values are 0, 1, 2 ...
+    With `categories` there is one row of cells for each of them. They are not divided, and their values are 0, 1, 2 ...
     """
 
     name: str
@@ -67,7 +67,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 @dataclass(frozen=True)
 class Outcome:
-    """What was found in a cell: the quantity's value, or that and why there is none."""
+    """The result of a cell: the value of the quantity, or the status and reason why there is none."""
 
     value: float = np.nan
     status: CellStatus = "measured"
@@ -87,8 +87,8 @@ class Overlay:
     """The boundary known from elsewhere: where `predict(x, y)` (arrays of one shape) passes `levels`.
 
     Below the first level the first class is expected, and so on: as many levels as the map has thresholds. A `bound`
-    says only what the quantity does not exceed: classes below the expected one are right too. `source` names the
-    theory or the publication.
+    only says what the quantity does not exceed, so that classes below the expected one are right too. `source` names
+    the theory or the publication.
     """
 
     name: str
@@ -109,8 +109,8 @@ class StabilityMap:
 
     `scene(x, y)` is the family, `measure(scene, x, y)` finds the quantity in one member; the classes `kinds` lie
     between the `thresholds` (increasing, one fewer). `depth` halvings are made where class or status changes. A cell
-    that `failed` counts as class number `failure` in the comparison with the overlay; without one no failure is right.
-    Where `skips`, cells that did not finish are no evidence. `shows` is for the gallery.
+    that `failed` counts as class number `failure` in the comparison with the overlay; if `failure` is not given, every
+    failed cell is wrong. With `skips`, cells that did not finish are no evidence. `shows` is the text of the gallery.
     """
 
     name: str

@@ -1,4 +1,4 @@
-"""Records of maps: one line for the machine, one for the map, one for each cell, written as they come."""
+"""Records of maps: one line for the machine, one for the map and one for each cell, each written when it is known."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ RECORDING = ("crosscheck.stability.map", "crosscheck.stability.run")  # a part o
 
 
 class MapRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="map"):
-    """A map as it was run. `identity` changes with its definition: then earlier cells are not its own any more."""
+    """A map as it was run. `identity` changes with its definition, and cells of another identity do not count."""
 
     map: str
     identity: str
@@ -28,7 +28,7 @@ class MapRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields
 
 
 class CellRecord(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="cell"):
-    """What was found in one cell (`Cell`) of the map of that identity, at its middle x, y."""
+    """The result of one cell (`Cell`) of the map of that identity, at its middle x, y."""
 
     identity: str
     level: int
@@ -51,18 +51,18 @@ Record = Written | BrokenLine
 
 
 def identity(what: StabilityMap) -> str:
-    """A digest of the map's axes and of all that its cells can depend on: sources, libraries, machine (`made_by`)."""
+    """A digest of the map's axes and of everything its cells depend on: sources, libraries, machine (`made_by`)."""
     code = made_by({what.scene.__module__, what.measure.__module__}, RECORDING)
     text = f"{what.name} {what.x} {what.y} {code}"
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def read(file: Path) -> list[Record]:
-    """All records of a file, in order; lines that are none are a BrokenLine, and their cells are asked for again."""
+    """All records of a file, in order; a line that is no record becomes a BrokenLine, and its cell is run again."""
     return decoded_lines(file, Written)
 
 
 def cells_of(records: Sequence[Record], wanted: str) -> dict[Cell, CellRecord]:
-    """Cells recorded for the map of one identity; those that did not run are asked for again."""
+    """Cells recorded for the map of one identity, without those that did not run, which are run again."""
     found = [each for each in records if isinstance(each, CellRecord) and each.identity == wanted]
     return {record.cell: record for record in found if record.status != "did not run"}

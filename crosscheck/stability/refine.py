@@ -34,7 +34,7 @@ class Mesh:
         return float(self.x.centres(cell.level)[cell.i]), float(self.y.centres(cell.level)[cell.j])
 
     def settle(self, found: Iterable[tuple[Cell, str]]) -> list[Cell]:
-        """Take labels of waiting cells; once none waits, halve where neighbours differ. Returns the new cells."""
+        """Give labels to waiting cells; once none waits, halve cells whose neighbours differ. Returns the new cells."""
         for cell, label in found:
             self.waiting.remove(cell)
             self.labels[cell] = label
@@ -48,7 +48,7 @@ class Mesh:
         return new
 
     def painted(self) -> tuple[Index, list[Cell]]:
-        """Which cell covers each place of the finest grid: numbers (columns, rows) into the list of cells."""
+        """Number, in the list of cells, of the cell that covers each place of the finest grid (columns, rows)."""
         cells = list(self.labels)
         number = np.full((self.x.count(self.depth), self.y.count(self.depth)), -1, dtype=np.intp)
         for k, cell in enumerate(cells):
@@ -62,7 +62,7 @@ class Mesh:
         return 1 if self.x.categories else factor, 1 if self.y.categories else factor
 
     def _at_changes(self) -> list[Cell]:
-        """Cells above the finest size with a neighbour of another label across an axis that is not of categories."""
+        """Cells above the finest size with a neighbour of another label; neighbours across categories do not count."""
         number, cells = self.painted()
         names = {label: n for n, label in enumerate(set(self.labels.values()))}
         kind = np.array([names[self.labels[cell]] for cell in cells])[number]

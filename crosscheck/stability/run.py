@@ -1,4 +1,4 @@
-"""Running a map: coarse cells first, then those that refinement asks for, recorded as they come; resumable."""
+"""Running a map: coarse cells first, then those that refinement asks for; each is recorded, so a run can be resumed."""
 
 from __future__ import annotations
 
@@ -59,8 +59,8 @@ def run_map(
     """Run one map of the provider to `depth` halvings (default: its own) and append to the file `records`.
 
     Cells already recorded by the same sources are kept unless `fresh`. A cell that takes longer than the `limits` allow
-    is stopped; it did not run, as far as the map is concerned, which asks for it again.
-    `listener` hears how many cells of those known so far are done. Raises KeyError where there is no such map.
+    is stopped; for the map it did not run, and the next run asks for it again. `listener` is told how many of the cells
+    known so far are done. Raises KeyError where there is no such map.
     """
     what = maps_of(provider)[name]
     mesh = Mesh(what.x, what.y, what.depth if depth is None else depth)
@@ -76,7 +76,7 @@ def run_map(
         jobs = list[CellJob]()
 
         def ask(cells: Sequence[Cell]) -> None:
-            """Take from the records what is there, and send for the rest; refine further if nothing is left."""
+            """Take recorded cells and submit the others; refine further once none is left."""
             while cells:
                 here = [known[cell] for cell in cells if cell in known]
                 new = [cell for cell in cells if cell not in known]
@@ -111,7 +111,7 @@ def maps_of(provider: str) -> dict[str, StabilityMap]:
 
 
 def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
-    """What a worker does with a cell: nothing a map raises is lost."""
+    """The work of a worker on a cell: whatever a map raises is recorded."""
     begin = process_time()
     try:
         outcome = maps_of(job.provider)[job.map].outcome(job.x, job.y)
@@ -133,7 +133,7 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
 
 
 def _cut_short(job: CellJob, event: Event) -> CellRecord:
-    """A cell whose process died, or was stopped at a limit, says nothing about a method: it did not run."""
+    """A cell whose process died or was stopped at a limit is no evidence about a method: it did not run."""
     return CellRecord(
         identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,
         status="did not run", message=event.content,

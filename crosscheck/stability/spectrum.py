@@ -16,7 +16,7 @@ from flexmb.typing import Real
 def linearised(system: System, places: Sequence[int]) -> Real:
     """Rows and columns `places` of the derivative of d[q, u]/dt at the initial state of the scene.
 
-    `places` must be closed: what they do not name (angles about a spin, positions) has no effect on them.
+    `places` must be closed: states that they do not name (angles about a spin, positions) must not affect them.
     """
     y = pack(system.initial_state)
     J = np.empty((len(y), len(y)))

@@ -18,7 +18,8 @@ VERDICTS = "maps.json"
 def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
     """The verdicts as a JSON file; those of other maps that it holds already are kept.
 
-    A file that holds something else is set aside as `<file>.broken`, with a warning: what was run is not lost for it.
+    A file with other content is set aside as `<file>.broken`, with a warning, so that the verdicts can still be
+    written.
     """
     try:
         known = {verdict.map: verdict for verdict in read_verdicts(file)} if file.exists() else {}
@@ -32,7 +33,7 @@ def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
 
 
 def read_verdicts(file: Path) -> list[MapVerdict]:
-    """What `write_verdicts` wrote. OSError, or ValueError naming the file."""
+    """The verdicts that `write_verdicts` wrote. Raises OSError, or ValueError naming the file."""
     text = file.read_bytes() if regular_size(file) else b""
     try:
         return msgspec.json.decode(text, type=list[MapVerdict])

@@ -8,7 +8,7 @@ from flexmb.output.printable import printable
 
 
 def words(text: str, style: str = "") -> Text:
-    """Text as it stands, brackets and colons too: only `Text` is safe from rich's markup and emoji."""
+    """Text shown literally, with brackets and colons: only `Text` is safe from rich's markup and emoji."""
     return Text(printable(text), style)
 
 

@@ -1,9 +1,9 @@
 """Which model of every flexible body, and which method, are good enough for what the user wants to know?
 
-`advise` answers with evidence. `quantity`: what matters, and its error. `models`, `ladder`: the rungs of every body,
-scene to scene, with predicted error and cost. `response`, `contribution`, `indicators`: the predictions, from one run
-of the rigid scene. `bench`, `confirm`: runs, their errors against the finest models, their counted cost. `search`: the
-walk. `verdict`: all that in a terminal.
+`advise` answers with evidence. `quantity` says what the user cares about and measures its error. `models` and `ladder`
+list the rungs of every body with their predicted error and cost. `response`, `contribution` and `indicators` predict,
+from one run of the rigid scene. `bench` and `confirm` run models and measure their error against the finest models and
+their cost in operations. `search` walks the ladder. `verdict` prints the result in a terminal.
 """
 
 from flexmb.advisor.advice import Advice as Advice

@@ -22,11 +22,11 @@ from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 
 BUDGET = 4e10
-"""Operations that the walk's runs may take before the walk down ends; about 20 s."""
+"""The walk down ends when the runs of the walk have taken this many operations (about 20 s)."""
 REFERENCE = 1e10
-"""Operations that one reference may be expected to cost."""
+"""A reference that is predicted to cost more operations than this is not run."""
 STIRRED = 1e-3
-"""Of the tolerance: families of modes that add less than that are not excited."""
+"""A family of modes that adds less than this part of the tolerance counts as not excited."""
 
 
 @dataclass(frozen=True)
@@ -52,12 +52,13 @@ class BodyAdvice:
 
 @dataclass(frozen=True)
 class Advice:
-    """What to simulate, and how it is known.
+    """What to simulate, and how this is known.
 
-    If `accepted`: `bodies`, `method`, the reduced `scene`; errors as parts of the scale of `quantities`: `predicted`,
-    and `measured` over the whole horizon by the chosen method, with the reference's `uncertainty` in it; operations of
-    the run `predicted_operations` and counted `operations`; `seconds` of integration, which nothing depends on.
-    Else `refusal` says why no model is known to be adequate. `trials`: every model that was run. `notes`: what else.
+    If `accepted`, it has `bodies`, `method` and the reduced `scene`. Errors are parts of the scale of `quantities`: the
+    `predicted` one, and the one `measured` over the whole horizon by the chosen method, which includes the reference's
+    `uncertainty`. Operations of the run are `predicted_operations` and the counted `operations`; `seconds` of
+    integration are shown but decide nothing. Otherwise `refusal` says why no model is known to be adequate. `trials`
+    lists every model that was run, `notes` further remarks.
     """
 
     name: str
@@ -132,10 +133,10 @@ def advise(
 
 @dataclass(frozen=True)
 class Prepared:
-    """A question with what is predicted before any candidate runs.
+    """A question together with what is predicted before any candidate runs.
 
-    `known`: indicators by body, none where the rigid scene does not run; `cost` and `hidden` as for `Confirmation`;
-    `ladders`: by body, its steps; `notes`: why there are no indicators.
+    `known`: the indicators of each body, empty where the rigid scene does not run; `cost` and `hidden` as for
+    `Confirmation`; `ladders`: the steps of each body; `notes`: why there are no indicators.
     """
 
     bench: Bench
@@ -147,7 +148,7 @@ class Prepared:
     notes: tuple[str, ...]
 
     def confirmation(self) -> Confirmation:
-        """The measurements, references run. Raises NoReference."""
+        """The measurements; this runs the references. Raises NoReference."""
         return Confirmation(self.bench, self.tolerance, self.hidden, self.cost, REFERENCE)
 
 
@@ -171,7 +172,7 @@ def prepare(
 
 
 def _indicators(base: RigidRun, scene: Scene, wanted: tuple[Quantity, ...]) -> dict[str, Indicators]:
-    """Of every flexible body, by name. Where a quantity stands still as long as bodies are rigid, its size is 1 SI."""
+    """Of every flexible body, by name. A quantity that does not change in the rigid run has the scale 1 (SI)."""
     signals = measured(wanted, base.own())
     try:
         scale = scales(wanted, signals)

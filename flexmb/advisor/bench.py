@@ -1,8 +1,8 @@
-"""Runs of models by methods, each made once: their signals, their error and their cost in counted operations.
+"""Runs of models by methods, each made only once: their signals and their cost in counted operations.
 
-Costs decide, so they are counted, not timed: the operations of one evaluation of the model's accelerations, with those
-of its closures (`flexmb.jit.counting`), times the evaluations of the run. Advice is the same on every machine; times
-are shown beside.
+Costs decide, so they are counted and not timed: the operations of one evaluation of the model's accelerations, closures
+included (`flexmb.jit.counting`), times the evaluations of the run. So advice is the same on every machine. Times are
+only shown.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from flexmb.tables.status import Status
 SAMPLES = 401
 MAX_STEPS = 400_000
 AROUND = 4e8
-"""What compiling a model and evaluating the output of its run take (0.2 s), as operations."""
+"""Time to compile a model and to evaluate the output of its run (0.2 s), expressed in operations."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ class Bench:
     def __init__(self, scene: Scene, t_end: float, wanted: tuple[Quantity, ...], samples: int = SAMPLES) -> None:
         self.scene, self.t_end, self.wanted = scene, t_end, wanted
         self.times = np.linspace(0.0, t_end, samples)
-        self.spent = 0.0  # operations of all runs and of what is around them
+        self.spent = 0.0  # operations of all runs, compilation and output included
         self._systems: dict[Model, System | str] = {}
         self._outcomes: dict[tuple[Model, Method], Outcome] = {}
         self._operations: dict[tuple[Model, Algorithm], int] = {}
@@ -64,7 +64,7 @@ class Bench:
         if model not in self._systems:
             try:
                 system = compile(built(self.scene, model))
-                _ = system.initial_state  # of a closed chain: sought here
+                _ = system.initial_state  # a closed chain may have none
                 self._systems[model] = system
             except (ClosureError, ValueError, NotImplementedError) as error:
                 self._systems[model] = str(error)
@@ -100,7 +100,7 @@ class Bench:
         steps = steps_within(method, each, most)
         try:
             done = simulated(system, self.times, method, min(steps, MAX_STEPS))
-        except ClosureError as error:  # nothing of it moves
+        except ClosureError as error:  # a mechanism that cannot move
             return Outcome({}, str(error), 0, 0.0, 0.0)
         cost = done.statistics
         return Outcome(

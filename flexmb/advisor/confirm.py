@@ -1,10 +1,10 @@
-"""Errors that were measured: candidates against the finest models that can be run, integration errors by refinement.
+"""Measured errors: candidates against the finest models that can be run, integration errors by refinement.
 
-The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. What they
-differ by is the uncertainty U of the finer; where differences of pieces and half pieces are seen to fall by a factor of
-1/r > 2, what is left of the geometric series, r/(1 - r) of the last, r no less than 1/4. What ten times tighter
-integration changes is part of U. A candidate is adequate if its distance to that one, plus U, plus what its integrator
-adds, is within the tolerance: the triangle inequality, no luck.
+The references are run from coarse to fine until two successive ones agree within a quarter of the tolerance. Their
+difference is the uncertainty U of the finer one. Where halving the pieces is seen to shrink the difference by a ratio r
+< 1/2, U is the rest of the geometric series instead: r/(1 - r) times the last difference, with r taken as 1/4 at least.
+The change under ten times tighter integration is part of U. A candidate is adequate if its distance to the finest
+reference, plus U, plus the error of its integrator, is within the tolerance: that is the triangle inequality.
 """
 
 from __future__ import annotations
@@ -20,21 +20,21 @@ from flexmb.advisor.models import Model
 from flexmb.advisor.quantity import Signals, error, scales
 
 AGREED = 0.25
-"""Of the tolerance: two references that differ by less are good enough."""
+"""Two references are good enough if they differ by less than this part of the tolerance."""
 SECOND_ORDER = 0.25
-"""Least ratio of successive differences that is believed: halved pieces converge by the second order at least."""
+"""The ratio r of successive differences counts as this at least: that of order 2, the least of halved pieces."""
 MOST = 0.5
-"""Of the tolerance: with an uncertainty beyond that nothing can be told."""
+"""With an uncertainty above this part of the tolerance, no candidate can be judged."""
 FINE, TIGHTER, LOOSEST = 1e-3, 0.1, 1e-5
-"""Relative tolerance that counts as fine, of the tolerance at first, then tightened by that; and at most."""
+"""Relative tolerance of a fine run: first this part of the tolerance, then tightened by this factor; never looser."""
 INTEGRATION, ROOM = 0.1, 0.05
-"""Of the tolerance: the most that the references' own integration may be off; what a model leaves the integrator."""
+"""Parts of the tolerance: the largest integration error of a reference; what a model must leave to its method."""
 FEW = 1000
-"""Evaluations: where the fine run takes fewer, methods that linearise are not tried."""
+"""Methods that linearise are not tried where the fine run takes fewer evaluations than this."""
 
 
 class NoReference(ValueError):
-    """Nothing that is known to be right can be run: the message says why."""
+    """No model that is known to be right can be run; the message says why."""
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,9 @@ class Confirmation:
     """Measures errors on a bench, relative to references that it finds first."""
 
     def __init__(self, bench: Bench, tolerance: float, hidden: float, cost: Cost, budget: float) -> None:
-        """hidden: predicted error of what no reference can show; cost: predictions; budget: the most operations
-        that one reference may be expected to cost."""
+        """`hidden`: predicted error that no reference can show; `cost`: predictions; `budget`: operations that one
+        reference may be predicted to cost at most.
+        """
         self.bench, self.tolerance, self.cost = bench, tolerance, cost
         self.fine, self.drift = min(FINE * tolerance, LOOSEST), 0.0
         self.measured: dict[Model, float] = {}
@@ -65,7 +66,7 @@ class Confirmation:
         return self.bench.run(model, self.finely(model))
 
     def finely(self, model: Model) -> Method:
-        """A method whose error does not count."""
+        """The method of fine runs, whose own error does not matter."""
         return Method("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
 
     def error(self, model: Model) -> float:
@@ -100,8 +101,9 @@ class Confirmation:
     def cheapest_method(self, model: Model) -> Method:
         """The method with the fewest operations whose error fits beside the model's.
 
-        In the ladder of every integrator, loose to tight, the first that fits and whose successor fits as well. A
-        ladder ends where it costs more than what was found: tighter costs more still.
+        In the ladder of every integrator, from loose to tight, it takes the first method that fits and whose successor
+        fits as well. A ladder ends where a method costs more than the best one found, because tighter ones cost even
+        more.
         """
         room = self.tolerance - self.error(model)
         scene, algorithm = self.bench.scene, self.bench.algorithm(model)
@@ -158,7 +160,7 @@ class Confirmation:
         if last is None:
             models = "the finest models of this scene do not run" if len(known) > 1 else "this does not run"
             raise NoReference(f"{models} to the end: {'; '.join(history)}")
-        if len(known) == 1:  # rigid bodies, or raw ones that have the modes they have
+        if len(known) == 1:  # only rigid bodies, or raw ones, which have no finer model
             last = replace(last, uncertainty=hidden + self.drift)
         if last.uncertainty > MOST * self.tolerance:
             alone = [f"{last.name} alone can be run"] if np.isinf(last.uncertainty) else []
@@ -166,7 +168,7 @@ class Confirmation:
         return last
 
     def _refine(self, model: Model) -> None:
-        """Tighten what counts as fine until ten times tighter changes the reference by less than its share: `drift`."""
+        """Tighten fine runs until ten times tighter ones change the reference by less than its share; sets `drift`."""
         while self.fine > FINEST:
             coarse, method = self.run(model), self.finely(model)
             tighter = self.bench.run(model, replace(method, value=max(FINEST, TIGHTER * self.fine)))

@@ -1,8 +1,8 @@
-"""What each mode of a body adds to a quantity, to first order, on top of the rigid scene's run.
+"""The contribution of each mode of a body to a quantity, to first order, on top of the rigid scene's run.
 
-Markers on the body and outboard of it are carried by the deflection of its nodes; loads of hinges inboard of it lose
-the inertia of what moves elastically; a freely flying scene recoils so that its momentum stays. Where the first order
-says nothing (wheels' loads, work) the contribution is zero.
+The deflection of the nodes carries markers on the body and outboard of it. The loads of hinges inboard of it change by
+the inertia of the elastic motion. A freely flying scene recoils so that its momentum stays. Where the first order says
+nothing (loads of wheels, work) the contribution is zero.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Predicted error of a rung: what its body would leave out, from one run of the rigid scene and no other.
+"""Predicted error of a rung, that is of the effects its body would leave out, from a single run of the rigid scene.
 
 Every figure is a part of the quantity's scale. With the modal response to the rigid motion (`response`) they are:
 
@@ -33,16 +33,16 @@ from flexmb.typing import Real
 
 _TINY = np.finfo(float).tiny
 SEGMENT_ERROR = 4.5
-"""Of the response, over n^2: phase error of the first modes of a chain of n segments after some periods."""
+"""Phase error of the first modes of a chain of n segments after some periods: this part of the response over n^2."""
 
 
 STRAIGHT = 0.1
-"""Of the response: how far a straight rigid body on the best hinge is from the bent one that moves alike."""
+"""Distance between a straight rigid body on the best hinge and the bent body it stands for, as part of the response."""
 
 
 @dataclass(frozen=True)
 class Indicators:
-    """What the rigid run says of one body. Ratios have no unit.
+    """The prediction of the rigid run for one body. Ratios have no unit.
 
     `flexibility`: error of the rigid body, part of the scale; `static`, `dynamic` (m,): what each mode adds at most,
     and what it adds beyond its quasi-static deflection; `stiffening`: largest |kappa| of the lowest modes;
@@ -117,7 +117,7 @@ def predicted(rung: Rung, body: Indicators) -> float:
     chosen = np.isin(body.family, [FAMILIES.index(name) for name in rung.families if name in FAMILIES])
     among = chosen if rung.families else np.ones(len(body.static), dtype=bool)
     kept = among & (np.cumsum(among) <= rung.modes)
-    if rung.static:  # the shapes of tip force and moment stand for two more modes of a family, and for what lags none
+    if rung.static:  # the static shapes of a family stand for two more modes, but follow without delay
         kept = among & (np.cumsum(among) <= rung.modes + 2 * len(set(body.family[among].tolist())))
     left = np.where(among & rung.static, body.dynamic, body.static)
     return float(left[~kept].sum()) + of_level(rung.level, body)
@@ -166,7 +166,7 @@ def _geometric(response: Response) -> Real:
 
 
 def _like_a_cantilever(response: Response) -> Real:
-    """|kappa| (T,1) of a raw body, whose slopes nobody knows: as if it were a uniform cantilever of its length.
+    """|kappa| (T,1) of a raw body, whose slopes are unknown, taken as that of a uniform cantilever of the same length.
 
     Of its first mode: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by a force at the tip, all
     taken as if along it.
@@ -205,5 +205,5 @@ def _length(model: FlexibleModel) -> float:
 def _mismatch(scene: Scene, body: str) -> float:
     try:
         return coupling_error(appendage_of(scene, body), fitted_hinge(scene, body))
-    except ValueError:  # not an appendage, or nothing that a hinge can follow
+    except ValueError:  # not an appendage, or no mode that a hinge can follow
         return np.inf

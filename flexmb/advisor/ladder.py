@@ -18,9 +18,9 @@ from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
 from flexmb.scene.schema import Scene
 
 LEVEL_COST = {"rigid": 1.0, "ruthless": 1.0, "linear": 1.25, "full": 1.4, "stiffened": 1.8}
-"""Operations of a body against a ruthless one, counted with four modes."""
+"""Operations of a body relative to a ruthless one, counted with four modes."""
 STEP_AT_HIGHEST = 3.4
-"""Step of DOP853 times the highest frequency, where that is what limits it (measured)."""
+"""Step of DOP853 times the highest frequency, where that frequency limits the step (measured)."""
 STAGES = 12
 ZIGZAG = 6.93
 """Highest frequency of a chain of n rigid segments: sqrt(48) n^2 sqrt(EI / (m L^4)), neighbours turning against each
@@ -40,15 +40,16 @@ class Step:
 
 @dataclass(frozen=True)
 class Cost:
-    """Predicted operations of a run to `t_end` (s): `rigid` for each evaluation of the bodies that are rigid anyway,
-    and no fewer evaluations than the `slow` that the rigid scene needs."""
+    """Predicted operations of a run to `t_end` (s). `rigid`: operations of one evaluation of the bodies that are rigid
+    in the scene; `slow`: evaluations that the rigid scene needs, which no run falls below.
+    """
 
     t_end: float
     rigid: float
     slow: int
 
     def of(self, steps: Iterable[Step]) -> float:
-        """Of the scene with these rungs for its flexible bodies."""
+        """Predicted operations of the scene with these rungs for its flexible bodies."""
         each, fastest = self.rigid, 0.0
         for step in steps:
             each, fastest = each + step.operations, max(fastest, step.fastest)
@@ -78,11 +79,11 @@ def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> t
 
 
 def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
-    """Models that every candidate is measured against, coarse to fine; two successive ones say how sure they are.
+    """Models that every candidate is measured against, coarse to fine; two successive ones show how certain they are.
 
     First all bodies with the modes that the scene gives them, and four more where it has no static shapes; then beams
-    in pieces, which converge to the geometrically exact beam. A raw body has its own modes and no more; a beam that
-    starts bent is not taken apart, but gets four more modes, and again four.
+    in pieces, which converge to the geometrically exact beam. A raw body has no other modes than its own. A beam that
+    starts bent is not taken apart; it gets four more modes, then another four.
     """
     bodies = flexible_bodies(scene)
     bent = {state.body for state in scene.modal_states}
@@ -118,7 +119,7 @@ def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:
 
 
 def cost(scene: Scene, t_end: float, slow: int) -> Cost:
-    """What is known of the cost before any rung is chosen."""
+    """The part of the cost that is known before any rung is chosen."""
     rigid = len(scene.bodies) + len(scene.point_masses) - len(flexible_bodies(scene))
     return Cost(t_end, float(articulated([0] * rigid).total), slow)
 
@@ -140,7 +141,7 @@ def _mode_count(body: Body) -> int:
 
 
 def _fastest(body: Body, rung: Rung, parts: list[Body]) -> float:
-    """Highest frequency (rad/s) of what a body became."""
+    """Highest frequency (rad/s) of the bodies that a rung makes of one body."""
     if rung.kind == "segments" and isinstance(body, BeamBody):
         return ZIGZAG * rung.pieces**2 * _beam_rate(body)
     return max(

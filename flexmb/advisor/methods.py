@@ -25,14 +25,14 @@ ADAPTIVE = frozenset({"dop853", "radau5", "exponential"})
 COMPLEX = 4
 """Operations of an evaluation in complex numbers against one in real ones."""
 EVALUATIONS = {"dop853": 11, "rk4": 4}
-"""Of a step, at least; of methods that linearise: 1."""
+"""Evaluations of a step, at least; methods that linearise take 1."""
 FACTORS = {"radau5": (10.0 / 3.0, 10.0), "exponential": (40.0, 10.0), "generalised_alpha": (2.0 / 3.0, 2.0)}
-"""Times n^3 for each factorisation (a real and a complex matrix; an exponential; a real one), n^2 for an evaluation."""
+"""Operations over n^3 a factorisation (real and complex; exponential; real), over n^2 for each evaluation."""
 
 
 @dataclass(frozen=True)
 class Method:
-    """`value` is the relative tolerance of an integrator that controls its step, else the step in s."""
+    """A way to integrate; `value` is the relative tolerance if the integrator controls its step, else the step (s)."""
 
     integrator: str
     value: float
@@ -73,8 +73,8 @@ def steps_within(method: Method, each: int, most: float) -> int:
 def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[Method, ...], ...]:
     """For each integrator its methods from loose to tight, those that linearise first.
 
-    Fixed steps are those of the frequency `highest` (rad/s), implicit ones of `slow`, what the scene does with all
-    bodies rigid. Methods that linearise are for trees, by the recursion.
+    Fixed steps follow the frequency `highest` (rad/s), those of implicit methods `slow`, the frequency of the scene
+    with all bodies rigid. Methods that linearise are for trees and the recursion only.
     """
     explicit = (
         tuple(Method("dop853", rtol, algorithm) for rtol in TOLERANCES),

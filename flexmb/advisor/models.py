@@ -1,7 +1,7 @@
-"""Models of a flexible body that a scene can choose from: scene to scene, body by body.
+"""The models that can replace a flexible body; each turns a scene into another scene.
 
-A `Rung` is one model of one body, a `Model` a rung for every flexible body. What is cheaper and what is finer is not
-known here: ladders are data.
+A `Rung` is one model of one body, a `Model` has a rung for every flexible body. Which rung is cheaper or finer is not
+decided here but in `flexmb.advisor.ladder`.
 """
 
 from __future__ import annotations
@@ -77,19 +77,19 @@ def levels(body: BeamBody | ModalBody) -> tuple[Level, ...]:
 
 
 def built(scene: Scene, model: Model) -> Scene:
-    """The scene with every body modelled as told. Raises ValueError where a rung does not fit its body."""
+    """The scene with every body modelled by its rung. Raises ValueError where a rung does not fit its body."""
     for name, rung in model:
         scene = _applied(scene, name, rung)
     return scene
 
 
 def with_rung(model: Model, name: str, rung: Rung) -> Model:
-    """The same model but for one body."""
+    """The same model with another rung for one body."""
     return tuple((each, rung if each == name else own) for each, own in model)
 
 
 def rigid(scene: Scene, name: str) -> Scene:
-    """The scene with that body at level "rigid": one word changed, and its modal state left out."""
+    """The scene with that body at level "rigid" and without its modal state; nothing else changes."""
     bodies = tuple(replace(b, level="rigid") if b.name == name else b for b in scene.bodies)
     return replace(scene, bodies=bodies, modal_states=tuple(s for s in scene.modal_states if s.body != name))
 

@@ -1,4 +1,4 @@
-"""A flexible body with other modes: fewer or more of a beam, the lowest of raw ones; its initial state goes along."""
+"""A flexible body with other modes: fewer or more for a beam, the lowest for a raw body; its initial state is kept."""
 
 from __future__ import annotations
 
@@ -22,9 +22,9 @@ def with_modes(scene: Scene, name: str, count: int, level: Level, static: bool, 
     """The scene with `count` modes of the body `name`, at `level`.
 
     A beam gets its `count` lowest modes of `families` (its own if empty), and attachment modes if `static`; a raw body
-    the `count` lowest of the eigenmodes that its own modes contain, or its own modes if that is all of them. What the
-    modes can hold of an initial modal state is kept: its projection in the norm of kinetic energy. Raises ValueError
-    where there are not so many modes.
+    the `count` lowest of the eigenmodes that its own modes contain, or its own modes if that is all of them. An initial
+    modal state is projected onto the modes, in the norm of kinetic energy. Raises ValueError where there are not so
+    many modes.
     """
     body = next(each for each in scene.bodies if each.name == name)
     if isinstance(body, BeamBody):
@@ -61,7 +61,7 @@ def _raw(body: ModalBody, count: int, level: Level) -> ModalBody:
         return replace(body, level=level)
     mass = modal_integrals(flexible_model(body)).spatial_mass[:every, :every]
     X = eigh(arrays.stiffness, mass)[1][:, :count]
-    X = X * np.sign(X[np.argmax(np.abs(X), axis=0), np.arange(count)])  # the sign of the mode that it mostly is
+    X = X * np.sign(X[np.argmax(np.abs(X), axis=0), np.arange(count)])  # the sign of its largest part
     nodes = tuple(
         ModalNode(
             name=node.name, position_m=node.position_m, quaternion=node.quaternion,
@@ -100,7 +100,7 @@ def _nested(array: Real) -> tuple[Any, ...]:
 
 
 def _square(array: Real | None, X: Real) -> Any:
-    """What each pair of modes has, (...,m,m), in the modes X (m,k): (...,k,k)."""
+    """Values for each pair of modes (...,m,m) transformed to the modes X (m,k): (...,k,k)."""
     return None if array is None else X.T @ array @ X
 
 
@@ -114,8 +114,8 @@ def _rows(matrix: Real) -> tuple[tuple[float, ...], ...]:
 
 
 def _projected(old: BeamBody | ModalBody, new: BeamBody | ModalBody, state: ModalState) -> ModalState:
-    """The initial state in the new modes: nearest in the norm of kinetic energy."""
-    # at level full both have all the points of the elements: at stiffened each has masses of its own
+    """The initial state in the new modes that is nearest in the norm of kinetic energy."""
+    # at level full both have the points of the elements; at stiffened each would have masses of its own
     before, after = (flexible_model(replace(each, level="full")) for each in (old, new))
     onto = np.linalg.solve(_products(after, after), _products(after, before))
     rates = np.array(state.rates or [0.0] * before.mode_count)

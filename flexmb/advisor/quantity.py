@@ -1,11 +1,11 @@
-"""What the user cares about: channels of a run, and how far two runs are apart in them.
+"""The quantities that the user cares about: channels of a run, and the distance of two runs in them.
 
 A quantity names channels as in `flexmb.run.channels`: `marker:tip.position`, `marker:*.orientation`, `load:hub.torque`,
-`drive:hub`, `energy.total`; "energy" or "load:hub" names all that begin so. Its error is the largest distance of two
-runs over the output times and over its channels, relative to a scale: the one given after "@" in SI units
-(`load:hub.torque@50`), or the range of the signal, which for positions and orientations is the farthest it gets from
-its start and for everything else its largest magnitude. Where several channels of a kind are named by one word, they
-share the largest range: a marker that stays where it is cannot be wrong by more than nothing.
+`drive:hub`, `energy.total`; "energy" or "load:hub" names all channels that begin like this. Its error is the largest
+distance of two runs over the output times and over its channels, relative to a scale: the one given after "@" in SI
+units (`load:hub.torque@50`), or the range of the signal: its largest distance from its start for positions and
+orientations, its largest magnitude for everything else. Channels of one kind that are named by one word share the
+largest range, so that a marker which hardly moves is not judged relative to almost nothing.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flexmb.typing import Real
 
 Signals = dict[str, Real]
 
-_STILL = 1e-12  # of its magnitude: a signal that changes by less does not change
+_STILL = 1e-12  # part of its magnitude; a signal that changes by less counts as constant
 
 
 @dataclass(frozen=True)
@@ -75,7 +75,7 @@ def measured(wanted: tuple[Quantity, ...], run: Run) -> Signals:
 
 
 def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[str, float]:
-    """What the error of each channel is relative to, in its own unit. ValueError where a signal has no range."""
+    """The scale of each channel's error, in the channel's unit. Raises ValueError where a signal has no range."""
     found: dict[str, float] = {}
     for quantity in wanted:
         named = [name for name in reference if matches(quantity.pattern, name)]

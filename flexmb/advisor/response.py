@@ -1,13 +1,13 @@
-"""How modes of flexible bodies would move if the scene moved as it does with all of them rigid.
+"""The response of the modes of flexible bodies to the motion that the scene makes with all of them rigid.
 
-One run of the rigid scene gives the motion of every body and what hangs on it. In body axes, with the body's motion
-w, alpha, a (less gravity) and loads tau, f at its nodes, mode n is driven by
+One run of the rigid scene gives the motion of every body and the loads at its nodes. In body axes, with the body's
+motion w, alpha, a (less gravity) and loads tau, f at its nodes, mode n is driven by
 
     Q_n = -sum_j m phi_jn . (a + alpha x r_j + w x (w x r_j)) + sum_nodes (psi_n . tau + phi_n . f)
 
-and follows etadd + 2 zeta omega etad + omega^2 eta = Q_n, solved exactly for Q_n linear between the output times. So
-effective masses, participation and the bandwidth of what excites are all in it; what is left out is what the body's
-bending does to the rest of the scene, and second-order effects.
+and follows etadd + 2 zeta omega etad + omega^2 eta = Q_n, solved exactly for Q_n linear between the output times. So it
+accounts for effective masses, participation and the bandwidth of the excitation. It leaves out the reaction of the
+body's bending on the rest of the scene, and second-order effects.
 """
 
 from __future__ import annotations
@@ -198,7 +198,7 @@ def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> 
 
 
 def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real) -> list[tuple[str, Real, Real]]:
-    """What hinges, wheels, point masses and loads do to the body at its nodes: (node, torque, force), body axes."""
+    """Loads of hinges, wheels, point masses and node loads on the body: (node, torque, force), body axes."""
     origin, _ = rigid.frame(body.name)
     model = eigenmodes(body)
     found = []

@@ -1,8 +1,9 @@
-"""The cheapest adequate model: up until one fits, then down as far as the runs allow.
+"""The cheapest adequate model: up the ladder until one fits, then down to cheaper ones as long as they fit.
 
-What a run costs follows from the highest frequency in it, and then from the operations of an evaluation. So the way up
-allows one highest frequency after the other, lowest first, and all bodies the best that it allows; the way down leaps
-to what is predicted to be much cheaper, whatever the number of bodies that change, and then changes one at a time.
+The cost of a run follows from the highest frequency in it, and then from the operations of an evaluation. So the way up
+allows one highest frequency after the other, lowest first, and gives every body the best rung below it. The way down
+first leaps to models that are predicted to be much cheaper, however many bodies change, and then changes one body at a
+time.
 
 Every decision is a run of the whole scene; nothing is random and nothing is timed.
 """
@@ -22,23 +23,26 @@ from flexmb.advisor.methods import Method
 from flexmb.advisor.models import LEVELS, Model, Rung
 
 HOPELESS = 20.0
-"""Models predicted to miss the tolerance by this factor are tried last on the way up and not at all on the way down."""
+"""Models predicted to miss the tolerance by this factor are tried last on the way up, and never on the way down."""
 MISSED = 2.0
 """A rung that missed the tolerance by this factor is not tried again when other bodies have become coarser."""
 SLACK, WORTH = 1.5, 0.9
-"""Predicted cost of what is tried on the way down, of what fits: of a scene with one body more, as predictions may be
-off; with several bodies what makes a difference."""
+"""On the way down a rung is tried if its predicted cost is below this part of the cost of what fits: the first for a
+scene with one flexible body, as predictions may be off; the second for several, where trials are many.
+"""
 LEAP, LEAPS, MANY = 0.75, 15, 20_000
-"""Leaps: to what is predicted to cost that part of a choice; so many are tried; of so many at most, else of pairs."""
+"""Leaps go to choices predicted to cost at most this part of the present one; so many are tried; beyond so many
+combinations only pairs of bodies change.
+"""
 FINALISTS = 3
-"""Adequate models, by the cost of their fine runs, for which the best method is looked for."""
+"""For so many adequate models, the cheapest by their fine runs, the best method is sought."""
 
 Choice = dict[str, Step]
 
 
 @dataclass(frozen=True)
 class Found:
-    """A model and the method that suits it best; `exhausted`: the budget ended the walk down."""
+    """A model and its cheapest method; `exhausted`: whether the budget ended the walk down."""
 
     model: Model
     method: Method
@@ -48,8 +52,8 @@ class Found:
 def search(ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, budget: float) -> Found | None:
     """The cheapest adequate model that the walk finds, or None where no choice of rungs is adequate.
 
-    `ladders`: by body, its steps. `budget`: operations of the walk's runs, and what is around them, after which the
-    walk down ends.
+    `ladders`: the steps of each body. `budget`: the walk down ends when its runs, compilation and output included, have
+    taken this many operations.
     """
     walk = _Walk(ladders, confirmation, budget)
     choice = walk.up()
@@ -71,7 +75,7 @@ class _Walk:
     def __init__(self, ladders: dict[str, tuple[Step, ...]], confirmation: Confirmation, budget: float) -> None:
         self.confirmation = confirmation
         known = highest_frequency(confirmation.bench.scene, confirmation.reference.model)
-        self.ladders = {  # what is finer than the reference is dearer
+        self.ladders = {  # a model finer than the reference costs more
             name: tuple(step for step in steps if step.fastest <= known) for name, steps in ladders.items()
         }
         self.most = confirmation.bench.spent + budget
@@ -88,7 +92,7 @@ class _Walk:
     def up(self) -> Choice | None:
         """The first choice on the way up that fits.
 
-        Where none does, those that were predicted to be hopeless have their turn, and then every rung of every body.
+        If none fits, the choices that were predicted to be hopeless are tried, and then every rung of every body.
         """
         way = list(self.way())
         hopeful = [choice for choice in way if _error(choice) <= self.hopeless]
@@ -96,7 +100,7 @@ class _Walk:
         return next(filter(self.fits, (*hopeful, *others, *self.finest())), None)
 
     def way(self) -> Iterator[Choice]:
-        """For each highest frequency, lowest first, the rungs with the least predicted errors that have no higher."""
+        """For each highest frequency, lowest first, the rungs of least predicted error that do not exceed it."""
         before: Choice | None = None
         for highest in sorted({0.0} | {step.fastest for steps in self.ladders.values() for step in steps}):
             choice = self.finest_below(highest, LEVELS)
@@ -105,8 +109,9 @@ class _Walk:
             before = choice
 
     def finest_below(self, highest: float, levels: tuple[str, ...]) -> Choice:
-        """Of every body the rung with the least predicted error that has no higher frequency, at one of the levels; the
-        dearest of those, for where nothing is predicted."""
+        """For every body the rung of one of the levels with the least predicted error and no higher frequency;
+        among equals, as where nothing is predicted, the most expensive.
+        """
         return {
             name: min(
                 (s for s in steps if s.fastest <= highest and s.rung.level in ("rigid", *levels)),
@@ -116,15 +121,16 @@ class _Walk:
         }
 
     def finest(self) -> Iterator[Choice]:
-        """Every rung of every body, cheapest first, with all others at their dearest."""
+        """Every rung of every body, cheapest first, while all other bodies have their most expensive one."""
         dearest = {name: max(steps, key=lambda s: (s.fastest, s.operations)) for name, steps in self.ladders.items()}
         for name, steps in self.ladders.items():
             for step in sorted(steps, key=lambda s: self.expected({name: s})):
                 yield dearest | {name: step}
 
     def down(self, choice: Choice) -> None:
-        """To cheaper choices that fit until there are none or the budget is spent: simpler levels for all bodies, the
-        same rung for all, leaps, body by body."""
+        """Go to cheaper choices that fit until there are none or the budget is spent: simpler levels for all bodies,
+        the same rung for all, leaps, body by body.
+        """
         highest = max((step.fastest for step in choice.values()), default=0.0)
         simpler = (self.finest_below(highest, LEVELS[:n]) for n in range(1, len(LEVELS)))
         choice = next(filter(self.fits, simpler), choice)
@@ -138,7 +144,7 @@ class _Walk:
             choice = settled
 
     def settled(self, choice: Choice) -> Choice:
-        """Body by body the cheapest rung with which the whole still fits, until nothing changes."""
+        """Give body after body the cheapest rung with which the scene still fits, until nothing changes."""
         changed = True
         while changed:
             changed = False
@@ -149,7 +155,7 @@ class _Walk:
         return choice
 
     def cheaper(self, choice: Choice, name: str) -> Choice | None:
-        """The choice with a cheaper rung of one body: of those that fit, the cheapest as run."""
+        """The choice with a cheaper rung for one body: of those that fit, the one whose run is the cheapest."""
         slack = SLACK if len(self.ladders) == 1 else WORTH
         enough, best, least = self.expected(choice), None, self.confirmation.run_cost(model_of(choice))
         others = [choice | {name: step} for step in self.steps(name)]
@@ -164,14 +170,14 @@ class _Walk:
         return best
 
     def leap(self, choice: Choice) -> Choice | None:
-        """A choice much cheaper that fits, with other rungs for several bodies; those with the least errors first."""
+        """A much cheaper choice that fits, with other rungs for several bodies; the least predicted errors first."""
         if len(self.ladders) < 2:
             return None
         others = sorted(self.leaps(choice), key=lambda each: (_error(each), self.expected(each)))
         return self.first_cheaper(choice, others[:LEAPS])
 
     def first_cheaper(self, choice: Choice, others: list[Choice]) -> Choice | None:
-        """The first of the others that fits and takes fewer operations as run."""
+        """The first of the others that fits and whose run takes fewer operations."""
         least = self.confirmation.run_cost(model_of(choice))
         for other in others:
             if self.exhausted:
@@ -193,8 +199,9 @@ class _Walk:
                     yield other
 
     def leaps(self, choice: Choice) -> Iterator[Choice]:
-        """Choices predicted to be much cheaper, of rungs that are the best in something: error, operations, frequency;
-        of all bodies at once or, where these are too many, of every two."""
+        """Choices predicted to be much cheaper, made of rungs that no other beats in error, operations and frequency
+        together; for all bodies at once or, where these are too many, for every two.
+        """
         best = {name: _best(self.steps(name)) for name in self.ladders}
         many = prod(map(len, best.values())) > MANY
         enough = LEAP * self.expected(choice)
@@ -205,7 +212,7 @@ class _Walk:
                     yield other
 
     def steps(self, name: str) -> list[Step]:
-        """Rungs of a body that there is hope for."""
+        """Rungs of a body that may fit: neither predicted to be hopeless nor seen to miss."""
         return [s for s in self.ladders[name] if s.error <= self.hopeless and s.rung not in self.missed[name]]
 
     def expected(self, choice: Choice) -> float:
@@ -214,12 +221,12 @@ class _Walk:
 
 
 def _error(choice: Choice) -> float:
-    """Predicted error of the whole: those of its bodies add up."""
+    """Predicted error of the whole scene: the sum over its bodies."""
     return float(np.sum([step.error for step in choice.values()]))
 
 
 def _best(steps: list[Step]) -> list[Step]:
-    """Those that no other is as good as in everything."""
+    """The steps that no other step equals or beats in everything."""
     merits = np.array([(step.error, step.operations, step.fastest) for step in steps]).reshape(-1, 3)
     found = []
     for i, step in enumerate(steps):

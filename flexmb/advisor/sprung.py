@@ -24,9 +24,10 @@ def spring_hinged(scene: Scene, name: str) -> Scene:
     """The scene with the flexible body `name` rigid, on a spring hinge.
 
     Its inboard hinge carries a clamp without mass, `<name>.clamp`, and the hinge `<name>.spring` joins the body to it:
-    about one axis, or two where low modes bend in two planes, at the point that (149)-(151) like best. Springs give
-    each axis the frequency of its mode with the base fixed, dampers its damping. What sat at the clamp stays there.
-    Raises ValueError where the body is not clamped at a limb end, starts deformed, or where its modes do not turn it.
+    about one axis, or two where low modes bend in two planes, at the point where the mismatch of (149)-(151) is least.
+    Springs give each axis the frequency of its mode with the base fixed, dampers its damping. Everything attached at
+    the clamp stays there. Raises ValueError where the body is not clamped at a limb end, starts deformed, or where its
+    modes do not turn it.
     """
     body = next((each for each in scene.bodies if each.name == name), None)
     if not isinstance(body, BeamBody | ModalBody):

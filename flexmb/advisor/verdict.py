@@ -1,4 +1,4 @@
-"""Advice in a terminal: what to simulate, why, what else was tried; or why nothing is known to be adequate."""
+"""Advice in a terminal: what to simulate, why, and what else was tried; or why no model is known to be adequate."""
 
 from __future__ import annotations
 

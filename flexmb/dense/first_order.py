@@ -1,10 +1,11 @@
 """Bodies of level linear: modal mass matrix and bias cut off after the first order in (eta, etadot), by a complex step.
 
-The sum over a body's points is entire in eta and etadot. At (i h eta, i h etadot) its real part is the order zero and
-its imaginary part h times the order one; what follows is smaller by h^2 and vanishes in rounding.
+The sum over a body's points is an entire function of eta and etadot. At (i h eta, i h etadot) its real part is the term
+of order zero and its imaginary part h times the term of order one; all further terms are smaller by h^2 and vanish in
+rounding.
 
 Order of rows: [modes; angular; linear], about the body origin in body axes. The elements of a body are its inertia
-points and the masses of its wheels; rotary inertia of wheels is not truncated, hence none of this.
+points and the masses of its wheels; the rotary inertia of wheels is not truncated and so does not belong here.
 """
 
 from __future__ import annotations
@@ -41,7 +42,7 @@ class FirstOrderBody:
         return 0.5 * float(self.speeds @ self.M @ self.speeds)
 
     def force(self, gravity: Real) -> Real:
-        """What the elements need to move so, beyond gravity (3,) in World axes: M (rates - g) + bias, (m+6,)."""
+        """Force (m+6,) that this motion needs beyond gravity (3,), which is in World axes: M (rates - g) + bias."""
         rates = self.rates.copy()
         rates[-3:] -= self.rotation.T @ gravity
         return self.M @ rates + self.bias

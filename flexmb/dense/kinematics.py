@@ -156,7 +156,7 @@ def _attitude(quaternion: Real, w: Real, w_rate: Real) -> Jet:
 def on_body(seat: Seat, eta: Jet) -> Frame:
     """A seat seen from its body: the node at x + phi eta, turned by exp((psi eta)~), then the fixed offset.
 
-    At level stiffened phi eta and psi eta have their second-order parts beside them.
+    At level stiffened the second-order parts are added to phi eta and psi eta.
     """
     node = seat.node
     moved = eta.map(lambda x: x @ node.translation.T)

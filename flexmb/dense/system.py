@@ -94,7 +94,7 @@ class DenseSystem:
 
     @cached_property
     def _summed(self) -> Points:
-        """The same without the elements of bodies of level linear; of their wheels the rotary inertia is left."""
+        """The same without bodies of level linear, of which only the rotary inertia of their wheels is left."""
         truncated = np.isin(self.points.member, self.tree.linear)
         elements = truncated & (np.arange(len(truncated)) < len(truncated) - len(self.tree.rotors))
         inertia = np.where(elements[:, None, None], 0.0, self.points.inertia)
@@ -256,7 +256,7 @@ class DenseSystem:
         return q
 
     def _seen(self, q: Real, u: Real, rates: Real) -> Snapshot:
-        """As inertia sees the motion: eta = etadot = 0 for ruthless bodies."""
+        """The motion as inertia sees it: eta = etadot = 0 for ruthless bodies."""
         u = u.copy()
         for member in self.tree.members:
             if member.level == "ruthless":
@@ -288,7 +288,7 @@ class DenseSystem:
         return _columns(seat_frame(self.tree, frames, *self.tree.sites[name], motion))
 
     def _inertial(self, now: Snapshot, chosen: Points) -> Wrenches:
-        """What each point needs to move so, beyond gravity: m (a - g), J alpha + w x J w."""
+        """The wrench that the motion of each point needs beyond gravity: m (a - g), J alpha + w x J w."""
         frames = now.points
         J, w, alpha = _turned(chosen, frames), frames.angular_velocity(), frames.angular_acceleration()
         torque = np.einsum("pab,pb->pa", J, alpha) + np.cross(w, np.einsum("pab,pb->pa", J, w))

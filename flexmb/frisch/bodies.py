@@ -2,8 +2,8 @@
 
 Corrections to the print, each declared in docs/errata.md: the parameters themselves; A_n and Q_n of (110) and of the
 left side depend on deformation to first order; Phi and Delta-L keep the second-order terms that cancel those of G (98),
-so that what stands for one body is of first order about its hinge point; loads at nodes and gravity act on the modes;
-the frame of a wheel turns with its node.
+so that the terms of one body about its hinge point are of first order; loads at nodes and gravity act on the modes; the
+frame of a wheel turns with its node.
 """
 
 from flexmb.frisch.tables import FIXED_SPIN_AXIS, NO_LOADS_ON_MODES, SECOND_ORDER

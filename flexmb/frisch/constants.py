@@ -27,8 +27,8 @@ def nested_constants(
     Null partitions phiR_H, phiT_H, phiR_W of hinges and wheels at nodes that do not deform are skipped, unless
     `null_partitions` keeps those that the constants have ports for.
 
-    ValueError where a body is of level stiffened, or has modes that are not clamped at its origin and the print is to
-    be followed.
+    Raises ValueError where a body is of level stiffened, or where the print is to be followed and the modes of a body
+    are not clamped at its origin.
     """
     parameters = [_parameters(link, errata) for link in chain]
     element, mode, pair, slopes = _elements(parameters, constants.mode.shape[1])

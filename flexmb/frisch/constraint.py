@@ -1,4 +1,4 @@
-"""Constraint loads: what the suppressed rows of (111) and its last partition give once the accelerations are known.
+"""Constraint loads: they follow from the suppressed rows of (111) and its last partition, given the accelerations.
 
 Row block k of (112) and of (115) is the balance of the nest of body k: left side minus eta is the whole torque and
 force that hinge k-1 transmits, phi^c + phi^H and F^c + F^H; likewise the row of a wheel, phi^c_W + CL (113).

@@ -2,8 +2,8 @@
 
 Both are sums over the same body: the parameters about its mass centre, to first order in the coordinates; the integrals
 about the body origin, complete in the coordinates where no point turns, with the points that turn kept as points. So
-integrals give all parameters. Parameters give the integrals only together with the points that turn: C_n, J_n and the
-rotary parts of the others are sums in which the single points are lost.
+the integrals give all parameters. The parameters give the integrals only together with the points that turn, because
+C_n, J_n and the rotary parts of the others are sums from which the single points cannot be recovered.
 """
 
 from __future__ import annotations
@@ -16,15 +16,15 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints
 from flexmb.typing import Real
 
-# A share of turning inertia that parameters hold beyond the given points, below which it is round-off of their sums.
+# Turning inertia in the parameters beyond that of the given points: a smaller share is round-off of the sums.
 _ROUND_OFF = 1e-12
 
 
 def from_integrals(integrals: ModalIntegrals, *, as_printed: bool = False) -> ModeParameters:
-    """All parameters (48)-(72) of a body of which only the modal integrals are known; nothing is missing.
+    """All parameters (48)-(72), without exception, of a body of which only the modal integrals are known.
 
-    The sums are moved from the body origin to the mass centre. That cancels: relative to the radius of gyration r, the
-    error grows as (|alpha| / r)^2.
+    The sums are moved from the body origin to the mass centre. That subtracts nearly equal numbers: with the radius of
+    gyration r, the relative error grows as (|alpha| / r)^2.
     """
     i = integrals
     turned = elements(i.turning)
@@ -87,7 +87,7 @@ def to_integrals(parameters: ModeParameters, turning: TurningPoints | None = Non
 
 
 def _check(p: ModeParameters, every: Particles, own: Rotary, slope: Slopes) -> None:
-    """What turning elements put into the parameters must be what the given ones put there."""
+    """Raise ValueError unless the turning inertia in the parameters is that of the given points."""
     length = np.sqrt(np.trace(p.Phi) / p.mass) + float(np.linalg.norm(p.alpha))
     shape = np.sqrt(float(np.max(np.diag(p.M1), initial=0.0)) / p.mass)
     Q1 = every.K - p.mass * np.cross(p.A[:, None], p.A[None]) + slope.Q1

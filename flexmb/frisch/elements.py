@@ -1,4 +1,4 @@
-"""The elements of a flexible body and their sums: masses at mass centres, and what turns with its element.
+"""The elements of a flexible body and their sums: masses at mass centres, and the inertia that turns with its element.
 
 Element i is the mass m_i at its mass centre x_i = position + c, moved by the mode vectors phiT and turned by phiR, with
 its own inertia Phi_i. It turns by exp(theta~), theta = sum_n a_n phiR_n, and carries c along, so that
@@ -51,7 +51,7 @@ class Particles:
 
 @dataclass(frozen=True)
 class Rotary:
-    """Sums over turning elements as printed: what the elements' own inertia adds.
+    """Sums over turning elements as printed: the contribution of the elements' own inertia.
 
     Phi (3,3) their part of (17); C (n,3) (55); J (n,3,3) (67); K (n,n,3) their part of (72); M1 (n,n) that of (41).
     """
@@ -126,7 +126,7 @@ def rotary(e: Elements) -> Rotary:
 
 
 def slopes(e: Elements, alpha: Real) -> Slopes:
-    """What the exact kinetic energy of turning elements has at first order in the coordinates, about `alpha`.
+    """The terms of first order in the coordinates of the exact kinetic energy of turning elements, about `alpha`.
 
     Per rate adot_n an element turns by phiR_n + 1/2 theta~ phiR_n, its mass centre moves by phiT_n + sum_k a_k bend_kn,
     and its inertia is Phi_i + [theta~, Phi_i], where (12) takes the second term for one of second order. So

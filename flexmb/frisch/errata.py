@@ -1,4 +1,4 @@
-"""The defects of the print that cost something when it is followed to the letter, each a switch of its own."""
+"""The defects of the print that change a result when it is followed to the letter, each with a switch of its own."""
 
 from __future__ import annotations
 

@@ -79,7 +79,7 @@ def _equations(c, w):
 
 @helper
 def _power(c, w):
-    """Power of motors, dampers, drives, node loads and modal damping (W)."""
+    """Power (W) of motors, dampers, drives, node loads and modal damping."""
     total = 0.0
     for j in range(w.u.shape[0]):
         rate = w.u[j]

@@ -1,9 +1,10 @@
 """Relative motion of contiguous bodies, base to tip: (78), (79), (116)-(132), and the entries of S = (126) (133).
 
-The hinge point of the paper is the origin of a body's frame. Extensions, all in S alone: hinges may translate along
-free coordinate vectors, may sit off their nodes, and a body's own frame may move with its modes where its inboard
-hinge sits on a node that deforms (free-free modes). Node frames move exactly: by the translation shapes, turned by the
-exponential of the rotation shapes. As printed they move by constant shapes, (118), (121), (124).
+The hinge point of the paper is the origin of a body's frame. Extensions beyond the paper, which change only S: hinges
+may translate along free coordinate vectors, hinges may sit off their nodes, and a body's own frame may move with its
+modes where its inboard hinge sits on a node that deforms (free-free modes). Node frames move exactly: by the
+translation shapes, turned by the exponential of the rotation shapes. As printed they move by constant shapes, (118),
+(121), (124).
 """
 
 from flexmb.frisch.tables import FIXED_SHAPES

@@ -1,7 +1,7 @@
 """Nests: sums over all bodies outboard of a hinge point, (78)-(84), (107), (108), taken in one pass inward.
 
 The sums over S_{k-1} of mass, m gamma, Phi + G and of the right sides all follow from those of the nests one hinge
-further out, shifted along beta: the order of the work is N where the print's double sums are of order N^2.
+further out, shifted along beta. So the work is of order N, where the print's double sums are of order N^2.
 """
 
 from flexmb.frisch.bodies import body_terms, load_terms, steiner, store6, wheel_terms
@@ -11,7 +11,7 @@ from flexmb.spatial.vector import add, add3, axpy, cross, store3, sym6, sym_add,
 
 @helper
 def nest_sums(c, w):
-    """Everything (107)-(110) sum over the bodies of each nest, and the right sides eta of (111)."""
+    """All sums of (107)-(110) over the bodies of each nest, and the right sides eta of (111)."""
     for k in range(c.body.shape[0]):
         body_terms(c, w, k)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):

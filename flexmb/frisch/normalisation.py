@@ -1,4 +1,4 @@
-"""What the paper demands of modes: clamped at the hinge point, (46), and normalised to the mass of the body, (41)."""
+"""The paper's demands on modes: clamped at the hinge point, (46), and normalised to the mass of the body, (41)."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ _PRINTED = 1e-9
 def check_boundary(model: FlexibleModel, name: str = "flexible body") -> None:
     """Raise ValueError unless clamped modes vanish at the body origin in translation and rotation: (33), (46).
 
-    Looked at are node "origin", and nodes and inertia points that lie at the origin. The message names the body, the
-    place and the mode (counted from 0), and what to do.
+    This looks at node "origin" and at all nodes and inertia points that lie at the origin. The message names the body,
+    the place, the mode (counted from 0) and the remedy.
     """
     n = model.mode_count
     if not model.clamped or n == 0:
@@ -52,9 +52,9 @@ def normalised(model: FlexibleModel, name: str = "flexible body") -> FlexibleMod
 
     The new modes are linear combinations of the given ones, which they span; stiffness is m_body diag(omega^2) in
     ascending order, as in (45), and the damping is transformed. Modes that are orthogonal already keep their order and
-    are only scaled. New modes have the sign in which they contain most of an old one. Coordinates change:
-    a_old = X a_new with the X that X' M1 X = m_body 1. Raises ValueError where clamped modes move the body origin, or
-    where modes depend on one another.
+    are only scaled. New modes have the sign in which they contain most of an old one. Coordinates change: a_old = X
+    a_new, where X' M1 X = m_body 1. Raises ValueError where clamped modes move the body origin, or where modes depend
+    on one another.
     """
     check_boundary(model, name)
     if model.mode_count == 0:

@@ -81,8 +81,8 @@ def mode_parameters(model: FlexibleModel, *, as_printed: bool = False, name: str
     """Parameters of one flexible body, corrected or exactly as printed, (48)-(72).
 
     Modes may be any assumed modes: with modes that (41) does not normalise, M1 is full, and the printed parameters are
-    the paper's in other coordinates. The corrected ones hold for free-free modes too. Raises ValueError, which calls
-    the body `name`, for printed parameters of modes that are not clamped at the body origin as the paper demands.
+    the paper's in other coordinates. The corrected ones hold for free-free modes too. Raises ValueError, naming the
+    body `name`, for printed parameters of modes that are not clamped at the body origin as the paper demands.
     """
     if as_printed:
         if not model.clamped:

@@ -2,7 +2,7 @@
 
 Body i stands on the path from the ground to hinge point k-1, or is k; d is the vector from its hinge point to that of
 k. Every sum over the nest of k of terms with gamma_{i-1} = gamma_{k-1} + d follows from the sums about hinge point k-1.
-Where neither nest holds the other, the matrix is zero: those places are never written.
+Where neither nest contains the other, the matrix is zero and is never written.
 """
 
 from flexmb.jit.kernel import helper

@@ -50,7 +50,7 @@ SPEED_COLUMN = _record(  # a column of S: its entries start .. stop
     ("body", _I),
 )
 
-# Defects of the print that are switches of the algorithm; the others are parameters of the bodies.
+# These defects of the print switch the algorithm; the others change the parameters of the bodies.
 ONE_SIDED, NO_LOADS_ON_MODES, FIXED_SPIN_AXIS, FIXED_SHAPES, SECOND_ORDER = range(5)
 
 

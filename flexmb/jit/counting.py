@@ -13,10 +13,12 @@ import math
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
-from types import BuiltinFunctionType, FunctionType, ModuleType, SimpleNamespace
+from types import BuiltinFunctionType, CellType, FunctionType, ModuleType, SimpleNamespace
 from typing import Any
 
 import numpy as np
+
+_PACKAGE = f"{__name__.partition('.')[0]}."  # modules whose functions are interpreted too
 
 
 @dataclass(frozen=True)
@@ -154,7 +156,7 @@ class _Interpreter:
             return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
         if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
             return self(thing.of_reals)
-        if isinstance(thing, ModuleType) and thing.__name__.startswith(f"{__package__}."):
+        if isinstance(thing, ModuleType) and thing.__name__.startswith(_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
             return self._scalar.square_root if thing is math.sqrt else self._scalar.elementary(thing)
@@ -162,7 +164,8 @@ class _Interpreter:
 
     def _function(self, function: FunctionType) -> FunctionType:
         space = self._namespace(function.__globals__)
-        twin = FunctionType(function.__code__, space, function.__name__, function.__defaults__, function.__closure__)
+        cells = tuple(CellType(self(cell.cell_contents)) for cell in function.__closure__ or ())
+        twin = FunctionType(function.__code__, space, function.__name__, function.__defaults__, cells)
         twin.__kwdefaults__ = function.__kwdefaults__
         return twin
 

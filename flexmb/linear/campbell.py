@@ -21,7 +21,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True, eq=False)
 class Campbell:
-    """Modes of a system whose `hinge` spins steadily, seen from the turning bodies.
+    """The modes of a system whose `hinge` spins steadily, as seen from the turning bodies.
 
     rates (R,) rad/s; eigenvalues (R,n) rad/s, column j one mode followed along the rates; mac (R,n): how alike its
     shape is to that at the rate before, 1 for equal ones; names (n,): the displacement that dominates it at the first
@@ -68,7 +68,7 @@ class Campbell:
 def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     """Eigenvalues against the spin rate (rad/s) of a revolute hinge or wheel, in the order of `rates`.
 
-    Every steady state is found from that of the rate before. Raises what `steady_spin` does.
+    Every steady state is sought from that of the rate before. Raises what `steady_spin` raises.
     """
     if isinstance(system, Scene):
         system = compile(system)
@@ -124,7 +124,7 @@ def _mac(before: Complex, after: Complex) -> Real:
 
 
 def _followed(alike: Real, before: Sequence[complex] | Complex, after: Complex) -> NDArray[np.int64]:
-    """For each mode before, its number after: one to one, alike in shape, and near in frequency where shapes mix."""
+    """For each mode before its number after, one to one: by likeness of shape, and by frequency where shapes mix."""
     a, b = np.asarray(before)[:, None], after[None]
     apart = np.abs(a - b) / np.maximum(np.abs(a) + np.abs(b), np.finfo(float).tiny)
     return linear_sum_assignment(1.0 - alike + apart)[1]

@@ -2,8 +2,8 @@
 
 Steps and errors are measured in the metric of kinetic energy, sqrt(xi' M xi) in m sqrt(kg), in which the method does
 not depend on units or scales of modes. Damping follows Deuflhard, Newton Methods for Nonlinear Problems (2004), sec.
-3.3: a step is accepted where the next, simplified correction is shorter. Where that fails from the guess, overdamped
-motion leads on.
+3.3: a step is accepted if the next, simplified correction is shorter. Where this fails from the guess, overdamped
+motion brings the state closer first.
 """
 
 from __future__ import annotations
@@ -20,15 +20,15 @@ from flexmb.system.system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
-CONVERGED = 1e-12  # last correction, part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
-RESIDUAL = 1e-9  # acceleration left, part of that at the start
-ROUNDING = 2.0**-46  # the same, part of the stiffness times a displacement of 1: 128 roundings
+CONVERGED = 1e-12  # last correction, as part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
+RESIDUAL = 1e-9  # acceleration left, as part of that at the start
+ROUNDING = 2.0**-46  # the same, as part of the stiffness times a displacement of 1: 128 roundings
 STEPS = 100
 SMALLEST = 2.0**-12  # damping factor
 SHORTENINGS = 20  # by 4, of a step of overdamped motion
 RELAXATIONS = 200  # steps of overdamped motion
 FIRST, LONGEST = 0.1, 0.5  # lengths of steps, parts of a displacement of all free coordinates by 1
-RANK = 1e-14  # directions stiffer by less than this part of the stiffest one are free to move: they are left alone
+RANK = 1e-14  # directions with less than this part of the largest stiffness are free to move and are left alone
 
 
 class EquilibriumError(ArithmeticError):
@@ -39,16 +39,16 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
     """The static equilibrium that Newton's method finds from a guess (default: the initial state).
 
     All speeds are zero; prescribed coordinates, motors and loads keep the values their functions have at the guess's
-    time. Wheels without springs stay at their angles. Stable or not: `linearize(..., held=True)` tells.
-    Raises EquilibriumError where none is found, NotImplementedError for closed chains, ValueError or TypeError for a
-    guess that is not a state of this system.
+    time. Wheels without springs stay at their angles. Whether the equilibrium is stable is for `linearize(...,
+    held=True)`. Raises EquilibriumError where none is found, NotImplementedError for closed chains, ValueError or
+    TypeError for a guess that is not a state of this system.
     """
     equations, guess = entering(system, guess)
     return balanced(equations.held(guess.t), replace(guess, u=np.zeros_like(guess.u)))
 
 
 def balanced(equations: Equations, guess: State) -> State:
-    """The state near the guess, its speeds kept, in which the free accelerations vanish: static or relative."""
+    """The state near the guess, with the guess's speeds, in which the free accelerations vanish."""
     start = equations.on_functions(guess)
     if not len(equations.free):
         return start
@@ -62,11 +62,11 @@ def balanced(equations: Equations, guess: State) -> State:
 
 
 def _relaxed(equations: Equations, start: State) -> State:
-    """Overdamped motion, M xi' = load, by implicit steps tau that grow as far as it goes, then Newton's method.
+    """Overdamped motion, M xi' = load, by implicit steps tau that grow as they succeed, then Newton's method.
 
     Pseudo-transient continuation (Kelley & Keyes 1998), with steps chosen as in a trust region (Nocedal & Wright 2006,
-    alg. 4.1): loads do work in every one of them. Newton's method is tried where no displacement grows by itself, so
-    that it does not turn aside to an equilibrium that is unstable.
+    alg. 4.1): the loads do work in every step. Newton's method is tried only where no displacement grows by itself, so
+    that it does not end in an unstable equilibrium.
     """
     here = _Loads(equations, equations.variations(start))
     tau = FIRST * here.scale / here.size
@@ -86,7 +86,8 @@ def _relaxed(equations: Equations, start: State) -> State:
 class _Loads:
     """Over the movable coordinates at a state: loads (n,), their derivative and inertia (n,n).
 
-    settling: loads oppose every displacement; size of the accelerations, scale of a displacement by 1, in the metric.
+    settling: whether loads oppose every displacement; size of the accelerations and scale of a displacement by 1, both
+    in the metric.
     """
 
     def __init__(self, equations: Equations, at: Variations) -> None:
@@ -105,7 +106,7 @@ def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variation
     for _ in range(SHORTENINGS):
         flow = here.inertia / tau - here.derivative
         try:
-            np.linalg.cholesky(flow + flow.T)  # else the step is longer than the fastest growth, and leads uphill
+            np.linalg.cholesky(flow + flow.T)  # otherwise the step is longer than the fastest growth, and leads uphill
             s = np.linalg.solve(flow, here.loads)
             if s @ here.inertia @ s <= (LONGEST * here.scale) ** 2:
                 step[moving] = s
@@ -121,7 +122,7 @@ def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variation
 
 
 def _newton(equations: Equations, state: State) -> State | None:
-    """Where the accelerations vanish; None where Newton's method does not get there."""
+    """The state where the accelerations vanish; None if Newton's method does not reach it."""
     first = None
     try:
         at = equations.variations(state)
@@ -130,7 +131,7 @@ def _newton(equations: Equations, state: State) -> State | None:
             first = now.size if first is None else first
             if now.length <= CONVERGED * now.scale:
                 removed = now.left <= RESIDUAL * first + ROUNDING * now.stiffness * now.scale
-                return at.state if removed else None  # else something accelerates that no displacement holds
+                return at.state if removed else None  # otherwise no displacement removes the rest
             moved = _damped(equations, now)
             if moved is None:
                 return None
@@ -143,8 +144,8 @@ def _newton(equations: Equations, state: State) -> State | None:
 class _Linearised:
     """Newton's correction at one state, lengths in the metric of kinetic energy, over the movable coordinates.
 
-    step (n,); length: of it; size: of the accelerations; left: of what of them no step removes; stiffness: norm of the
-    derivative; scale: length of a displacement of all free coordinates by 1.
+    step (n,) and its length; size: of the accelerations; left: size of the part that no step removes; stiffness: norm
+    of the derivative; scale: length of a displacement of all free coordinates by 1.
     """
 
     def __init__(self, at: Variations, M: Real, moving: Index) -> None:
@@ -177,13 +178,13 @@ def _damped(equations: Equations, now: _Linearised) -> State | None:
             if now.correction(equations.rates(moved))[1] <= (1.0 - 0.25 * factor) * now.length:
                 return moved
         except DynamicsError:
-            pass  # beyond what can be evaluated: closer
+            pass  # cannot be evaluated there: take a shorter step
         factor *= 0.5
     return None
 
 
 def _report(equations: Equations, at: Variations) -> str:
-    """What is left, where, and what to do."""
+    """The error: which acceleration is left, where, and what to do."""
     left = equations.mass(at.state) @ at.rates
     names, _ = displacement_names(equations)
     worst = int(np.argmax(np.abs(left)))

@@ -22,7 +22,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     """The linear model about a state (default: the initial one), by exact derivatives.
 
     Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
-    state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` is what is left.
+    state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` has its accelerations.
     Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains, ValueError or
     TypeError for what is not a state of this system.
     """
@@ -31,7 +31,7 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
 
 def linear_model(equations: Equations, state: State) -> LinearModel:
-    """The model of equations whose functions of time are what they shall be."""
+    """The model of equations whose functions of time are already held or replaced as wanted."""
     system, free = equations.system, equations.free
     state = equations.on_functions(state)
     at, mass, n = equations.variations(state), equations.mass(state), len(free)
@@ -74,7 +74,7 @@ def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
 
 
 def _driven(equations: Equations) -> list[int]:
-    """Places among the free speeds of those that a motor can drive: all but modal ones."""
+    """Places among the free speeds of those that a motor can drive: all but the modal ones."""
     modal = np.zeros(equations.system.nu, bool)
     for body in equations.constants.body:
         modal[int(body["etad_index"]) : int(body["etad_index"] + body["modes"])] = True

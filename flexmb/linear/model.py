@@ -23,7 +23,7 @@ ROUNDOFF = 2.0**-53
 class Mode:
     """One eigenvalue (rad/s); of a conjugate pair the one with positive imaginary part.
 
-    shape (n,): displacements, largest entry 1. tolerance (rad/s): what rounding of A leaves open of the eigenvalue.
+    shape (n,): displacements, largest entry 1. tolerance (rad/s): uncertainty of the eigenvalue from rounding of A.
     participation (n,): part of the kinetic energy in each displacement, by the diagonal of the mass matrix.
     """
 
@@ -55,10 +55,10 @@ class Mode:
 
 @dataclass(frozen=True)
 class Stability:
-    """What the eigenvalues say, up to rounding: `eigenvalue` is the one that decides, known to `tolerance` (rad/s).
+    """Verdict of the eigenvalues, up to rounding; `eigenvalue` is the one that decides, known to `tolerance` (rad/s).
 
-    "neutral": some eigenvalues have no real part beyond rounding, none a positive one: terms that a linear model leaves
-    out decide.
+    "neutral": no eigenvalue has a positive real part beyond rounding, but some have none at all; then terms that a
+    linear model leaves out decide.
     """
 
     verdict: Literal["asymptotically stable", "neutral", "unstable"]
@@ -130,7 +130,8 @@ class LinearModel:
         """Response (W, outputs) of all, or the named, outputs to a unit harmonic load at each omega (rad/s).
 
         (i omega - A) x = B f solved at each frequency: no modes are left out. KeyError for names that do not exist,
-        ValueError at an undamped resonance and for frequencies that are not finite, TypeError for what is no number.
+        ValueError at an undamped resonance and for frequencies that are not finite, TypeError for anything that is not
+        a number.
         """
         b = self.B[:, _place(self.inputs, input, "input")]
         rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
@@ -200,9 +201,10 @@ class LinearModel:
 
     @cached_property
     def _decomposition(self) -> tuple[Complex, Complex, Real]:
-        """Eigenvalues by modulus, right eigenvectors, and bounds n u |A| / |y'x| of what rounding of A changes.
+        """Eigenvalues by modulus, right eigenvectors, and bounds n u |A| / |y'x| of the changes from rounding of A.
 
-        Of the matrix balanced by powers of two, hence without rounding: entries of A differ by squares of frequencies.
+        A is first balanced by powers of two, hence without rounding, because its entries differ by squares of
+        frequencies.
         """
         balanced, (scale, _) = matrix_balance(self.A, permute=False, separate=1)
         values, left, right = eig(balanced, left=True, right=True)

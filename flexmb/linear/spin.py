@@ -15,7 +15,7 @@ from flexmb.system.system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 
-DEPENDENT = 1e-9  # change of the accelerations with the angle, part of their derivatives' size
+DEPENDENT = 1e-9  # change of the accelerations with the angle, as part of the size of their derivatives
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,10 +35,10 @@ class SteadySpin:
 def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | None = None) -> SteadySpin:
     """The deformation in which nothing accelerates while `hinge` (revolute, or a wheel) turns at `rate` (rad/s).
 
-    Whatever else turns it in the scene is replaced by this drive; other prescribed coordinates stand still, other
-    wheels keep the speeds they have in the guess (default: the initial state), other speeds are zero. ValueError where
-    the motion of what turns depends on the angle (gravity across the axis, loads in World axes): there is no steady
-    spin. EquilibriumError where no deformation is found.
+    This drive replaces every other drive of it in the scene; other prescribed coordinates stand still, other wheels
+    keep the speeds they have in the guess (default: the initial state), other speeds are zero. ValueError where the
+    motion of what turns depends on the angle (gravity across the axis, loads in World axes): there is no steady spin.
+    EquilibriumError where no deformation is found.
     """
     base, guess = entering(system, guess)
     system, rate = base.system, arguments.number("rate", rate)

@@ -1,4 +1,4 @@
-"""What a linear model says in a terminal."""
+"""A linear model as tables in a terminal."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _PART = 0.05  # of the kinetic energy, below which one is not named
 
 
 def modes_table(model: LinearModel) -> RenderableType:
-    """Frequency, damping and dominant displacements of every mode; stability; what is left of the accelerations."""
+    """Frequency, damping and dominant displacements of every mode; stability; accelerations that are not balanced."""
     table = _table(f"\nModes of {model.scene}", "Parts: of the kinetic energy of the shape, by displacement.")
     for name in ("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)"):
         table.add_column(name, justify="right")

@@ -64,7 +64,7 @@ class Equations:
         self.system = system
         self.constants = system.constants if constants is None else constants
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
-        # places among them of those whose displacement anything depends on: all but wheels without springs
+        # places among them of those on whose displacement anything depends: all but wheels without springs
         wheels = self.constants.wheel["u_index"]
         indifferent = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         self.movable: Index = np.flatnonzero(~np.isin(self.free, indifferent))
@@ -72,11 +72,11 @@ class Equations:
         self._real_w = system.workspace()
 
     def held(self, t: float) -> Equations:
-        """The same with every function of time standing still at its value at time t (s)."""
+        """The same equations with every function of time held at its value at time t (s)."""
         return self._with(self._constant_functions(t))
 
     def spinning(self, speed: int, rate: float, state: State) -> Equations:
-        """All functions held at the state's time, and one scalar coordinate, by the number of its speed, at `rate`."""
+        """The same with all functions held, and the scalar coordinate whose speed has that number driven at `rate`."""
         functions = self._constant_functions(state.t)
         angle = float(state.q[self.constants.speed["coordinate"][speed]])
         speeds = self.constants.speed.copy()
@@ -109,7 +109,7 @@ class Equations:
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
         self._check(jacobian(state.t, y, J, self.constants, self._w), self._w.fault[0])
         if self._w.doubt[0]:
-            self.system.digits_left(state)  # raises if pivots are nothing but rounding
+            self.system.digits_left(state)  # raises if pivots are only rounding
         rates = self._w.slope.real[nq + self.free]
         self._check(time_derivative(state.t, y, drift, self.constants, self._w), self._w.fault[0])
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
@@ -119,7 +119,7 @@ class Equations:
         )  # fmt: skip
 
     def moved(self, at: Variations, xi: Real) -> State:
-        """The state displaced by xi (n,) to first order, then put back where quaternions are unit; DynamicsError."""
+        """The state displaced by xi (n,) to first order, quaternions normalised again; raises DynamicsError."""
         y = pack(at.state)
         y[: self.system.nq] += at.motion @ xi
         self.system.project(at.state.t, y, self.constants)
@@ -128,7 +128,7 @@ class Equations:
         return State(y[: self.system.nq], y[self.system.nq : -1], at.state.t, self.system.layout)
 
     def on_functions(self, state: State) -> State:
-        """The state with prescribed coordinates and speeds as their functions have them at its time."""
+        """The state with prescribed coordinates and speeds at the values of their functions at its time."""
         y = pack(state)
         self.system.project(state.t, y, self.constants)
         return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
@@ -154,7 +154,7 @@ class Equations:
 
 
 def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
-    """What a linear model is made of: the equations of a tree or its scene, and a state of it (default: initial).
+    """The two parts of a linear model: the equations of a tree or its scene, and a state of it (default: initial).
 
     NotImplementedError for closed chains, ValueError or TypeError for a state that is not one of this system.
     """

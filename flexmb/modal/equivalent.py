@@ -1,11 +1,12 @@
-"""Few masses that move as the many inertia points of a body do, as far as its kinetic energy is concerned.
+"""A few masses with the same kinetic energy as the many inertia points of a body.
 
-All integrals of the masses are sums m a b of two scalar fields on the points: 1, components of the rest position r, of
-mode shapes phi_n, of the second-order field G_ni. The coefficients of these fields in a basis orthonormal under sum m a
-b, times one over the square root of a mass, are again a position, shapes and a field of points: one of this mass for
-each basis function. If the basis spans 1, r and phi, every integral with one of them is exact: the kinetic energy loses
-but the part of G beyond the basis, which it has squared only, a term of fourth order in (eta, etadot) that is no less
-than zero. So a mass matrix summed over the new points is positive, and exact to the third order.
+All integrals of the masses are sums m a b of two scalar fields a, b on the points: 1, components of the rest position
+r, of the mode shapes phi_n and of the second-order field G_ni. Choose a basis that is orthonormal under sum m a b, and
+equal masses, one for each basis function. The coefficients of the fields in this basis, divided by the square root of
+such a mass, are the position, the mode shapes and the field of the new points. If the basis spans 1, r and phi, every
+integral in which one of these occurs is exact. The kinetic energy loses only what G has beyond the basis. That part
+enters squared, as a term of fourth order in (eta, etadot) that is never negative. So the mass matrix summed over the
+new points is positive and exact to the third order.
 """
 
 from __future__ import annotations
@@ -19,13 +20,13 @@ from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
 from flexmb.typing import Real
 
 NEGLIGIBLE = 1e-12
-"""What is left of a field of unit size beyond the others is rounding below it."""
+"""A field of unit size adds nothing to the span of the others if its remainder is smaller: that is rounding."""
 
 
 def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
-    """A body with a second-order field on as few masses without offset as its modes allow.
+    """The body with as few masses as its modes allow, if it has a second-order field; else the body itself.
 
-    Offset masses stay what they are, and so do inertia tensors, on points without mass.
+    Masses with an offset stay as they are; inertia tensors stay too, on points without mass.
     """
     if model.second is None:
         return model
@@ -61,7 +62,7 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
 
 
 def _basis(fields: Real) -> Real:
-    """Orthonormal columns that span those of `fields` (points, n), each taken in its own size."""
+    """Orthonormal columns that span those of `fields` (points, n), each scaled to unit length first."""
     size = np.linalg.norm(fields, axis=0)
     Q, R, _ = qr(fields[:, size > 0.0] / size[size > 0.0], mode="economic", pivoting=True)
     return np.asarray(Q[:, np.abs(np.diag(R)) > NEGLIGIBLE])
@@ -70,7 +71,7 @@ def _basis(fields: Real) -> Real:
 def _equal_masses(basis: Real, m: Real) -> Real:
     """Rows (r, points) that take a field times sqrt(m) to its values at r points of mass sum(m) / r.
 
-    The field 1 must have equal coefficients: a reflection brings those it has, of the same norm, to these.
+    The field 1 must have equal coefficients: a reflection turns the coefficients it has into equal ones of that norm.
     """
     r = basis.shape[1]
     coefficients, equal = basis.T @ np.sqrt(m), np.full(r, np.sqrt(m.sum() / r))

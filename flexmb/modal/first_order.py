@@ -8,7 +8,7 @@ inertias J turning with their points and mass centres off their points included.
     W_n(eta)  = psi_n + 1/2 eta_k psi_k x psi_n            angular velocity per modal speed
     RJR'(eta) = J + eta_k T_k                              T_k = psi_k~ J - J psi_k~
 
-every table below is a product of these, cut off after the first order (`gyration_slope`: J(eta) after the second).
+every table below is a product of these, cut off after the first order (only G belongs to the second order of J(eta)).
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def first_order(model: FlexibleModel) -> FirstOrder:
 
 
 def _points(model: FlexibleModel, chosen: slice) -> FlexibleModel:
-    """Some of the points."""
+    """The chosen points alone."""
     return replace(
         model, mass=model.mass[chosen], position=model.position[chosen], com_offset=model.com_offset[chosen],
         inertia=model.inertia[chosen], translation=model.translation[chosen], rotation=model.rotation[chosen],
@@ -68,7 +68,7 @@ def _points(model: FlexibleModel, chosen: slice) -> FlexibleModel:
 
 
 def _sums(model: FlexibleModel) -> FirstOrder:
-    """All tables of points few enough to have a vector for every pair of modes."""
+    """All tables of some points, few enough to hold a vector for every point and pair of modes in memory."""
     m, J, psi = model.mass, model.inertia, np.swapaxes(model.rotation, 1, 2)
     rho, u, a = _mass_centres(model)
     T = _turning(model)

@@ -25,16 +25,16 @@ def flexible_model(body: BeamBody | ModalBody, folder: Path | None = None) -> Fl
     """Inertia points, modes, stiffness, damping and nodes of one flexible body.
 
     `folder` is where a modal body's `.npz` lies (the scene file's folder). Node "origin" is the body frame, which does
-    not deform; a beam also has "root" and "tip". At level "stiffened" the points are few that are as good as the many
-    (`flexmb.modal.equivalent`). Equal beams have one model between them, so its arrays must not be written to. Raises
-    ValueError for data no model can be made of.
+    not deform; a beam also has "root" and "tip". At level "stiffened" a few equivalent points replace the many
+    (`flexmb.modal.equivalent`). Equal beams share one model, so its arrays must not be written to. Raises ValueError
+    for data of which no model can be made.
     """
     if isinstance(body, ModalBody):
         return with_equivalent_masses(raw_model(body, folder))
     try:
         return _beam(replace(body, name="beam"))
     except ValueError:
-        return _beam(body)  # raises by its own name
+        return _beam(body)  # raises again, now with the name of the body
 
 
 @lru_cache(maxsize=128)
@@ -79,7 +79,7 @@ def _points(
 def _second_order(
     body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real
 ) -> SecondOrder | None:
-    """Of points at `offset` (n,3) from the axis points x (n,); as large as all pairs of modes, so only where needed."""
+    """Second-order field of points at `offset` (n,3) from the axis points x (n,); only level "stiffened" needs it."""
     return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None
 
 

@@ -5,8 +5,8 @@ and velocity of the body frame. Masses at points without `com_offset` have the k
 
     T = 1/2 etadot' M_ff etadot + etadot' C(eta)' w + etadot' s1' v + 1/2 w' J(eta) w + v' (w x s(eta)) + 1/2 m v'v,
 
-exactly polynomial in eta. What turns with a point (inertia tensors, offset masses) is not polynomial; it is kept apart
-as a set of points to be summed when the dynamics runs.
+which is exactly a polynomial in eta. What turns with a point (inertia tensors, offset masses) is no polynomial; it is
+kept apart, as a set of points that are summed at every evaluation.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ def _spatial_mass(model: FlexibleModel) -> Real:
 
 
 def still_points(model: FlexibleModel, chosen: NDArray[np.intp]) -> TurningPoints:
-    """Masses without offset, as points to be summed that do not turn."""
+    """Masses without offset, as points that are summed at every evaluation but do not turn."""
     return TurningPoints(
         mass=model.mass[chosen],
         position=model.position[chosen],

@@ -12,7 +12,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class SecondOrder:
-    """What moves with the squares of the modal coordinates: 1/2 eta' G eta, symmetric in the last two axes.
+    """The motion of second order in the modal coordinates, 1/2 eta' G eta; G is symmetric in its last two axes.
 
     translation (...,3,m,m): added to the displacement phi eta of a point (m); rotation (...,3,m,m): added to its
     rotation vector psi eta. Leading axes: points, or none for a node.
@@ -55,7 +55,7 @@ class ModalNode:
 
 
 def undeforming_node(modes: int) -> ModalNode:
-    """The body frame as a node: no mode moves it."""
+    """The body frame as a node, which no mode moves."""
     none = np.zeros((3, modes))
     return ModalNode(np.zeros(3), np.eye(3), none, none)
 
@@ -99,7 +99,7 @@ def join_second(first: SecondOrder | None, then: SecondOrder | None) -> SecondOr
 def with_node(model: FlexibleModel, node: ModalNode) -> SecondOrder | None:
     """The second-order field of the points of `model` and, as one more point, of `node`; None where it has none.
 
-    A node without one does not deform.
+    A node without a field of its own does not deform.
     """
     if model.second is None:
         return None

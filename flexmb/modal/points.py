@@ -1,4 +1,4 @@
-"""Inertia points of a beam with its modes: how stations and lumps become what the dynamics sums over."""
+"""Inertia points of a beam with its modes: stations and lumps become the points that the dynamics sums over."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""Second-order field of a raw modal body: as the user gives it, or from geometric stiffness under unit loads.
+"""Second-order field of a raw modal body, given by the user or derived from geometric stiffness under unit loads.
 
-A load F_j on the points does the work sum F_j . u_2j = 1/2 eta' (sum F_j . G_j) eta on the second-order field, which is
-minus half the geometric stiffness it brings: K_g = -sum F_j . G_j. Of the field of the points the kinetic energy needs
-nothing but sum m G and sum m r x' G, hence the stiffness under mass forces that are uniform or grow with the
-coordinates. Every field with these integrals is as good as the true one; the one that is affine in the place is taken.
+A load F_j on the points does the work sum F_j . u_2j = 1/2 eta' (sum F_j . G_j) eta on the second-order field. So its
+geometric stiffness is K_g = -sum F_j . G_j. The kinetic energy needs only the integrals sum m G and sum m r x' G of the
+field. These follow from the geometric stiffness under mass forces that are uniform and that grow with the coordinates.
+Every field with these integrals gives the same kinetic energy, so the one that is affine in the position is taken.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ EXTENT = 1e-9  # share of the mass' extent below which points lie in a plane or 
 def second_order(arrays: ModalArrays) -> SecondOrder | None:
     """Field of the points (n,3,m,m), None without data.
 
-    ValueError where gradient_stiffness has a load that no mass feels.
+    Raises ValueError where gradient_stiffness has a load that acts on no mass.
     """
     if arrays.second_translation is not None:
         G, H = arrays.second_translation, arrays.second_rotation
@@ -62,5 +62,5 @@ def _affine(arrays: ModalArrays, Z: Real, X: Real) -> Real:
 
 
 def _symmetric(G: Real) -> Real:
-    """The part that acts."""
+    """The symmetric part, the only one that acts."""
     return 0.5 * (G + np.swapaxes(G, -1, -2))

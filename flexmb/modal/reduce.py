@@ -13,9 +13,8 @@ from flexmb.modal.beam import BeamElements
 from flexmb.scene.bodies import Modes
 from flexmb.typing import Real
 
-# A direction whose share of the mass is below this many round-offs of the largest has no inertia: its frequency is
-# infinite, so it is never among the lowest.
-# The same share of coupling between families is none.
+# A direction has no inertia if its share of the mass is below this many round-offs of the largest share. Its frequency
+# is infinite, so it is never among the lowest. Families whose coupling is below the same share are not coupled.
 _ROUND_OFF = 64 * np.finfo(float).eps
 
 
@@ -45,7 +44,7 @@ class _Part:
 def beam_modes(elements: BeamElements, K: Real, M: Real, modes: Modes) -> BeamModes:
     """The `modes.count` lowest eigenmodes of the chosen families, with attachment modes if `modes.static`.
 
-    Families that nothing couples are solved apart, so degenerate bending pairs come out as pure planes; modes are
+    Families that nothing couples are solved separately, so degenerate bending pairs come out as pure planes; modes are
     merged by frequency, then by the order axial, torsion, bending_y, bending_z. Families that a lump couples are solved
     together; families that are not chosen are held fixed. Families without inertia have no modes. Free-free modes are
     orthogonal to the rigid motions of the chosen families, so their frame is a mean-axis (Buckens) frame of those.
@@ -146,7 +145,7 @@ def _with_attachment(
     load = elements.motion(tip, np.eye(elements.size))[0][:, part.index].T
     load = load[:, np.any(load, axis=0)]
     static = cho_solve(cho_factor(part.A), load)
-    # Eigenmodes are orthogonal to what they leave over of the static answers, so only that remainder needs reducing.
+    # The remainder of the static deflections is orthogonal to the eigenmodes, so only the remainder needs reducing.
     known = np.column_stack([part.rigid, *(column for _, column in eigenmodes)])
     for _ in range(2):  # twice is enough (Parlett): the second pass removes the round-off of the first
         static = static - known @ (known.T @ part.M @ static)
@@ -160,7 +159,7 @@ def _mass_normalised(compliance: Real, columns: Real, M: Real) -> list[tuple[flo
     kept = compliance > _ROUND_OFF * max(compliance.max(), 0.0)
     columns = columns[:, kept]
     columns = columns / np.sqrt(np.einsum("im,ij,jm->m", columns, M, columns))
-    # The eigenvectors are orthogonal to a hundred or a thousand round-offs: one step of Newton's iteration leaves one.
+    # The eigenvectors are orthogonal only to some 1000 round-offs: one step of Newton's iteration brings that to one.
     columns = columns @ (1.5 * np.eye(columns.shape[1]) - 0.5 * columns.T @ M @ columns)
     return [(float(1.0 / np.sqrt(c)), column) for c, column in zip(compliance[kept], columns.T, strict=True)]
 

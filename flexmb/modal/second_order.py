@@ -1,4 +1,4 @@
-"""Second-order field of a beam: what its axis and sections do with the squares of its modal coordinates.
+"""Second-order field of a beam: the motion of its axis and sections that grows with the squares of modal coordinates.
 
 The modal coordinates measure strain: curvature and twist kappa = theta' of the modes, stretch and shears Gamma =
 [e, gamma_y, gamma_z], all in axes that turn with the section, are linear in eta, so that the strain energy
@@ -8,9 +8,10 @@ position to second order
     theta_2 = 1/2 int theta x theta' dx
     u_2'    = theta_2 x e_x + 1/2 theta x (theta x e_x) + theta x Gamma
 
-with theta = psi eta of first order. Bending alone leaves u_2 = -1/2 int (v'^2 + w'^2) dx along the axis: it shortens,
-hence centrifugal and gravity stiffening, buckling. Bending in two planes with torsion turns and moves sections sideways
-too: without that a beam would not buckle laterally. The integrals start at the root, which moves by the modes alone.
+with theta = psi eta of first order. With bending alone only u_2 = -1/2 int (v'^2 + w'^2) dx along the axis is left: the
+beam shortens, which is the cause of centrifugal stiffening, gravity stiffening and buckling. Bending in two planes
+together with torsion also turns the sections and moves them sideways; without that a beam would not buckle laterally.
+The integrals start at the root, which moves by the modes alone.
 """
 
 from __future__ import annotations

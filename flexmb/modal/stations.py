@@ -43,7 +43,7 @@ class Lump:
 
 
 def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) on every piece between nodes and section stations, so that kinks cost nothing."""
+    """Gauss points and weights (n,) on every piece between nodes and stations, so that kinks cost no accuracy."""
     inside = table.x[(table.x > mesh.nodes[0]) & (table.x < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
     s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
@@ -55,8 +55,8 @@ def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Real, Real]:
 def inertia_stations(body: BeamBody, mesh: Mesh, table: SectionTable) -> Stations:
     """The beam's own inertia: at the Gauss points ("consistent") or at the element nodes ("lumped").
 
-    Lumped: a node receives what its hat function weighs. `points = "line"` leaves the section's inertia out.
-    Stations without mass are dropped.
+    Lumped: each node receives the inertia weighted by its hat function. `points = "line"` leaves the section's inertia
+    out. Stations without mass are dropped.
     """
     x, weight = quadrature(mesh, table)
     mass = weight * table.at(table.mass, x)

@@ -83,7 +83,7 @@ class Modes(_Strict, frozen=True, kw_only=True):
     """Which modes represent the body: the `count` lowest of the wanted families, clamped at the root or free-free.
 
     `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes; with `count` 0
-    they stand alone.
+    they are the only modes.
     """
 
     count: int
@@ -120,7 +120,7 @@ class BeamBody(_Strict, frozen=True, kw_only=True, tag="beam", tag_field="kind")
 
 
 class InertiaPoint(_Strict, frozen=True, kw_only=True):
-    """One inertia point of a raw modal body (FORMULATION of the modal field: docs/notation.md).
+    """One inertia point of a raw modal body; docs/notation.md has the equations of the modal field.
 
     `translation_modes[n]` and `rotation_modes[n]` are the point's displacement and rotation for unit modal
     coordinate n. `com_offset_m` is the mass centre's offset from the point, turning with it. `second_translation[n][k]`
@@ -183,7 +183,7 @@ class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind
 
 
 class SidBody(_Strict, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
-    """A body from a Standard Input Data file (Wallrapp 1994). Expressible; not supported by `compile` yet."""
+    """A body from a Standard Input Data file (Wallrapp 1994): a scene can contain it, `compile` refuses it so far."""
 
     name: str
     file: str

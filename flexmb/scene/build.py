@@ -1,7 +1,7 @@
 """Writing a scene in Python: a fluent builder that appends the schema's structs.
 
-Argument names are the schema's keys without their unit; every value is SI, quaternions are scalar-first, unit, and map
-outboard components to inboard ones. Arrays are welcome wherever tuples are.
+Argument names are the schema's keys without their unit. Every value is SI; quaternions are scalar-first, have unit
+length and map outboard components to inboard ones. Arrays are accepted wherever tuples are.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
 """Scenes as TOML files: build -> file -> build is the identity.
 
 Keys at their default are left out, floats are written so that they read back bit for bit. A body that refers to a file
-(`.npz`, SID) names it relative to the scene's folder in TOML, and by its absolute path in a loaded `Scene`: the folder
-may move as a whole, and whoever holds a Scene needs to know nothing about where it came from.
+(`.npz`, SID) names it relative to the scene's folder in TOML, and by its absolute path in a loaded `Scene`. So a folder
+can be moved as a whole, and a Scene can be used without knowing where it came from.
 
-The writer is our own because scenes are read by people: the library for it writes each component of a vector on a line
-of its own. The reader is Python's, and the tests hold the two together on random scenes.
+The writer is our own because people read scenes, and the usual library writes each component of a vector on a line of
+its own. The reader is Python's; the tests hold the two together on random scenes.
 """
 
 from __future__ import annotations

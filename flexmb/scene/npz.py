@@ -1,4 +1,4 @@
-"""Named arrays from an `.npz`, believed as far as its headers are sound: real numbers, bounded before unpacking."""
+"""Named arrays from an `.npz` of unknown origin: only real numbers, sizes bounded before anything is unpacked."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is wrong with a scene, where, and what to do about it."""
+"""The problems of a scene: what is wrong, where, and what to write instead."""
 
 from __future__ import annotations
 

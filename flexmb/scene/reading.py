@@ -1,4 +1,4 @@
-"""Files that somebody else wrote: regular ones, of a size that can be meant, in UTF-8, nested as people write."""
+"""Reading files that somebody else wrote: only regular files, of a sensible size, in UTF-8, not nested too deeply."""
 
 from __future__ import annotations
 
@@ -13,11 +13,12 @@ from typing import Any
 
 MIB = 2**20
 TEXT_LIMIT = 16 * MIB  # of a file that people write; tomllib takes some 10 s for it
-# What is packed may unpack to so many bytes, and to so many times its own size: zeros shrink a thousandfold, but a file
-# of nothing else holds no data.
+# An archive may unpack to this many bytes at most, and to this many times its own size. Zeros shrink a thousandfold,
+# but a file of nothing but zeros holds no data.
 FREE, RATIO = 64 * MIB, 100
 DEEPEST = 64  # parts of a dotted key: no scene and no run file has more than three
-# Looked for where a word begins, giving nothing back: a search from anywhere in a long word takes its square.
+# The search starts only where a word begins and never backtracks (possessive quantifiers): a search from every letter
+# of a long word would take a time that grows with the square of its length.
 DOTTED = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 
 

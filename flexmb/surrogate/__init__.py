@@ -1,7 +1,7 @@
-"""Scene to scene: other models of the same flexible bodies, for whoever compares models or looks for a cheaper one.
+"""Scenes made from scenes: other models of the same flexible bodies, to compare models or to find a cheaper one.
 
-A surrogate is a scene like any other and given to every engine alike, so that a coarser model is never mistaken for a
-difference between codes.
+A surrogate is a scene like any other, and every engine gets the same one, so that a coarser model is never mistaken for
+a difference between codes.
 """
 
 from flexmb.surrogate.points import modal_points as modal_points

@@ -1,4 +1,4 @@
-"""A beam taken apart into a chain of bodies: what sat on the beam goes to the piece at its place."""
+"""A beam taken apart into a chain of bodies; whatever was attached to the beam moves to the piece at that place."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ def piece_at(ends: Sequence[float], x: float) -> int:
 
 
 def outward(joints: Sequence[Hinge], root: int) -> list[Hinge]:
-    """Joints listed along the beam, from the piece `root` outward: to the tip first, so that parents come first."""
+    """Joints listed along the beam, reordered from the piece `root` outward, so that parents come first."""
     return [*joints[root:], *joints[:root][::-1]]
 
 

@@ -1,6 +1,6 @@
 """A flexible body without its flexibility: the rigid body with the same inertia points and the same nodes at rest.
 
-Independent of the native modal preprocessing, of which it repeats only the documented choice of inertia points.
+It uses nothing of the native modal preprocessing and repeats only its documented choice of inertia points.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def _lumps(lumps: Sequence[TipMass]) -> list[Inertia]:
 
 
 def _lumped_beam(body: BeamBody) -> Inertia:
-    """A beam whose inertia sits at its element nodes: a node receives what its hat function weighs."""
+    """A beam whose inertia sits at its element nodes: each node receives the inertia weighted by its hat function."""
     nodes = np.linspace(0.0, body.length_m, body.elements + 1)
     x, weight = quadrature(body, tuple(nodes))
     hats = np.maximum(0.0, 1.0 - np.abs(x[:, None] - nodes) * body.elements / body.length_m)

@@ -1,4 +1,4 @@
-"""Beams as the raw inertia points and modes that they are made of."""
+"""Beams replaced by the raw inertia points and modes that they are made of."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ from flexmb.typing import Real
 
 
 def modal_points(scene: Scene) -> Scene:
-    """Every beam replaced by the raw inertia points and modes it is made of, so that other codes get the very same.
+    """The scene with every beam as raw inertia points and modes, so that other codes get exactly the same data.
 
-    At level "stiffened" with the second-order field of its points and nodes.
+    A beam of level "stiffened" also brings the second-order field of its points and nodes.
     """
     return replace(scene, bodies=tuple(_modal(each) if isinstance(each, BeamBody) else each for each in scene.bodies))
 

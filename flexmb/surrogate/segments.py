@@ -50,8 +50,8 @@ def finite_segments(scene: Scene, body: str | None, n: int) -> Scene:
     The beam is divided into n elements of length l with a hinge in the middle of each (so half an element is rigid at
     the root and at the tip): springs EI/l for each bending plane and GJ/l for torsion among the beam's mode families,
     more exactly the inverse of the compliance integrated over the element. If "axial" is among them, slides at the
-    element boundaries carry EA/l. The first frequency is off by O(n^-2), and so is finite deflection in a plane; in
-    space the turns about the axes of a hinge follow one another, which leaves an error O(n^-1). Segments are named
+    element boundaries carry EA/l. The error of the first frequency is O(n^-2), and so is that of finite deflection in a
+    plane; in space it is O(n^-1), because a hinge turns about one axis after the other. Segments are named
     `<beam>.seg00` ... and hinges `<beam>.h01` ... (slides `<beam>.a01` ...) from the root. Modal damping becomes
     proportional to stiffness, exact for the first mode. Raises ValueError for what segments cannot carry: Timoshenko
     shear, initial modal states.

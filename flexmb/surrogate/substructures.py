@@ -29,10 +29,10 @@ def substructured(
     A piece has the attachment modes of its beam's mode families (unit forces and moments at its tip: one mode for axial
     motion, one for torsion, two for each plane of bending), clamped at its own root, and as many `eigenmodes` of the
     clamped piece besides. Its level is the beam's unless `level` is given. The chain converges to the geometrically
-    exact beam, at level "full" by the square of the length of a piece, at "stiffened" by its third power; of a beam
-    whose twist varies by the square too, unless an eigenmode of torsion is among those of a piece. Sections, theory,
-    tip masses and the choice of inertia points stay; modal damping becomes proportional to stiffness, exact for the
-    beam's first mode.
+    exact beam with the square of the length of a piece at level "full", and with its third power at "stiffened"; where
+    the twist varies along the beam, that also falls to the square unless the modes of a piece include an eigenmode of
+    torsion. Sections, theory, tip masses and the choice of inertia points stay; modal damping becomes proportional to
+    stiffness, exact for the beam's first mode.
 
     Pieces are named `<beam>.p00` ... and welds `<beam>.w01` ... from the root; a node on a cut, or a tip mass, belongs
     to the piece toward the tip. Raises ValueError for a body that is no beam or is rigid, for fewer than one piece, for
@@ -54,7 +54,7 @@ def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: i
     places = {}
     for name, frame in rest_frames(beam).items():
         piece = piece_at(ends, frame.position[0])
-        # A piece has a root and a tip of its own, where those of the beam are.
+        # Names stay: the beam's root is the root of the first piece, its tip the tip of the last one.
         places[name] = Place(piece, _piece_name(beam, piece), name)
     lag = stiffness_damping(beam)
     parts = [_piece(beam, i, ends, places, replace(beam.modes, count=eigenmodes), level, lag) for i in range(count)]
@@ -72,7 +72,7 @@ def _piece(
         beam,
         name=_piece_name(beam, number),
         length_m=end - start,
-        # Two elements bear every attachment mode with lumped masses too; an eigenmode more has half a wave more.
+        # Two elements carry every attachment mode, even with lumped masses; each further eigenmode adds half a wave.
         elements=max(-(-beam.elements // (len(ends) - 1)), 2 + modes.count),
         stations=_sections(beam, start, end),
         modes=replace(modes, boundary="clamped-free", static=True, damping_ratio=0.0),
@@ -99,7 +99,7 @@ def _piece(
 
 
 def _sections(beam: BeamBody, start: float, end: float) -> tuple[BeamStation, ...]:
-    """The stations from `start` to `end` (m), measured from `start`; of two at one place the piece has its own."""
+    """Stations from `start` to `end` (m), measured from `start`; of two at one x the piece gets the one on its side."""
     stations = sorted(beam.stations, key=lambda station: station.x_m)
     xs = [station.x_m for station in stations]
     inside = [station for station in stations if start < station.x_m < end]

@@ -1,4 +1,4 @@
-"""Closed loops by RK4: drift against the step, by way of keeping closures closed, and where stabilisation is stable."""
+"""Closed loops by RK4: drift against the step by each way of closing loops, and where stabilisation is stable."""
 
 from __future__ import annotations
 
@@ -61,7 +61,7 @@ def system() -> ClosedSystem:
 
 
 def gap(step: float, time: float, rate: float) -> Outcome:
-    """`opening` of a run of flexmb with RK4; `rate` 0 projects."""
+    """`opening` of a run of flexmb with RK4; with `rate` 0 it projects."""
     done = simulate(system(), time, "rk4", step=step, samples=np.linspace(0.0, time, SAMPLES), stabilise=rate)
     if not done.finished:
         return Outcome(status="failed", message=done.message)
@@ -143,7 +143,7 @@ def anchored() -> float:
 
 @cache
 def pulled_apart() -> float:
-    """Acceleration (m/s^2) at which the joined points would part if nothing joined them, the largest of a run."""
+    """Largest acceleration (m/s^2) in a run at which the joined points would part if nothing joined them."""
     mechanism, tree = system(), System(system().scene)
     done = simulate(mechanism, SPAN, samples=SAMPLES, rtol=1e-8, atol=1e-10)
     largest = 0.0
@@ -154,10 +154,11 @@ def pulled_apart() -> float:
 
 
 def drift(step: Real, kept: Real) -> Real:
-    """log10 of the opening: where projection stops, fourth order in the step, and the yield of a soft constraint.
+    """log10 of the opening: the limit where projection stops, the fourth order in the step, or the yield of a soft
+    constraint.
 
     MuJoCo's constraint is a critically damped spring of its time constant T, not shorter than two steps, whose force is
-    scaled by its impedance d: it yields (1 - d) T^2 a under what would part the points with the acceleration a.
+    scaled by its impedance d: it yields (1 - d) T^2 a under a load that would part the points with the acceleration a.
     """
     time = np.maximum(SOFT_TIME, 2.0 * step)
     table = np.array([

@@ -19,7 +19,7 @@ from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
 LENGTH, MASS, STIFFNESS = 1.0, 1.0, 1.0  # m, kg/m, N m^2
-KNOTS = 25  # radii of gyration at which the overlay is found; between them it is as good as a power law
+KNOTS = 25  # radii of gyration at which the overlay is computed; between them a power law is accurate enough
 
 
 def scene(deflection: float, gyration: float) -> Scene:
@@ -47,7 +47,7 @@ def scene(deflection: float, gyration: float) -> Scene:
 def measure(scene: Scene, deflection: float, gyration: float) -> Outcome:
     """Smallest eigenvalue of the mass matrix by composite bodies, scaled to a unit diagonal, with its sign changed.
 
-    The recursion must refuse exactly the states where it is not positive: a cell where it does not has failed.
+    The recursion must refuse exactly the states where it is not positive; otherwise the cell has failed.
     """
     system = compile(scene)
     state = system.initial_state

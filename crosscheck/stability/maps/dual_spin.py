@@ -21,8 +21,8 @@ NEUTRAL = 1e-10  # of the spin; dampers of a thousandth of the inertia make grow
 def scene(inertia: float, momentum: float) -> Scene:
     """A gyroscope on a spherical hinge with four dampers in its plane, which move along the axis, and a wheel on it.
 
-    `inertia` is the axial one of the body over the transverse one of all, `momentum` the wheel's over the transverse
-    inertia times the body's spin.
+    `inertia` is the axial inertia of the body over the transverse inertia of the whole; `momentum` is the wheel's
+    momentum over the transverse inertia times the body's spin.
     """
     dampers = 4.0 * MASS * ARM**2
     rate = momentum * TRANSVERSE * SPIN / WHEEL
@@ -55,7 +55,7 @@ def measure(scene: Scene, inertia: float, momentum: float) -> Outcome:
 
 
 def energy_sink(inertia: Real, momentum: Real) -> Real:
-    """Positive where nutation grows: the nutation as the damped body sees it turns against its spin."""
+    """Positive where nutation grows: where, as the damped body sees it, nutation turns against the body's spin."""
     return np.asarray(1.0 - inertia - momentum)
 
 

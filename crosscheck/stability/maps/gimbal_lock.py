@@ -20,8 +20,8 @@ LOCK = {"gimbal xyz": 0.5 * np.pi, "gimbal zxz": 0.0}  # second angle, rad
 INERTIA = np.diag([1.0, 2.0, 2.5])
 STATES = 24
 ROUNDING = 2.0**-53
-AWAY = (angular(), angular(angle=0.8), angular())  # a start that is not locked; every state is given
-"""What is measured is the worst of `STATES` states."""
+AWAY = (angular(), angular(angle=0.8), angular())  # the scene starts away from lock; all states are set explicitly
+"""The measurement is the worst of `STATES` states."""
 
 
 class Body(NamedTuple):
@@ -87,8 +87,8 @@ def hinge_map(sequence: str, q: Real) -> Real:
 def predicted(distance: Real, hinge: Real) -> Real:
     """log10 of the error of Cholesky's method, u cond(D) |udot|, as H shows it along the lost axis; least: rounding.
 
-    D = H'JH has the condition 1/distance^2, udot grows as 1/distance^2, and H is of the size of the distance there:
-    three digits for each factor of ten.
+    D = H'JH has the condition 1/distance^2, udot grows as 1/distance^2, and H is of the size of the distance there. So
+    three digits are lost for each factor of ten.
     """
     table = np.array([_error_at_one(name) for name in HINGES])
     power = np.array([0.0 if name == "quaternion" else 3.0 for name in HINGES])

@@ -19,7 +19,7 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 STEPS, PARTS = 4096, 64  # of a run: 1000 periods and more where step x frequency is 1.54 and more
-GROWTH = 2e-5  # of the amplitude's logarithm in a step; beats of a bounded motion stay a hundred times below
+GROWTH = 2e-5  # of the amplitude's logarithm in a step; beats of a bounded motion stay below a hundredth of it
 SLOW = 1.0  # rad/s
 START = 1e-3  # m
 UNLIMITED, NEVER = np.inf, 0.0
@@ -149,7 +149,7 @@ METHODS = (
 )
 
 
-# ---- Methods that choose their steps: how accurate they are asked to be takes the place of the step
+# ---- Methods that choose their steps: the tolerance takes the place of the step
 
 PERIODS = 1000
 BOUNDED = 2.0  # times the start

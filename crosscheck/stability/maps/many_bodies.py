@@ -11,7 +11,7 @@ from flexmb.system.system import Algorithm, compile
 from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")
-MOST = {"articulated": 20_000, "composite": 1_500, "frisch": 150}  # what takes less than a minute
+MOST = {"articulated": 20_000, "composite": 1_500, "frisch": 150}  # within a minute for each cell
 ROUNDING = 2.0**-53
 PRODUCTS = 2 * 36  # of a body in a sweep: six products of six terms, in both routes
 LEVELS = (-15.0, -14.0, -13.0, -12.0)
@@ -26,7 +26,7 @@ def scene(bodies: float, algorithm: float) -> Scene:
     """A chain of equal bodies on hinges about two axes in turn, moving under gravity."""
     builder = SceneBuilder("chain", gravity=(0.0, 0.0, -9.81))
     if bodies > MOST[ALGORITHMS[round(algorithm)]]:
-        bodies = 1.0  # it will not be run
+        bodies = 1.0  # no run needs it
     rng = np.random.default_rng(3)
     for k in range(count(bodies)):
         builder.rigid_body(f"b{k}", mass=1.0, com=(0.5, 0.02, 0.01), inertia=(0.01, 0.09, 0.09))
@@ -53,7 +53,7 @@ def measure(scene: Scene, bodies: float, algorithm: float) -> Outcome:
 
 
 def rounding(bodies: Real, algorithm: Real) -> Real:
-    """log10 of gamma(n), n the roundings in a row: of a factorisation of n speeds and of two sweeps over n bodies."""
+    """log10 of gamma(n), n the successive roundings of a factorisation of n speeds and of two sweeps over n bodies."""
     return np.asarray(np.log10((1 + PRODUCTS) * bodies * ROUNDING))
 
 

@@ -17,7 +17,7 @@ from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")
 GRAVITY, LENGTH, CENTRE, INERTIA = 9.81, 1.3, 0.47, 0.1  # m/s^2, m, m, kg m^2 of the inner body of 1 kg
-FACTORS = (0.9873, 0.9941, 1.0049, 1.0122)  # of mass and inertia, lest one is lucky in its digits
+FACTORS = (0.9873, 0.9941, 1.0049, 1.0122)  # of mass and inertia, so that none is exact by luck
 STATES = 4  # of each
 ROUNDING = 2.0**-53
 
@@ -25,7 +25,8 @@ ROUNDING = 2.0**-53
 class Inputs(NamedTuple):
     """What the accelerations depend on: angles (rad) and rates (rad/s) of both hinges.
 
-    The chain is stretched: bent, the outer mass would have its own inertia about the first hinge, and all be well.
+    The chain is stretched. If it were bent, the outer mass would have inertia of its own about the first hinge, and no
+    digits would be lost.
     """
 
     angles: Real
@@ -34,7 +35,7 @@ class Inputs(NamedTuple):
 
 @cache
 def states() -> tuple[Inputs, ...]:
-    """Random ones, the same for every cell; measured is the worst."""
+    """Random states, the same for every cell, of which the worst is measured."""
     rng = np.random.default_rng(8)
     return tuple(Inputs(np.array([rng.uniform(-np.pi, np.pi), 0.0]), rng.normal(size=2)) for _ in range(STATES))
 
@@ -93,7 +94,7 @@ def measure(algorithm: Algorithm, ratio: float, slender: float) -> Outcome:
 
 
 def left_over(ratio: Real, slender: Real) -> tuple[Real, Real]:
-    """Determinant of M over M22, and M11: what the first hinge has to move, outer body yielding and not."""
+    """Determinant of M over M22, and M11: what the first hinge moves, with the outer hinge free and locked."""
     own = slender * ratio * CENTRE**2
     inner, M22 = INERTIA + CENTRE**2, own + ratio * CENTRE**2
     return inner + ratio * LENGTH**2 * own / M22, inner + own + ratio * (LENGTH + CENTRE) ** 2
@@ -107,9 +108,9 @@ def scaled_condition(ratio: Real, slender: Real) -> Real:
 
 
 def cancellation(ratio: Real, slender: Real) -> Real:
-    """log10 of the rounding of the outer mass over what is left of it: P - P H D^-1 H' P cancels at the hinge.
+    """log10 of the rounding of the outer mass over its remainder: P - P H D^-1 H' P cancels at the hinge.
 
-    A bound: where what is left is the outer body's, forces and inertia have the same error, and it cancels again.
+    This is a bound: where the outer body provides the remainder, forces and inertia have the same error, which cancels.
     """
     left, _ = left_over(ratio, slender)
     return np.asarray(np.log10(ROUNDING * np.maximum(ratio * LENGTH**2 / left, 1.0)))

@@ -14,7 +14,7 @@ from flexmb.typing import Real
 
 MASS, OMEGA = 1.0, 1.0  # kg, rad/s: the disc and its critical speed
 INTERNAL = 0.02  # N s/m
-ANCHOR = 1e9  # kg: stands for the ground beyond the disc; what it gives way is a billionth
+ANCHOR = 1e9  # kg: stands for the ground beyond the disc; it gives way by a billionth
 NEUTRAL = 1e-7  # of the critical speed
 
 
@@ -40,9 +40,9 @@ def scene(speed: float, ratio: float) -> Scene:
 
 
 def measure(scene: Scene, speed: float, ratio: float) -> Outcome:
-    """Growth rate over critical speed of disturbances of the disc and of the speed of the surroundings, in a turn.
+    """Growth rate over critical speed, in one turn, of disturbances of the disc and of the speed of the surroundings.
 
-    Turning and fixed axes are mixed: the motion repeats itself with the turns (Floquet).
+    Turning and fixed axes are mixed, so the coefficients repeat with every turn (Floquet).
     """
     system = compile(scene)
     q, u = system.coordinate("bending").start, system.nq + system.speed("bending").start

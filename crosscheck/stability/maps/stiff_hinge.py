@@ -49,7 +49,7 @@ def scene(step: float, stiffness: float) -> Scene:
 
 
 def measure(scene: Scene, step: float, stiffness: float) -> Outcome:
-    """Growth of the logarithm of the hinge angles' size in a step, from their largest of the two halves of a run."""
+    """Growth of the logarithm of the hinge angles' size in a step, from the largest in each half of a run."""
     done = simulate(scene, step * STEPS, "rk4", step=step, samples=step * STEPS / PARTS * np.arange(PARTS + 1))
     if not done.finished:
         return Outcome(status="failed", message=done.message)
@@ -58,7 +58,7 @@ def measure(scene: Scene, step: float, stiffness: float) -> Outcome:
 
 
 def amplification(step: Real, stiffness: Real) -> Real:
-    """log of the largest |R(h lambda)| over the eigenvalues of the linear chain; the slow ones, of |R| = 1, as zero."""
+    """log of the largest |R(h lambda)| over the eigenvalues of the linear chain; slow ones, |R| = 1, count as zero."""
     M, k = np.linalg.inv(mass_matrix()), np.ravel(stiffness)
     A = np.zeros((k.size, 4, 4))
     A[:, :2, 2:] = np.eye(2)

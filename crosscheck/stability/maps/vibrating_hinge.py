@@ -16,7 +16,7 @@ from flexmb.typing import Real
 
 GRAVITY, LENGTH = 9.81, 1.0
 OMEGA_0 = np.sqrt(GRAVITY / LENGTH)
-NEUTRAL = 1e-5  # of the drive's frequency: rounding, of which the multipliers near 1 show the square root
+NEUTRAL = 1e-5  # of the drive's frequency: multipliers near 1 show the square root of rounding
 
 
 def scene(frequency: float, amplitude: float) -> Scene:

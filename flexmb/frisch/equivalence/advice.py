@@ -1,7 +1,8 @@
-"""Which model of an appendage is better for which question: the numbers behind the paper's "Interpretation of results".
+"""Which model of an appendage is better for which question, with the numbers of the paper's "Interpretation of
+results".
 
-A spring-hinged rigid body has one vibration for each axis, but moves exactly however far it turns. Modes have as many
-vibrations as they are, but leave out what is of second order in the deflection.
+A spring-hinged rigid body has only one vibration for each axis, but moves exactly however far it turns. Modes bring one
+vibration each, but leave out everything of second order in the deflection.
 """
 
 from __future__ import annotations
@@ -30,11 +31,11 @@ class Verdict:
 
 @dataclass(frozen=True)
 class Equivalence:
-    """An appendage by modes against a rigid body on a spring hinge.
+    """An appendage with modes compared with a rigid body on a spring hinge.
 
-    `accuracy` (part of one) that is asked for; `fits` by name: `AT_CLAMP`, `BEST` and, where a point was given,
+    `accuracy` that is asked for, as a fraction; `fits` by name: `AT_CLAMP`, `BEST` and, where a point was given,
     `GIVEN`; `directions`: how the modes converge about and along the body axes and hinge axes; `verdicts` about the
-    given hinge, or the best.
+    given hinge, or else the best one.
     """
 
     appendage: Appendage
@@ -54,8 +55,8 @@ def equivalence(
 ) -> Equivalence:
     """Compare an appendage with rigid models of it.
 
-    `accuracy`, a part of one, decides verdicts and counts of modes; `axes` (k,3) and `modes` as in `best_hinge`;
-    `point` (3,) m, of a hinge to be judged beside the best one. Raises ValueError as `best_hinge` does.
+    `accuracy`, a fraction, decides verdicts and counts of modes; `axes` (k,3) and `modes` as in `best_hinge`; `point`
+    (3,) m: a hinge to be judged beside the best one. Raises ValueError as `best_hinge` does.
     """
     if not 0.0 < accuracy < 1.0:
         raise ValueError(f"accuracy is a part of one, such as 0.05, got {accuracy:g}")
@@ -70,7 +71,8 @@ def equivalence(
 
 
 def coupling_error(body: Appendage, fit: Fit) -> float:
-    """Largest relative difference of effective mass and effective inertia, hinge against its modes, along the modes.
+    """Largest relative difference of effective mass and effective inertia between a hinge and its modes, along the
+    modes.
 
     Base and hinge exchange momentum as base and modes do if these agree: at resonance they are the pull on the base.
     """
@@ -128,7 +130,7 @@ def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Verdict, ...]
 
 
 def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
-    """Parts of the inertia about the hinge axes, and of the mass along the modes' velocity, beyond the fit's modes."""
+    """Fractions of inertia about the hinge axes, and of mass along the modes' velocity, that other modes move."""
     modal, rigid = modal_effective_inertia(body, fit.modes), inertia_about_origin(body.moving)
     turning = [(q @ modal[:3, :3] @ q) / (q @ rigid[:3, :3] @ q) for q in fit.hinge.axes]
     velocity = [body.parameters.A[mode] for mode in fit.modes]
@@ -137,7 +139,7 @@ def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
 
 
 def percent(value: float) -> str:
-    """A part of one in percent with three digits; round-off is zero."""
+    """A fraction in percent with three digits; round-off is shown as zero."""
     if abs(value) < 1e-9:
         return "0 %"
     return f"{100.0 * value:.3g} %" if abs(value) >= 1e-5 else "< 0.001 %"

@@ -1,4 +1,4 @@
-"""An elastic appendage at a limb end: modal data of a body clamped to its inboard body, and where a scene has one."""
+"""An elastic appendage at a limb end: modal data of a body that is clamped to its inboard body, taken from a scene."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ class Appendage:
 
     @cached_property
     def moving(self) -> ModeParameters:
-        """Parameters of the points that some mode moves or turns: what sits in the clamp belongs to the base."""
+        """Parameters of the points that some mode moves or turns; points in the clamp belong to the base."""
         model = self.model
         size = np.sqrt(np.sum(model.position**2, axis=1).max())
         shapes = np.maximum(np.abs(model.translation), size * np.abs(model.rotation)).max(axis=(1, 2))
@@ -71,8 +71,9 @@ def inertia_about_origin(p: ModeParameters) -> Real:
 
 
 def appendage(model: FlexibleModel, name: str = "appendage") -> Appendage:
-    """The appendage of a flexible model. Raises ValueError, which calls it `name`, where the paper's comparison has no
-    sense: no modes, modes that are not clamped at the origin, or modes without stiffness."""
+    """The appendage of a flexible model. Raises ValueError, naming it `name`, where the paper's comparison makes no
+    sense: no modes, modes that are not clamped at the origin, or modes without stiffness.
+    """
     if model.mode_count == 0:
         raise ValueError(f"{name}: a rigid body has no modes to compare with a hinge; choose a flexible body")
     if not model.clamped:
@@ -110,10 +111,10 @@ def with_modes(model: FlexibleModel, chosen: NDArray[np.intp]) -> FlexibleModel:
 def appendage_of(scene: Scene, body: str, modes: int | None = None) -> Appendage:
     """The body of that name as an appendage of its inboard body.
 
-    `modes`: how many modes to look at: a beam gets them from its finite elements whatever the scene says, a modal body
-    has those it was given. Default: all of those, and of a beam the lower half of the finite elements' modes, which are
-    good, up to `DEFAULT_MODES`. Raises ValueError where the body is not there, not flexible, not clamped, or not at a
-    limb end, naming what is in the way.
+    `modes`: how many modes to look at. A beam gets them from its finite elements, whatever the scene says; a modal body
+    has only those it was given. Default: all of a modal body; of a beam the lower half of the finite elements' modes,
+    which are accurate, up to `DEFAULT_MODES`. Raises ValueError, saying why, where the body does not exist, is not
+    flexible, not clamped, or not at a limb end.
     """
     found = next((candidate for candidate in scene.bodies if candidate.name == body), None)
     if found is None:
@@ -152,7 +153,7 @@ def _first(body: Appendage, modes: int | None) -> Appendage:
 
 
 def _check_limb_end(scene: Scene, body: str) -> None:
-    """Nothing is attached to the body, and its hinge is at the clamp."""
+    """Raise ValueError unless the hinge of the body is at the clamp and nothing else is attached to the body."""
     attached = [f'hinge "{hinge.name}"' for hinge in scene.hinges if hinge.parent == body]
     attached += [f'point mass "{mass.name}"' for mass in scene.point_masses if mass.body == body]
     attached += [f'wheel "{wheel.name}"' for wheel in scene.wheels if wheel.body == body]

@@ -10,9 +10,9 @@ the rates adot_n = s_n . [omega; 0] / m, its projections in the norm of kinetic 
     (151)   sum_n adot_n Q_n  ->  Phi . omega
 
 and the same for a velocity of the clamp, with [0; v] instead. The sum of s_n s_n' / m over the modes is the effective
-inertia (6,6) that follows the base elastically; it tends to the rigid body's about the clamp. What is left over of it
-is fixed to the base in a model with that many modes, at whatever frequency the base moves. What sits in the clamp
-itself, so that no mode moves it, is fixed there anyway and not counted.
+inertia (6,6) that follows the base elastically; it tends to the rigid body's about the clamp. The remainder is fixed to
+the base in a model with that many modes, at whatever frequency the base moves. Inertia in the clamp itself, which no
+mode moves, is fixed to the base anyway and is not counted.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ class Direction:
     `motion` (6,): unit [omega; velocity of the clamp], `name` of it; `inertia`: the rigid body's for it, kg m^2 about
     the clamp or kg; `mode_shares` (n,): effective inertia of each mode as a part of that; `remainder` (n+1,): what is
     left over; `relations` (3,n+1): mismatches of (149)-(151) in the norm of `equivalence`, as parts of the energy of
-    the rigid motion; empty (0,n+1) for motion along a direction, of which the relations do not speak.
+    the rigid motion; empty (0,n+1) for motion along a direction, about which the relations say nothing.
     """
 
     name: str

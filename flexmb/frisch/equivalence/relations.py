@@ -1,4 +1,4 @@
-"""An appendage by modes against the same appendage as a rigid body on a spring hinge, (149)-(151).
+"""An appendage with modes compared with the same appendage as a rigid body on a spring hinge, (149)-(151).
 
 The two models describe the same motion as far as mass-centre velocity, rate of the inertia tensor and relative angular
 momentum agree, seen from the base. With rates adot_n of the modes and omega = sum_m thetadot_m q_m of the hinge,
@@ -7,7 +7,7 @@ momentum agree, seen from the base. With rates adot_n of the modes and omega = s
     (150)   omega x Phi - Phi x omega     against   sum_n adot_n E_n
     (151)   Phi . omega                   against   sum_n adot_n Q_n
 
-**Norm.** What is left over is measured by kinetic energy. A motion with the mass-centre velocity v and the angular
+**Norm.** The differences are measured by kinetic energy. A motion with the mass-centre velocity v and the angular
 momentum h about the mass centre has at least the energy (m v.v + h.Phi^-1.h) / 2, that of a rigid body; the modes have
 sum_mn adot_m M1_mn adot_n / 2, which is m |adot|^2 / 2 under (41). So the mismatches are
 
@@ -48,7 +48,8 @@ class SpringHinge:
 
 @dataclass(frozen=True)
 class Relation:
-    """One equivalence relation with numbers: `equation` of the paper, what it is about, both sides, their mismatch.
+    """One equivalence relation with numbers: `equation` of the paper, the quantity it compares, both sides, their
+    mismatch.
 
     `rigid` and `flexible` are (3,) or (3,3), in SI units; `mismatch` is the difference in the norm of this module.
     """
@@ -82,7 +83,7 @@ class Fit:
 def rate_relations(
     body: Appendage, hinge: SpringHinge, rates: ArrayLike, hinge_rates: ArrayLike | None = None
 ) -> tuple[Relation, Relation, Relation]:
-    """(149)-(151) for modal rates (n,) and hinge rates (k,) rad/s, by default those that make the norm smallest."""
+    """(149)-(151) for modal rates (n,) and hinge rates (k,) rad/s, by default those with the smallest norm."""
     p, r = body.parameters, np.asarray(rates, dtype=float)
     turn = best_rates(body, hinge.point, hinge.axes, r) if hinge_rates is None else np.asarray(hinge_rates, dtype=float)
     omega = turn @ hinge.axes
@@ -157,12 +158,12 @@ def turning_axis(body: Appendage, mode: int) -> Real:
 
 
 def best_hinge(body: Appendage, axes: ArrayLike | None = None, modes: tuple[int, ...] | None = None) -> Fit:
-    """The spring hinge that describes the appendage best: its point makes the norm of (149)-(151) smallest.
+    """The spring hinge that describes the appendage best: at its point the norm of (149)-(151) is smallest.
 
     `axes` (k,3): default one, about which the first of `modes` turns the appendage. `modes`, one for each axis, counted
-    from 0: default the mode that a turn about the axis explains most of, and without `axes` the lowest. Springs give
-    each axis the frequency of its mode with the base fixed. Along a single axis the point is free: it is nearest to the
-    clamp. Raises ValueError for axes that depend on one another and for modes that no hinge can follow.
+    from 0; default: the mode of which a turn about the axis explains most, and without `axes` the lowest. Springs give
+    each axis the frequency of its mode with the base fixed. The point may slide along a single axis; the place nearest
+    to the clamp is taken. Raises ValueError for axes that depend on one another and for modes that no hinge can follow.
     """
     axes, modes = _choice(body, axes, modes)
     starts = [_nearest_point(body, axis, mode) for axis, mode in zip(axes, modes, strict=True)]
@@ -249,7 +250,7 @@ def _choice(body: Appendage, axes: ArrayLike | None, modes: tuple[int, ...] | No
 
 
 def _explained(body: Appendage, axis: Real, mode: int) -> float:
-    """Part of the squared norm of a mode's (149)-(151) that a hinge about `axis` at the best point takes away."""
+    """Fraction of the squared norm of a mode's (149)-(151) that a hinge about `axis` at the best point removes."""
     whole = _modal_side(body.parameters, np.eye(body.mode_count)[mode])
     try:
         left = _left(body, _nearest_point(body, axis, mode), axis[None], mode)
@@ -259,10 +260,11 @@ def _explained(body: Appendage, axis: Real, mode: int) -> float:
 
 
 def _nearest_point(body: Appendage, axis: Real, mode: int) -> Real:
-    """Where a hinge about one axis makes the norm smallest, nearest to the clamp.
+    """The point, nearest to the clamp, where a hinge about one axis makes the norm smallest.
 
-    (150) and (151) do not know the point: they fix the rate thetadot; then the point puts the part of (149) across the
-    axis right, thetadot q x (alpha - point) = A_n. All mass in one point can turn about any; that is the clamp then.
+    (150) and (151) do not depend on the point and fix the rate thetadot. Then the point satisfies the part of (149)
+    across the axis: thetadot q x (alpha - point) = A_n. If all mass is in one point, it can turn about any point; the
+    clamp is taken.
     """
     p = body.parameters
     if _compact(p):
@@ -276,7 +278,7 @@ def _nearest_point(body: Appendage, axis: Real, mode: int) -> Real:
 
 
 def _left(body: Appendage, point: Real, axes: Real, mode: int) -> Real:
-    """What is left over of (149)-(151) for unit rate of a mode, weighted by the norm."""
+    """The remainder of (149)-(151) for unit rate of a mode, weighted by the norm."""
     p, unit = body.parameters, np.eye(body.mode_count)[mode]
     columns, flexible = _hinge_columns(p, point, axes), _modal_side(p, unit)
     return (columns @ best_rates(body, point, axes, unit) - flexible) / np.sqrt(_scale(p, unit))
@@ -333,5 +335,5 @@ def _compact(p: ModeParameters) -> bool:
 
 
 def _least_squares(columns: Real, side: Real) -> Real:
-    """x that makes |columns x - side| smallest, the shortest of them."""
+    """The shortest x that makes |columns x - side| smallest."""
     return np.asarray(np.linalg.lstsq(columns, side, rcond=None)[0], dtype=np.float64)

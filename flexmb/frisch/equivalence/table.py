@@ -1,4 +1,4 @@
-"""What the comparison of an appendage with spring-hinged rigid models says in a terminal."""
+"""The comparison of an appendage with spring-hinged rigid models as tables in a terminal."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def _mismatch(relations: tuple[Relation, ...], result: Equivalence) -> list[Text
 
 
 def _hinges(result: Equivalence) -> Table:
-    """The rigid models themselves, and how they and their modes pull at the base."""
+    """The rigid models themselves, and the loads that they and their modes exert on the base."""
     body = result.appendage
     caption = "Effective mass and inertia, of the rigid body's, follow the vibration; the rest follows the base."
     table = _table("\nSpring-hinged rigid models", caption)

@@ -1,4 +1,4 @@
-"""Is a scene one that can be simulated? Every defect is found before anything runs, with its place and its remedy."""
+"""Can this scene be simulated? Every defect is found before anything runs, with its place and its remedy."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wh
 def check_scene(scene: Scene, t_end: float | None = None) -> None:
     """Raise SceneError with all problems of a scene, or return. With `t_end` (s) profiles must cover the run.
 
-    SID bodies and every fidelity level pass: whether they can be run is for `compile` to say.
-    TypeError for what is no scene at all.
+    SID bodies and every fidelity level pass: `compile` decides whether they can be run. Raises TypeError for anything
+    but a Scene.
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")

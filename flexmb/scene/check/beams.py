@@ -11,8 +11,8 @@ from flexmb.scene.check.walk import sound
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene
 
-# Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. Wider than any structure
-# that is built, and the soft benchmark beams of the literature (100 m/s) are inside.
+# Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
+# any structure that is built; the soft benchmark beams of the literature (100 m/s) are inside.
 WAVE_SPEED = (50.0, 20_000.0)  # m/s
 THICKEST = 0.5  # radius of gyration over length: beyond it nothing is slender
 # GJ / (EIy + EIz) and GA / EA are below 0.75 for isotropic materials; laminates reach a few times that.
@@ -70,7 +70,7 @@ def _stations(place: Place, body: BeamBody) -> Iterator[Problem]:
 
 
 def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Problem]:
-    """A slip of units in one of the stiffnesses, or between stiffness and mass."""
+    """Problems that look like a slip of units in one of the stiffnesses, or between stiffness and mass."""
     check = "check the units, a factor of 1000 for instance"
     speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
     if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
@@ -133,7 +133,7 @@ def _attachments(body: BeamBody) -> int:
 def _available(body: BeamBody) -> int:
     """Coordinates with inertia of the wanted families.
 
-    A free-free beam has the root's in addition, but as many rigid motions, which are no modes.
+    A free-free beam has the root's coordinates in addition, but just as many rigid motions, which are not modes.
     """
     bending = body.elements if body.mass == "lumped" and not _has_rotary(body) else 2 * body.elements
     counts = {"axial": body.elements, "torsion": twisting_points(body), "bending_y": bending, "bending_z": bending}

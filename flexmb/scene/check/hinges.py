@@ -29,7 +29,7 @@ def hinges(scene: Scene) -> Iterator[Problem]:
 
 
 def closures(scene: Scene) -> Iterator[Problem]:
-    """A closure without an axis is not given one."""
+    """A closure of a kind without an axis must not be given one."""
     for place, closure in sound(scene, "closures"):
         if closure.axis != Z_AXIS and closure.type not in ("revolute", "prismatic", "cylindrical"):
             what = f"a {closure.type} closure has no axis of its own"

@@ -19,8 +19,8 @@ from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero at the clamp, this well
-# Lowest frequency times size (m/s). The upper end is the wave speed in the stiffest materials, which no body's first
-# mode reaches; the lower end is a kilometre of membrane at a microhertz.
+# Lowest frequency times size (m/s). The upper limit is the wave speed in the stiffest materials, which no body's first
+# mode reaches; the lower limit is a membrane of a kilometre at a microhertz.
 SPEED = (1e-3, 20_000.0)
 
 
@@ -155,7 +155,7 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Prob
 def _is_loose(arrays: ModalArrays, floating: Real, scale: Real, slack: float) -> bool:
     """Whether the clamp does not hold a rigid-body motion of the points that is among the modes.
 
-    That they are moved as a rigid body is no fault by itself: a lump at the tip of a beam, say.
+    Points that a mode moves as a rigid body are no fault by themselves: a lump at the tip of a beam does so.
     """
     stiffness = arrays.stiffness * scale
     values, vectors = np.linalg.eigh(floating * scale)
@@ -165,7 +165,7 @@ def _is_loose(arrays: ModalArrays, floating: Real, scale: Real, slack: float) ->
 
 
 def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
-    """Clamped modes vanish at the body origin: at the node listed there, and at a point that sits there."""
+    """Clamped modes must vanish at the body origin: at the node listed there, and at a point that sits there."""
     remedy = 'subtract the rigid-body part from the mode, or make the boundary "free-free"'
     size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
     largest = float(np.max(np.abs(arrays.translation_modes)))

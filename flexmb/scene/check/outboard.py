@@ -1,7 +1,8 @@
 """Inertia beyond hinges: a freedom that moves nothing has no acceleration.
 
-Aligned axes of a gimbal move nothing, whatever it carries. All else is checked where it can be told without kinematics:
-for the child and everything welded to it, unless more mass hangs from these by moving hinges.
+A gimbal with aligned axes has a freedom that moves nothing, whatever the gimbal carries. Everything else is checked
+where no kinematics is needed: for the child and everything welded to it, unless more mass hangs from these by moving
+hinges.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ def entries(scene: Scene, collection: str) -> Iterator[tuple[Place, Any]]:
 
 
 def sound(scene: Scene, collection: str) -> Iterator[tuple[Place, Any]]:
-    """Like `entries`, without the items that hold a NaN or an infinity: no physics can be asked of those."""
+    """Like `entries`, without the items that hold a NaN or an infinity: physical checks would mean nothing there."""
     for place, item in entries(scene, collection):
         if not any(non_finite(value) for _, _, value in values(place, item)):
             yield place, item
