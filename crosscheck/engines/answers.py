@@ -14,12 +14,11 @@ from typing import Any, get_args
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, MarkerPath, Model, Status, Support, Trajectory
+from crosscheck.engines.contract import ENERGIES, OUTPUTS, Effort, MarkerPath, Model, Status, Support, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 RUNGS = 3
-ENERGIES = ("kinetic", "strain", "spring", "gravity")
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -78,8 +77,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
     finished, message = found.status == "finished", _text(found.message, "message")
     _require(finished or bool(message.strip()), f'a "{found.status}" run says in its message when and why')
     count = _reached(found.times, times, finished)
-    hinges, wheels = _names(scene.hinges), _names(scene.wheels)
-    loaded = hinges | _names(scene.closures) | _names(scene.point_masses)
+    known = _known(scene)
     run = Trajectory(
         status=found.status,
         message=message,
@@ -88,18 +86,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
             name: _path(path, f"markers[{name!r}]", count)
             for name, path in _named_by(found.markers, "markers", _names(scene.markers))
         },
-        loads=_loads(found.loads, "loads", loaded, count),
-        wheel_loads=_loads(found.wheel_loads, "wheel_loads", wheels, count),
-        drives={
-            name: _array(values, f"drives[{name!r}]", count, None)
-            for name, values in _named_by(found.drives, "drives", hinges | wheels)
-        },
-        energy={
-            kind: _array(values, f"energy[{kind!r}]", count)
-            for kind, values in _named_by(found.energy, "energy", set(ENERGIES))
-        },
-        momentum=None if found.momentum is None else _array(found.momentum, "momentum", count, 6),
-        work=None if found.work is None else _array(found.work, "work", count),
+        **{name: _output(getattr(found, name), name, count, known.get(name)) for name in OUTPUTS},
         wall_s=_number(found.wall_s, "wall_s"),
         evaluations=_count(found.evaluations),
     )
@@ -140,8 +127,24 @@ def _path(found: Any, where: str, count: int) -> MarkerPath:
     )
 
 
-def _loads(found: Any, where: str, known: set[str], count: int) -> dict[str, Real]:
-    return {name: _array(values, f"{where}[{name!r}]", count, 6) for name, values in _named_by(found, where, known)}
+def _known(scene: Scene) -> dict[str, set[str]]:
+    """Who can have each of the outputs that several items have."""
+    hinges, wheels = _names(scene.hinges), _names(scene.wheels)
+    return {
+        "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
+        "wheel_loads": wheels,
+        "drives": hinges | wheels,
+        "energy": set(ENERGIES),
+    }
+
+
+def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
+    """An output of a run in plain arrays: by name where `known` items can have it, else one array or None."""
+    columns = OUTPUTS[where]
+    if known is not None:
+        named = _named_by(found, where, known)
+        return {name: _array(values, f"{where}[{name!r}]", count, *columns) for name, values in named}
+    return None if found is None else _array(found, where, count, *columns)
 
 
 def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
@@ -180,9 +183,12 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
     for name, path in run.markers.items():
         for part in fields(path):
             yield f"markers[{name!r}].{part.name}", getattr(path, part.name)
-    for group in ("loads", "wheel_loads", "drives", "energy"):
-        yield from ((f"{group}[{name!r}]", values) for name, values in getattr(run, group).items())
-    yield from ((name, getattr(run, name)) for name in ("momentum", "work") if getattr(run, name) is not None)
+    for output in OUTPUTS:
+        found = getattr(run, output)
+        if isinstance(found, dict):
+            yield from ((f"{output}[{name!r}]", values) for name, values in found.items())
+        elif found is not None:
+            yield output, found
 
 
 def _cut(run: Trajectory, count: int) -> Trajectory:
@@ -194,13 +200,14 @@ def _cut(run: Trajectory, count: int) -> Trajectory:
             name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
             for name, path in run.markers.items()
         },
-        loads={name: values[:count] for name, values in run.loads.items()},
-        wheel_loads={name: values[:count] for name, values in run.wheel_loads.items()},
-        drives={name: values[:count] for name, values in run.drives.items()},
-        energy={kind: values[:count] for kind, values in run.energy.items()},
-        momentum=None if run.momentum is None else run.momentum[:count],
-        work=None if run.work is None else run.work[:count],
+        **{name: _first_samples(getattr(run, name), count) for name in OUTPUTS},
     )
+
+
+def _first_samples(output: Any, count: int) -> Any:
+    if isinstance(output, dict):
+        return {name: values[:count] for name, values in output.items()}
+    return None if output is None else output[:count]
 
 
 def _effort(found: Any, where: str) -> Effort:

@@ -12,12 +12,12 @@ from crosscheck.judging.figures import worse
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import GRAVITY, Finding, Status, Verdict, VerdictKind, compare, conserve
 from crosscheck.library.accepted import key
-from crosscheck.library.case import Comparison, Conservation, Control, Side
+from crosscheck.library.case import Comparison, ComparisonSide, Conservation, Control
+from crosscheck.library.channels import CONSERVED
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.kinds import CaseRecord
 from flexmb.run.channels import matches, norms
 
-MOMENTUM = {"linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
 CLOCK = 1e-9  # relative difference of two clocks that show the same time: old records hold the engines' own
 TRUE_MODEL = "conservation law"
 
@@ -42,8 +42,8 @@ class Question:
     case: CaseRecord
     name: str
     kind: VerdictKind
-    a: Side
-    b: Side
+    a: ComparisonSide
+    b: ComparisonSide
     expected: Status
     why: str
 
@@ -137,11 +137,11 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
 
 def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict:
     name = f"{item.quantity.replace('_', ' ')} conserved"
-    side = Side(variant=item.variant, engine=engine)
-    law = Side(variant=item.variant, engine=TRUE_MODEL)
+    side = ComparisonSide(variant=item.variant, engine=engine)
+    law = ComparisonSide(variant=item.variant, engine=TRUE_MODEL)
     question = Question(case.case, name, "conservation", side, law, item.expect, item.reason)
     result = case.get(item.variant, engine)
-    channel = "energy.total" if item.quantity == "energy" else MOMENTUM[item.quantity]
+    channel = CONSERVED[item.quantity]
     finding = _absent(result, channel) or _drift(result, channel, item)
     beyond = outside(item, channel, finding) if finding.status == item.expect else ""
     return question.verdict(channel, item.limit, finding, beyond)

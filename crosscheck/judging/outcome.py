@@ -27,7 +27,7 @@ class Absence:
 
 
 @dataclass(frozen=True)
-class Outcome:
+class SessionOutcome:
     """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
     `strict`: figures that are worse than recorded, or not recorded, are not as expected.
@@ -120,9 +120,9 @@ class Outcome:
         return sum(noticed), len(noticed)
 
 
-def conclude(session: Session, strict: bool = False) -> Outcome:
+def conclude(session: Session, strict: bool = False) -> SessionOutcome:
     """Judge every case of a session."""
-    return Outcome(
+    return SessionOutcome(
         verdicts={case.case.case: judge(case) for case in session.cases},
         absences=[absence for case in session.cases for absence in _absences(case)],
         broken=tuple(str(line) for line in session.broken),

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, spatial, unknown
+from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
@@ -81,7 +81,7 @@ class Result:
         ladder = [run for run in self._ladder() if run.status == "finished"]
         if _without_effect(ladder):
             ladder = ladder[-1:]
-        rungs = [Rung(run.effort_value, self.values(channel, run)) for run in ladder]
+        rungs = [RungSignal(run.effort_value, self.values(channel, run)) for run in ladder]
         size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
         return estimate(channel, finest.effort_kind, rungs, finest.evaluations, size)
 

@@ -14,7 +14,7 @@ from itertools import combinations
 import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.library.case import Chart, Comparison, Conservation, Control, RunFile, Side, Variant
+from crosscheck.library.case import Chart, Comparison, ComparisonSide, Conservation, Control, RunFile, Variant
 from flexmb.scene.problems import closest
 
 
@@ -73,14 +73,14 @@ def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
             comparison,
             variant=None,
             engines=(),
-            a=Side(variant=comparison.variant, engine=first),
-            b=Side(variant=comparison.variant, engine=second),
+            a=ComparisonSide(variant=comparison.variant, engine=first),
+            b=ComparisonSide(variant=comparison.variant, engine=second),
         )
         for first, second in combinations(engines, 2)
     ]
 
 
-def _wanted(asked: tuple[str, ...], sides: tuple[Side, Side]) -> bool:
+def _wanted(asked: tuple[str, ...], sides: tuple[ComparisonSide, ComparisonSide]) -> bool:
     """Whether two sides are compared when these engines are asked for."""
     involved = {side.engine for side in sides}
     if not asked:

@@ -18,6 +18,7 @@ from typing import Any, BinaryIO
 
 import msgspec
 
+from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
 from crosscheck.records.packing import packed_bytes, unpack
@@ -119,17 +120,9 @@ def _check_shapes(record: RunRecord) -> None:
     for name, packed in record.channels.items():
         if rows is None or len(packed.shape) != 2 or packed.shape[:1] != rows or packed.shape[1] == 0:
             raise ValueError(f"{name} of shape {packed.shape} does not belong to times of shape {rows}")
-        if packed.shape[1] != (_width(name) or packed.shape[1]):
+        part = part_of(name)
+        if part is not None and part.width not in (None, packed.shape[1]):
             raise ValueError(f"{name} has {packed.shape[1]} columns")
-
-
-def _width(channel: str) -> int | None:
-    """Columns of a channel; None for one that may have any number, as a drive of several coordinates."""
-    if channel.endswith(".orientation"):
-        return 4
-    if channel.startswith(("marker:", "load:", "wheel_load:", "momentum.")):
-        return 3
-    return 1 if channel.startswith("energy.") or channel == "work" else None
 
 
 def _set_broken_lines_aside(file: Path, kind: Any) -> None:

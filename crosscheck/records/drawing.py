@@ -7,7 +7,7 @@ import msgspec
 from flexmb.scene.bodies import Vector
 
 
-class Point(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
+class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A marker ("" is the World origin) and an offset in its axes (m)."""
 
     marker: str
@@ -19,7 +19,7 @@ class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True
 
     body: str
     kind: str
-    points: tuple[Point, ...]
+    points: tuple[CarriedPoint, ...]
 
 
 class Drawing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):

@@ -15,11 +15,11 @@ from crosscheck.records.packing import Packed
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
 
 
-class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="record"):
+class _OneRecord(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, tag_field="record"):
     """Base of all records."""
 
 
-class Environment(_Strict, frozen=True, kw_only=True, tag="environment"):
+class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
     """Machine and versions of one session of running, and what was asked for: no engines named means all.
 
     A session that `confirms` writes a `Confirmed` for each earlier result that it lets stand; older versions did not.
@@ -44,7 +44,7 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     error: str = ""
 
 
-class CaseRecord(_Strict, frozen=True, kw_only=True, tag="case"):
+class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, and the
     figures accepted for it."""
 
@@ -56,7 +56,7 @@ class CaseRecord(_Strict, frozen=True, kw_only=True, tag="case"):
     accepted: Accepted = {}
 
 
-class RunRecord(_Strict, frozen=True, kw_only=True, tag="run"):
+class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
     `role` is "main", "refined" or "control:<name>". `rung` counts the efforts of the ladder from coarse to fine out of
@@ -95,7 +95,7 @@ class RunRecord(_Strict, frozen=True, kw_only=True, tag="run"):
         return (self.case, self.variant, self.role, self.engine, self.effort)
 
 
-class Confirmed(_Strict, frozen=True, kw_only=True, tag="confirmed"):
+class Confirmed(_OneRecord, frozen=True, kw_only=True, tag="confirmed"):
     """Says that what earlier sessions recorded under this key is the result of this session too."""
 
     case: str

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from crosscheck.judging.outcome import Outcome, conclude
+from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
@@ -19,7 +19,7 @@ Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
 def write_all(
     records: Path, out: Path, strict: bool = False, chosen: Choice = standing
-) -> tuple[Outcome, Path]:
+) -> tuple[SessionOutcome, Path]:
     """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
 
     `strict`: figures that are worse than recorded, or not recorded, are not as expected.

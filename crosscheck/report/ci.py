@@ -11,7 +11,7 @@ import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.figures import recordable
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from flexmb.output.printable import printable
 
@@ -20,13 +20,13 @@ SHOWN = 40
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
 
 
-def write_verdicts(outcome: Outcome, file: Path) -> None:
+def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
     """verdicts.json: a list with one record a verdict."""
     records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
     file.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
-def write_summary(outcome: Outcome, file: Path) -> None:
+def write_summary(outcome: SessionOutcome, file: Path) -> None:
     """summary.md: headline, counts by case, what is not as expected, what did not run."""
     lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
     lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
@@ -54,7 +54,7 @@ def write_summary(outcome: Outcome, file: Path) -> None:
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
-def write_junit(outcome: Outcome, file: Path) -> None:
+def write_junit(outcome: SessionOutcome, file: Path) -> None:
     """junit.xml: one suite for each case, one test for each verdict, and one failing test for each run that is lost.
 
     Verdicts that need a lost run are skipped, because the failing test of that run stands for them.
@@ -89,7 +89,7 @@ def write_junit(outcome: Outcome, file: Path) -> None:
     ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
 
 
-def _complaint(outcome: Outcome, verdict: Verdict) -> str:
+def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:
     """Why a strict session rejects a verdict that is as expected."""
     if not outcome.strict or not verdict.ok:
         return ""

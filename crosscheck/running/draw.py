@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.records.drawing import Drawing, Line, Point
+from crosscheck.records.drawing import CarriedPoint, Drawing, Line
 from flexmb.scene.bodies import Body, RigidBody, Vector
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
@@ -38,8 +38,8 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
     """Box of equal inertia, arms from the mass centre to the hinges, wheels as circles."""
     position, rotation = _pose(body, marker)
 
-    def carried(point: Real) -> Point:
-        return Point(marker.name, _vector(rotation.inv().apply(point - position)))
+    def carried(point: Real) -> CarriedPoint:
+        return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
     com = np.array(body.com_m)
     lines = [Line(body=body.name, kind="box", points=tuple(map(carried, edge))) for edge in _box_edges(body)]
@@ -54,25 +54,25 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
 def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
     """Line through the body's markers by distance from its origin, starting at the inboard hinge if that is carried."""
     placed = sorted(markers, key=lambda marker: float(np.linalg.norm(_pose(body, marker)[0])))
-    points = [Point(marker.name, (0.0, 0.0, 0.0)) for marker in placed]
+    points = [CarriedPoint(marker.name, (0.0, 0.0, 0.0)) for marker in placed]
     root = _root_point(scene, body)
     if root is not None and np.linalg.norm(_pose(body, placed[0])[0]) > 0.0:
         points.insert(0, root)
     return Line(body=body.name, kind="beam", points=tuple(points))
 
 
-def _root_point(scene: Scene, body: Body) -> Point | None:
+def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
     """The inboard hinge point of a flexible body, carried by the World or by a rigid parent's marker."""
     hinge = next(hinge for hinge in scene.hinges if hinge.child == body.name)
     if hinge.parent == GROUND:
-        return Point("", hinge.parent_position_m)
+        return CarriedPoint("", hinge.parent_position_m)
     parent = next(each for each in scene.bodies if each.name == hinge.parent)
     marker = next((each for each in scene.markers if each.body == hinge.parent), None)
     if marker is None or not isinstance(parent, RigidBody):
         return None
     position, rotation = _pose(parent, marker)
     point = _node_point(parent, hinge.parent_node, hinge.parent_position_m)
-    return Point(marker.name, _vector(rotation.inv().apply(point - position)))
+    return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
 
 def _box_edges(body: RigidBody) -> list[tuple[Real, Real]]:

@@ -11,7 +11,7 @@ from scipy.ndimage import distance_transform_cdt
 
 from crosscheck.stability.map import NO_PREDICTION, StabilityMap
 from crosscheck.stability.map_records import CellRecord
-from crosscheck.stability.refine import Cell, Mesh
+from crosscheck.stability.refine import Cell, CellMesh
 
 ALLOWED = 1  # cells of the finest size
 FAR = 10**6
@@ -43,7 +43,7 @@ class MapVerdict(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
         return self.status == "agree"
 
 
-def judge(what: StabilityMap, mesh: Mesh, records: dict[Cell, CellRecord]) -> MapVerdict:
+def judge(what: StabilityMap, mesh: CellMesh, records: dict[Cell, CellRecord]) -> MapVerdict:
     """Hold the finished cells of a map against its overlay."""
     number, cells = mesh.painted()
     measured = np.array([measured_class(what, records[cell]) for cell in cells])[number]

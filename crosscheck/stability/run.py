@@ -16,9 +16,9 @@ from crosscheck.records.archive import Archive
 from crosscheck.records.machine import environment
 from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
 from crosscheck.stability.boundary import MapVerdict, judge, label
-from crosscheck.stability.map import Outcome, StabilityMap
+from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
-from crosscheck.stability.refine import Cell, Mesh
+from crosscheck.stability.refine import Cell, CellMesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"
 Listener = Callable[[StabilityMap, int, int], None]
@@ -40,7 +40,7 @@ class Finished(NamedTuple):
     """A map that was run: its mesh, what its cells gave, and the judgement."""
 
     map: StabilityMap
-    mesh: Mesh
+    mesh: CellMesh
     records: dict[Cell, CellRecord]
     verdict: MapVerdict
 
@@ -63,7 +63,7 @@ def run_map(
     known so far are done. Raises KeyError where there is no such map.
     """
     what = maps_of(provider)[name]
-    mesh = Mesh(what.x, what.y, what.depth if depth is None else depth)
+    mesh = CellMesh(what.x, what.y, what.depth if depth is None else depth)
     if fresh:
         records.unlink(missing_ok=True)
     mark = identity(what)
@@ -116,13 +116,13 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
     try:
         outcome = maps_of(job.provider)[job.map].outcome(job.x, job.y)
     except EngineMissing as error:
-        outcome = Outcome(status="did not run", message=str(error))
+        outcome = Measurement(status="did not run", message=str(error))
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        outcome = Outcome(status="failed", message=clean(f"{type(error).__name__}: {error}"))
+        outcome = Measurement(status="failed", message=clean(f"{type(error).__name__}: {error}"))
     if outcome.status == "measured" and not math.isfinite(outcome.value):
-        outcome = Outcome(status="failed", message=f"the quantity is {outcome.value}")
+        outcome = Measurement(status="failed", message=f"the quantity is {outcome.value}")
     emit(
         CellRecord(
             identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,

@@ -5,10 +5,10 @@ from __future__ import annotations
 from rich.table import Table
 
 from crosscheck.terminal.text import words
-from crosscheck.verify.against_case import Checked
+from crosscheck.verify.against_case import CsvOutcome
 
 
-def channels_table(checked: Checked) -> Table:
+def channels_table(checked: CsvOutcome) -> Table:
     """Every channel of a CSV: how far off, with which uncertainty, when worst, and why, where there is a guess."""
     table = Table("channel", "status", "E", "U", "goal", "worst at, s", "it looks as if", header_style="bold")
     for verdict in checked.all:

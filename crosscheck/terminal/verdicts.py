@@ -8,14 +8,14 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
 
 SHOWN = 20
 
 
-def print_outcome(console: Console, outcome: Outcome) -> int:
+def print_outcome(console: Console, outcome: SessionOutcome) -> int:
     """Show the verdicts; returns the exit code: 0 where all is as expected, else 1."""
     if outcome.all:
         console.print(_verdict_table(outcome.all))

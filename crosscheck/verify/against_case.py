@@ -11,9 +11,9 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import Result, collect
-from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate
+from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import RunFile, Variant
 from crosscheck.library.find import Case
@@ -38,7 +38,7 @@ class Detail:
 
 
 @dataclass(frozen=True)
-class Checked(Outcome):
+class CsvOutcome(SessionOutcome):
     """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared."""
 
     details: dict[str, Detail] = field(default_factory=dict)
@@ -53,7 +53,7 @@ def verify_csv(
     variant: str | None = None,
     engine: str = "native",
     provider: str = PROVIDER,
-) -> Checked:
+) -> CsvOutcome:
     """Verdicts on every channel of a CSV against `engine` on a variant (by default the first) of a case.
 
     The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the case's goal. Of
@@ -80,7 +80,7 @@ def verify_csv(
             cause = f"; {detail.cause}?" if detail.cause else ""
             finding = replace(finding, reason=f"{finding.reason}; worst at t = {detail.worst_s:.6g} s{cause}")
         verdicts.append(_verdict(case, chosen, channel, engine, goal or 0.0, finding))
-    return Checked({case.name: verdicts}, [], details=details, left_out=tuple(left_out))
+    return CsvOutcome({case.name: verdicts}, [], details=details, left_out=tuple(left_out))
 
 
 def read_signals(file: Path, times: Real) -> dict[str, Real]:
@@ -143,7 +143,7 @@ def _judge(reference: Result, channel: str, values: Real, rough: Real | None, go
         return Finding("refused", "the case sets no goal for this channel")
     target = reference.signal(channel, across=False)
     if rough is not None:
-        doubt = estimate(channel, "tolerance", [Rung(2.0, rough), Rung(1.0, values)], 0, target.sizes[0])
+        doubt = estimate(channel, "tolerance", [RungSignal(2.0, rough), RungSignal(1.0, values)], 0, target.sizes[0])
     else:
         doubt = _claimed(channel, target, goal)
     return compare(channel, Signal(values, doubt, target.sizes), target, goal)
@@ -202,4 +202,4 @@ def _verdict(case: Case, variant: Variant, channel: str, engine: str, goal: floa
     )
 
 
-__all__ = ["Checked", "Detail", "VerifyError", "read_signals", "sample_times_csv", "verify_csv"]
+__all__ = ["CsvOutcome", "Detail", "VerifyError", "read_signals", "sample_times_csv", "verify_csv"]

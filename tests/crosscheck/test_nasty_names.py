@@ -19,10 +19,10 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
-from crosscheck.judging.outcome import Absence, Outcome, conclude
+from crosscheck.judging.outcome import Absence, SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.case import Comparison, Side
+from crosscheck.library.case import Comparison, ComparisonSide
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import BrokenLine, RunRecord
@@ -48,13 +48,13 @@ NASTY = (
 FOREIGN = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20) | st.sampled_from(NASTY)
 
 
-def outcome_of(name: str) -> Outcome:
+def outcome_of(name: str) -> SessionOutcome:
     verdict = Verdict(
         case=name, comparison=name, kind="comparison", channel=f"marker:{name}.position", variant_a=name, engine_a=name,
         variant_b=name, engine_b=name, level="", status="differ", expected="agree", E=1.0, U=0.1, goal=0.1, scale=1.0,
         reason=name,
     )  # fmt: skip
-    return Outcome({name: [verdict]}, [Absence(name, name, name, "main", "did not run", name)], (name,))
+    return SessionOutcome({name: [verdict]}, [Absence(name, name, name, "main", "did not run", name)], (name,))
 
 
 def flat(text: str) -> str:
@@ -137,7 +137,7 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("hostile")
     case, evil = load_case(CASE), "</script><script>alert('[/]|`')</script><!-- ]]>\x1b[31m\x00\u2028%{x}"
     record, _ = plan(case, (), PROVIDER)
-    one, other = Side(variant=evil, engine=evil), Side(variant=evil, engine=evil + "2")
+    one, other = ComparisonSide(variant=evil, engine=evil), ComparisonSide(variant=evil, engine=evil + "2")
     run = msgspec.structs.replace(
         record.run,
         title=evil,

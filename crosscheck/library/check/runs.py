@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 
-from crosscheck.library.case import RunFile, Side, Variant
+from crosscheck.library.case import ComparisonSide, RunFile, Variant
 from crosscheck.library.check.ranges import problem
 from flexmb.scene.problems import Place, Problem, closest
 
@@ -32,7 +32,7 @@ def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Problem
         yield problem(place, f'engine "{engine}" is listed twice', "name it once")
 
 
-def check_same_times(run: RunFile, a: Side, b: Side, place: Place) -> Iterator[Problem]:
+def check_same_times(run: RunFile, a: ComparisonSide, b: ComparisonSide, place: Place) -> Iterator[Problem]:
     """Two sides that are compared must have the same sample times."""
     variants = [find_variant(run, side.variant) for side in (a, b)]
     if len({(each.duration_s or run.duration_s, each.samples or run.samples) for each in variants if each}) > 1:

@@ -16,7 +16,7 @@ from crosscheck import cli
 from crosscheck.judging import accept
 from crosscheck.judging import outcome as outcome_module
 from crosscheck.judging.figures import FLOOR, figures, recordable, worse
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.accepted import Accepted, Figure, dumps, key, merged
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case, shipped_cases
@@ -60,7 +60,7 @@ def test_what_has_no_accepted_figure_is_not_worse() -> None:
     assert worse(None, 1.0, math.nan) == ""
 
 
-def session(accepted: Accepted, spread: float = 1e-6, strict: bool = False) -> Outcome:
+def session(accepted: Accepted, spread: float = 1e-6, strict: bool = False) -> SessionOutcome:
     runs = [*ladder("one", {TIP: way()}, spread=spread), *ladder("two", {TIP: way()}, spread=spread)]
     return judged(ONE_PAIR, runs, accepted, strict)
 

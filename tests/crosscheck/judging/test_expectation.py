@@ -9,7 +9,7 @@ import msgspec
 import pytest
 
 from crosscheck.judging.expectation import outside
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import Ending, Finding
 from crosscheck.library.case import Comparison, Conservation
 from crosscheck.records.packing import pack
@@ -22,7 +22,7 @@ def expecting(expect: str, **bounds: object) -> Comparison:
     return Comparison(name="c", goals={TIP: 1e-3}, expect=expect, reason="so", **bounds)
 
 
-def differing(by: float, band: str) -> Outcome:
+def differing(by: float, band: str) -> SessionOutcome:
     """Two engines, the second off by that part of the range, and an expected difference."""
     text = ONE_PAIR + f'expect = "differ"\nband = {{ {band} }}\nreason = "so"\n'
     return judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way(1.0 + by)})])

@@ -8,7 +8,7 @@ import pytest
 
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import figures, recordable
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, spatial
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
@@ -46,7 +46,7 @@ def signal(level: float, doubt: float, sizes: tuple[float, ...] = (1.0,)) -> Sig
     return Signal(np.full((3, 1), level), Uncertainty(np.full(3, doubt), doubt, "given"), sizes)
 
 
-def everything() -> Outcome:
+def everything() -> SessionOutcome:
     """A control that is noticed, and a momentum that changes by a half as expected."""
     momentum = np.ones((len(TIMES), 3))
     momentum[4] = 0.5

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 import pytest
 
-from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, observed_order, roundoff_floor, spatial
+from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, observed_order, roundoff_floor, spatial
 from crosscheck.judging.verdict import STATUSES, Finding, Signal, compare, conserve
 from flexmb.run.channels import distance, magnitude, signal_range
 
@@ -126,8 +126,8 @@ def test_conserving_is_total() -> None:
     assert conserve(np.zeros(0), 1.0, 1e-6).status == "failed"
 
 
-def ladder(efforts: tuple[float, ...], levels: tuple[float, ...]) -> list[Rung]:
-    return [Rung(effort, np.full((2, 3), level)) for effort, level in zip(efforts, levels, strict=True)]
+def ladder(efforts: tuple[float, ...], levels: tuple[float, ...]) -> list[RungSignal]:
+    return [RungSignal(effort, np.full((2, 3), level)) for effort, level in zip(efforts, levels, strict=True)]
 
 
 @pytest.mark.parametrize("kind", ["step", "tolerance", ""])
@@ -152,9 +152,9 @@ def check(found: Uncertainty, sound: bool) -> None:
 
 def test_rungs_that_are_no_ladder_leave_the_uncertainty_unknown() -> None:
     assert estimate(CHANNELS[0], "step", [], 0, 1.0).value == math.inf
-    shapes = [Rung(0.2, np.ones((3, 3))), Rung(0.1, np.ones((2, 3)))]
+    shapes = [RungSignal(0.2, np.ones((3, 3))), RungSignal(0.1, np.ones((2, 3)))]
     assert estimate(CHANNELS[0], "step", shapes, 0, 1.0).value == math.inf
-    empty = [Rung(0.2, np.ones((0, 3))), Rung(0.1, np.ones((0, 3)))]
+    empty = [RungSignal(0.2, np.ones((0, 3))), RungSignal(0.1, np.ones((0, 3)))]
     assert estimate(CHANNELS[0], "step", empty, 0, 1.0).value == math.inf
     rising = ladder((0.1, 0.2, 0.4), (1.0, 1.1, 1.12))
     assert estimate(CHANNELS[0], "step", rising, 0, 1.0).value == math.inf

@@ -9,7 +9,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.special import ellipj, ellipk
 
-from crosscheck.judging.uncertainty import Rung, estimate, observed_order, spatial
+from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, spatial
 from flexmb.typing import Real
 
 CHANNEL = "marker:tip.velocity"
@@ -119,7 +119,7 @@ def fixed_step_ratio(problem: Oscillator | Logistic | Pendulum, name: str, coars
     """U / true error of the finest of three halved steps."""
     _, step = METHODS[name]
     counts = [coarsest * 2**n for n in range(3)]
-    rungs = [Rung((TIMES[1] - TIMES[0]) / count, march(problem, step, count)) for count in counts]
+    rungs = [RungSignal((TIMES[1] - TIMES[0]) / count, march(problem, step, count)) for count in counts]
     return ratio("step", rungs, 4 * counts[-1] * len(TIMES), problem)
 
 
@@ -129,12 +129,12 @@ def tolerance_ratio(problem: Oscillator | Logistic | Pendulum, name: str, tolera
         run = solve_ivp(
             lambda t, y: problem.rate(y), (0.0, TIMES[-1]), problem.start, name, TIMES, rtol=tolerance, atol=tolerance
         )
-        rungs.append(Rung(tolerance, run.y.T))
+        rungs.append(RungSignal(tolerance, run.y.T))
         count = run.nfev
     return ratio("tolerance", rungs, count, problem)
 
 
-def ratio(kind: str, rungs: list[Rung], evaluations: int, problem: Oscillator | Logistic | Pendulum) -> float:
+def ratio(kind: str, rungs: list[RungSignal], evaluations: int, problem: Oscillator | Logistic | Pendulum) -> float:
     exact = problem.solution(TIMES)
     size = float(np.max(np.linalg.norm(exact, axis=1)))
     error = float(np.max(np.linalg.norm(rungs[-1].values - exact, axis=1)))
@@ -191,23 +191,23 @@ def signal(size: float) -> Real:
 
 
 def test_one_effort_leaves_the_uncertainty_unknown() -> None:
-    assert estimate(CHANNEL, "step", [Rung(0.1, signal(1.0))], 10, 1.0).value == np.inf
+    assert estimate(CHANNEL, "step", [RungSignal(0.1, signal(1.0))], 10, 1.0).value == np.inf
 
 
 def test_runs_that_do_not_converge_get_the_larger_difference() -> None:
-    rungs = [Rung(0.4, signal(1.0)), Rung(0.2, signal(1.5)), Rung(0.1, signal(0.9))]
+    rungs = [RungSignal(0.4, signal(1.0)), RungSignal(0.2, signal(1.5)), RungSignal(0.1, signal(0.9))]
     assert estimate(CHANNEL, "step", rungs, 0, 0.0).value == pytest.approx(3.0 * 0.6 * np.sqrt(3.0))
 
 
 def test_equal_runs_keep_the_roundoff_floor() -> None:
-    rungs = [Rung(10.0**-n, signal(1.0)) for n in (8, 9, 10)]
+    rungs = [RungSignal(10.0**-n, signal(1.0)) for n in (8, 9, 10)]
     eps = np.finfo(float).eps
     assert estimate(CHANNEL, "tolerance", rungs, 400, 2.0).value == pytest.approx(2.0 * 20.0 * eps)
 
 
 def test_envelope_never_falls() -> None:
     wave = np.sin(np.linspace(0.0, 20.0, 81))[:, None]
-    rungs = [Rung(h, wave * (1.0 + h**2)) for h in (0.4, 0.2, 0.1)]
+    rungs = [RungSignal(h, wave * (1.0 + h**2)) for h in (0.4, 0.2, 0.1)]
     envelope = estimate(CHANNEL, "step", rungs, 0, 1.0).envelope
     assert np.all(np.diff(envelope) >= 0.0)
 

@@ -7,14 +7,14 @@ import warnings
 import numpy as np
 import pytest
 
-from crosscheck.judging.uncertainty import Rung, estimate, observed_order, roundoff_floor, spatial, unknown
+from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, roundoff_floor, spatial, unknown
 from crosscheck.judging.verdict import conserve
 
 FORCE = "load:pivot.force"
 
 
-def rungs(efforts: tuple[float, ...], order: float) -> list[Rung]:
-    return [Rung(h, np.array([[0.0], [h**order]])) for h in efforts]
+def rungs(efforts: tuple[float, ...], order: float) -> list[RungSignal]:
+    return [RungSignal(h, np.array([[0.0], [h**order]])) for h in efforts]
 
 
 @pytest.mark.parametrize("efforts", [(0.4, 0.2, 0.1), (0.9, 0.3, 0.1), (0.6, 0.2, 0.1)])
@@ -48,7 +48,7 @@ def test_other_orders_get_less_credit_or_none(efforts: tuple[float, ...]) -> Non
 
 @pytest.mark.parametrize(("values", "bound"), [((3.0, 1.0, 0.0), 1.0), ((3.5, 1.0, 0.0), 1.0), ((2.9, 1.0, 0.0), 5.7)])
 def test_tolerances_that_halve_the_error_bound_it(values: tuple[float, ...], bound: float) -> None:
-    given = [Rung(10.0**-n, np.array([[each]])) for n, each in enumerate(values)]
+    given = [RungSignal(10.0**-n, np.array([[each]])) for n, each in enumerate(values)]
     found = estimate(FORCE, "tolerance", given, 0, 0.0)
     assert np.isclose(found.value, bound) and found.order is None
     short = "difference of the two finest tolerances"
@@ -64,7 +64,7 @@ def test_judging_warns_of_nothing() -> None:
             huge = np.full((2, 3), level)
             assert np.all(np.isinf(spatial(FORCE, huge, -huge, 1.0 + 1e-15, 1e-300)))
         for level in (1e308, 0.0):
-            apart = [Rung(0.1, np.full((3, 1), -1e308)), Rung(0.01, np.full((3, 1), level))]
+            apart = [RungSignal(0.1, np.full((3, 1), -1e308)), RungSignal(0.01, np.full((3, 1), level))]
             found = estimate(FORCE, "step", apart, 0, 0.0)
             assert np.array_equal(found.envelope, np.full(3, np.inf))
             assert found.how == "unknown: the runs are so far apart that their distance is no number"
@@ -84,8 +84,8 @@ def test_orders_are_looked_for_between_nothing_and_sixteen() -> None:
     assert (unknown(3, "so").how, unknown(3, "so").envelope.shape) == ("unknown: so", (3,))
 
 
-def level(effort: float, *values: float) -> Rung:
-    return Rung(effort, np.array(values)[:, None])
+def level(effort: float, *values: float) -> RungSignal:
+    return RungSignal(effort, np.array(values)[:, None])
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,9 @@ def level(effort: float, *values: float) -> Rung:
         ("step", [level(0.2, 1.0), level(0.1, 1.0)], 1, np.inf, "1 evaluations of a signal of size inf leave no"),
     ],
 )
-def test_each_fault_of_a_ladder_is_named(kind: str, given: list[Rung], evaluations: int, size: float, why: str) -> None:
+def test_each_fault_of_a_ladder_is_named(
+    kind: str, given: list[RungSignal], evaluations: int, size: float, why: str
+) -> None:
     found = estimate(FORCE, kind, given, evaluations, size)
     assert found.how.startswith(f"unknown: {why}") and (found.value, found.order) == (np.inf, None)
     assert found.how.removeprefix(f"unknown: {why}") in ("", " to be told", " round-off to be told")

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import msgspec
 import pytest
 
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import GRAVITY
 from crosscheck.library.accepted import Figure, key
 from crosscheck.report.ci import write_junit
@@ -20,7 +20,7 @@ VELOCITY = "marker:tip.velocity"
 WIDE = ONE_PAIR.replace("marker:tip.position", "marker")
 
 
-def failures(outcome: Outcome, folder: Path) -> int:
+def failures(outcome: SessionOutcome, folder: Path) -> int:
     """How many failures junit.xml holds, counted twice."""
     write_junit(outcome, folder / "junit.xml")
     root = ElementTree.parse(folder / "junit.xml").getroot()

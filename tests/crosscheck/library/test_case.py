@@ -10,7 +10,7 @@ import msgspec
 import pytest
 
 from crosscheck.library import case as case_module
-from crosscheck.library.case import CaseError, Comparison, Refined, RunFile, Side, Variant
+from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Refined, RunFile, Variant
 from crosscheck.library.check import check_run_file
 from crosscheck.library.find import load_case, resolve
 from crosscheck.library.selection import select
@@ -143,7 +143,7 @@ def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
     )
     named = Comparison(
         name="named", goals={"energy": 1e-9},
-        a=Side(variant="rigid", engine="native"), b=Side(variant="rigid", engine="exudyn"),
+        a=ComparisonSide(variant="rigid", engine="native"), b=ComparisonSide(variant="rigid", engine="exudyn"),
     )  # fmt: skip
     run = msgspec.structs.replace(example(), variants=variants, comparisons=example().comparisons[:1], controls=())
     chosen = select(run, ())

@@ -222,7 +222,7 @@ def test_accepted_figures_are_read_as_strictly(accepted: dict, said: str) -> Non
         (case_module.Refined, "``variant``:"),
         (case_module.EffortLadder, "``variant``:"),
         (case_module.Comparison, "``comparison``:"),
-        (case_module.Side, "``comparison``:"),
+        (case_module.ComparisonSide, "``comparison``:"),
         (case_module.Control, "``control``:"),
         (case_module.Conservation, "``conservation``:"),
         (case_module.Chart, "``chart``:"),

@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from crosscheck.judging.outcome import Outcome
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import Verdict
 from crosscheck.records import archive as archive_module
 from crosscheck.records.archive import Archive, BrokenRecords, read
@@ -149,8 +149,8 @@ def test_a_session_with_a_broken_line_is_not_green() -> None:
         case="a", comparison="c", kind="comparison", channel="x", variant_a="v", engine_a="e", variant_b="v",
         engine_b="f", level="", status="agree", expected="agree", E=0.0, U=0.0, goal=1.0, scale=1.0, reason="",
     )  # fmt: skip
-    assert Outcome({"a": [verdict]}, []).ok
-    lost = Outcome({"a": [verdict]}, [], ("records.jsonl, line 3: broken",))
+    assert SessionOutcome({"a": [verdict]}, []).ok
+    lost = SessionOutcome({"a": [verdict]}, [], ("records.jsonl, line 3: broken",))
     assert not lost.ok
     assert "1 line is no record" in lost.headline
 

@@ -14,7 +14,7 @@ import pytest
 
 from crosscheck.library.case import Transform, Variant
 from crosscheck.library.find import load_case, resolve
-from crosscheck.report import Outcome, write_all
+from crosscheck.report import SessionOutcome, write_all
 from crosscheck.report.html import _code, _transformation
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
@@ -40,18 +40,18 @@ reference = "rigid"
 FOREIGN = re.compile(r"""(?:src|href)\s*=\s*["'](?!#)|@import|url\(""")
 
 
-def session(folder: Path, case: Path) -> tuple[Outcome, Path]:
+def session(folder: Path, case: Path) -> tuple[SessionOutcome, Path]:
     sweep([load_case(case)], (), folder / "records.jsonl", provider=PROVIDER, limits=Limits(workers=2))
     return write_all(folder / "records.jsonl", folder)
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
+def sound(tmp_path_factory: pytest.TempPathFactory) -> tuple[SessionOutcome, Path]:
     return session(tmp_path_factory.mktemp("sound"), CASE)
 
 
 @pytest.fixture(scope="module")
-def mixed(tmp_path_factory: pytest.TempPathFactory) -> tuple[Outcome, Path]:
+def mixed(tmp_path_factory: pytest.TempPathFactory) -> tuple[SessionOutcome, Path]:
     folder = tmp_path_factory.mktemp("mixed")
     return session(folder, copy_case(folder, MIXED))
 
@@ -61,7 +61,7 @@ def data(page: Path) -> dict:
     return json.loads(text.replace("<\\/", "</"))
 
 
-def test_the_report_is_one_file_that_loads_nothing(sound: tuple[Outcome, Path]) -> None:
+def test_the_report_is_one_file_that_loads_nothing(sound: tuple[SessionOutcome, Path]) -> None:
     page = sound[1].read_text(encoding="utf-8")
     markup = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
     assert not FOREIGN.search(markup)
@@ -70,7 +70,7 @@ def test_the_report_is_one_file_that_loads_nothing(sound: tuple[Outcome, Path]) 
     assert "All 15 verdicts are as expected" in markup
 
 
-def test_the_report_names_what_did_not_run_and_why(mixed: tuple[Outcome, Path]) -> None:
+def test_the_report_names_what_did_not_run_and_why(mixed: tuple[SessionOutcome, Path]) -> None:
     markup = re.sub(r"<script.*?</script>", "", mixed[1].read_text(encoding="utf-8"), flags=re.DOTALL)
     assert "the library is not installed; install the extra `absent`" in markup
     assert "diverged at t = 0.9 s" in markup
@@ -81,7 +81,7 @@ def test_the_report_names_what_did_not_run_and_why(mixed: tuple[Outcome, Path]) 
     assert {look for look, status in looks if status in ("did not run", "failed")} == {"bad"}
 
 
-def test_charts_carry_the_recorded_numbers(mixed: tuple[Outcome, Path]) -> None:
+def test_charts_carry_the_recorded_numbers(mixed: tuple[SessionOutcome, Path]) -> None:
     content = data(mixed[1])
     (case,) = content["cases"]
     panel = next(panel for panel in case["panels"] if panel["title"] == "Motion")
@@ -113,7 +113,7 @@ def test_peaks_survive_thinning() -> None:
     assert thinned.max() == 7.0
 
 
-def test_verdicts_json(mixed: tuple[Outcome, Path]) -> None:
+def test_verdicts_json(mixed: tuple[SessionOutcome, Path]) -> None:
     verdicts = json.loads(mixed[1].with_name("verdicts.json").read_text(encoding="utf-8"))
     assert len(verdicts) == len(mixed[0].all)
     needed = {"case", "channel", "engine_a", "engine_b", "level", "status", "expected", "E", "U", "goal", "reason"}
@@ -121,7 +121,7 @@ def test_verdicts_json(mixed: tuple[Outcome, Path]) -> None:
     assert all(not each["ok"] for each in verdicts if each["status"] != "agree")
 
 
-def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[Outcome, Path]) -> None:
+def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[SessionOutcome, Path]) -> None:
     (suite,) = ElementTree.parse(mixed[1].with_name("junit.xml")).getroot()
     passed = [test for test in suite if not len(test)]
     assert len(passed) == sum(verdict.ok for verdict in mixed[0].all) > 0
@@ -133,7 +133,7 @@ def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[Outcome, P
     assert any(test.get("name") == "rigid by absent ran" for test in suite)
 
 
-def test_the_summary_says_it_all(mixed: tuple[Outcome, Path], sound: tuple[Outcome, Path]) -> None:
+def test_the_summary_says_it_all(mixed: tuple[SessionOutcome, Path], sound: tuple[SessionOutcome, Path]) -> None:
     bad = mixed[1].with_name("summary.md").read_text(encoding="utf-8")
     assert bad.startswith("# ❌")
     assert "**did not run** pendulum/single, rigid, absent" in bad

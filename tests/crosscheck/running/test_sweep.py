@@ -5,7 +5,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
-from crosscheck.judging.outcome import Outcome, conclude
+from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
@@ -15,11 +15,11 @@ GOALS = '"marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6'
 
 
 @pytest.fixture(scope="module")
-def sound(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def sound(tmp_path_factory: pytest.TempPathFactory) -> SessionOutcome:
     return run_case(CASE, tmp_path_factory.mktemp("sound") / "records.jsonl")
 
 
-def test_sound_engines_agree_on_every_channel(sound: Outcome) -> None:
+def test_sound_engines_agree_on_every_channel(sound: SessionOutcome) -> None:
     compared = [verdict for verdict in sound.all if verdict.kind == "comparison"]
     assert {verdict.status for verdict in compared} == {"agree"}
     assert {"load:pivot.force", "load:pivot.torque", "energy.total", "marker:tip.orientation"} <= {
@@ -28,7 +28,7 @@ def test_sound_engines_agree_on_every_channel(sound: Outcome) -> None:
     assert all(0.0 <= verdict.U <= verdict.goal for verdict in compared)
 
 
-def test_negative_controls_come_out_different_and_so_all_is_as_expected(sound: Outcome) -> None:
+def test_negative_controls_come_out_different_and_so_all_is_as_expected(sound: SessionOutcome) -> None:
     controls = [verdict for verdict in sound.all if verdict.kind == "control"]
     assert len(controls) == 2
     assert all(verdict.status == "differ" and verdict.ok for verdict in controls)
@@ -50,12 +50,12 @@ FAULTY = ("absent", "nonsense", "refuser", "crasher", "raiser", "diverger")
 
 
 @pytest.fixture(scope="module")
-def faulty(tmp_path_factory: pytest.TempPathFactory) -> Outcome:
+def faulty(tmp_path_factory: pytest.TempPathFactory) -> SessionOutcome:
     """Two sound engines, a biased one, and all that give no result, in one session."""
     return compare_engines(tmp_path_factory.mktemp("faulty"), ("fine", "stepper", "biased", *FAULTY))
 
 
-def test_a_biased_engine_differs_from_both_others(faulty: Outcome) -> None:
+def test_a_biased_engine_differs_from_both_others(faulty: SessionOutcome) -> None:
     assert only(faulty.all, "fine", "stepper").status == "agree"
     assert only(faulty.all, "fine", "biased").status == "differ"
     assert only(faulty.all, "stepper", "biased").status == "differ"
@@ -92,7 +92,9 @@ def test_efforts_without_effect_leave_the_uncertainty_unknown(tmp_path) -> None:
         ("diverger", "diverged", "diverged at t = 0.9 s: the step fell below"),
     ],
 )
-def test_an_engine_that_gives_no_result_is_never_green(faulty: Outcome, engine: str, status: str, words: str) -> None:
+def test_an_engine_that_gives_no_result_is_never_green(
+    faulty: SessionOutcome, engine: str, status: str, words: str
+) -> None:
     for partner in ("fine", "stepper"):
         verdict = only(faulty.all, partner, engine)
         assert (verdict.status, verdict.ok) == (status, False)
@@ -218,7 +220,7 @@ def test_a_missing_library_withdraws_earlier_results_and_comes_back(tmp_path) ->
     assert run_case(folder, records).ok
 
 
-def test_replaying_the_records_gives_the_same_verdicts(sound: Outcome, tmp_path) -> None:
+def test_replaying_the_records_gives_the_same_verdicts(sound: SessionOutcome, tmp_path) -> None:
     records = tmp_path / "records.jsonl"
     first = run_case(CASE, records)
     again = conclude(collect(read(records)))
