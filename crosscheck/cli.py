@@ -1,4 +1,4 @@
-"""The command `crosscheck`: thin, it only reads words and shows results."""
+"""The command `crosscheck`: it reads the command line and shows results; the work is done by the other rooms."""
 
 from __future__ import annotations
 
@@ -251,7 +251,7 @@ def _found(words: tuple[str, ...]) -> tuple[find.Case, ...]:
 
 @contextmanager
 def _sole_writer(out: Path) -> Iterator[None]:
-    """Hold the folder for as long as something is written there; what the user can put right is one line."""
+    """Lock the folder while something is written there; an error that the user can put right is shown in one line."""
     with _in_one_line(), locked(out):
         yield
 
@@ -262,7 +262,7 @@ def _check_limit(seconds: float | None) -> None:
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
-    """Write what the cases have reached beside their run files, or say why not; whether it was done."""
+    """Write the figures that the cases have reached beside their run files, or say why not; whether it was done."""
     try:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
@@ -286,12 +286,12 @@ def _conclude(
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """What the user can put right ends the command with one line, and warnings are lines too: no tracebacks."""
+    """Show each warning, and the error that ends the command, in one line without a traceback."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
         try:
             yield
-        except BrokenPipeError:  # whoever read the output has read enough
+        except BrokenPipeError:  # the reader of the output has closed it
             raise
         except OSError as error:
             _refuse(in_words(error))

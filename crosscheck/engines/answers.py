@@ -1,4 +1,4 @@
-"""What an engine answers, held against the contract before it is recorded; what breaks it is that engine's failure.
+"""An engine's answers are held against the contract before they are recorded; one that breaks it is a failed run.
 
 Every function returns the answer in plain types of our own (float64 copies, short clean text), so that nothing an
 engine keeps or changes later reaches a record.

@@ -96,7 +96,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
 def _unused(
     goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
 ) -> Iterator[tuple[str, Finding]]:
-    """Scales and bands whose pattern names no channel that is judged: misspelt, they would be left out in silence."""
+    """Scales and bands whose pattern names no channel that is judged: a misspelt one must not be ignored silently."""
     judged = [name for name in _union(a.channels, b.channels) if most_specific(goals, name) is not None]
     for what, patterns in given.items():
         for pattern in patterns if judged else ():
@@ -172,7 +172,7 @@ def _energy_drift(result: Result) -> tuple[np.ndarray, float]:
 
 
 def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[str, float, Finding | None]]:
-    """Every channel to judge with its goal, and the finding where there is nothing to compare.
+    """Every channel to judge, with its goal, and with the finding where there is nothing to compare.
 
     Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
     is left out, any other channel that only one offers is a refusal of the other.
@@ -208,7 +208,7 @@ def _missing(*results: Result) -> Finding | None:
 
 
 def _elsewhere(a: Result, b: Result) -> Finding | None:
-    """Why two finished results are not of the same times, or of the same scene where they are of one variant."""
+    """The finding where two results have other times, or are of one variant and have other scenes; else None."""
     if a.times.shape != b.times.shape or not np.allclose(a.times, b.times, rtol=CLOCK, atol=0.0):
         text = f"the results are at other times: {len(a.times)} samples to {a.times[-1]:g} s"
         return Finding("failed", f"{text}, and {len(b.times)} to {b.times[-1]:g} s")
@@ -219,7 +219,7 @@ def _elsewhere(a: Result, b: Result) -> Finding | None:
 
 
 def _absent(result: Result, channel: str) -> Finding | None:
-    """Why a result has no such channel, if it has not."""
+    """The finding where a result lacks the channel; None where it has it."""
     if result.status != "finished":
         return _missing(result)
     if channel not in result.channels:

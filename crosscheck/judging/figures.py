@@ -37,7 +37,7 @@ def worse(figure: Figure | None, E: float | None, U: float | None) -> str:
 
 
 def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
-    """The figures of verdicts between some engines (the library's own); controls have none, nor what has no E."""
+    """The figures to record of verdicts between the `engines` given, which are the library's own."""
     own = set(engines)
     found: Accepted = {}
     for verdict in verdicts:
@@ -48,7 +48,7 @@ def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
 
 
 def recordable(verdict: Verdict, own: Iterable[str]) -> bool:
-    """Whether a verdict should have a figure: it compares numbers, and of the library's own engines only."""
+    """Whether a verdict should have a figure: it compares numbers, it is no control, and its engines are our `own`."""
     if verdict.kind == "control" or verdict.E is None:
         return False
     return verdict.engine_a in own and (verdict.kind == "conservation" or verdict.engine_b in own)

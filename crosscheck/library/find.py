@@ -114,7 +114,7 @@ def load_case(folder: Path) -> Case:
 
 
 def _present(file: Path) -> bool:
-    """Whether anything stands at the file's place: what cannot be read is refused there, not passed over."""
+    """Whether there is a file, even one that cannot be read: then reading it says so, and it is not passed over."""
     return os.path.lexists(file)
 
 

@@ -1,4 +1,4 @@
-"""Patterns of channels in a run file: which of several names a channel, and whether one can name any channel at all."""
+"""Patterns of channels in a run file: which of several patterns a channel belongs to, and which can name none."""
 
 from __future__ import annotations
 

@@ -1,5 +1,6 @@
-"""What of a case is run: its run file reduced to the engines that were asked for, every comparison an explicit pair.
-A variant then has one list of engines, those beside it among them.
+"""The part of a case that is run: its run file, reduced to the engines that were asked for.
+
+In the reduced run file every comparison is an explicit pair, and `engines` of a variant include those of `also`.
 
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
@@ -41,7 +42,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
-    """Which of the engines asked for nothing in any of the run files is for, and which could be; "" if none is idle."""
+    """A message that names the engines that were asked for and have no part in any of the run files; "" if all have."""
     runs = tuple(runs)
     busy = {engine for run in runs for variant in select(run, asked).variants for engine in variant.engines}
     idle = [engine for engine in asked if engine not in busy]
@@ -52,7 +53,7 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The run file with foreign engines added to the variants that are compared engine by engine."""
+    """The run file with engines that it does not know added to the variants that are compared engine by engine."""
     known = set(BUILT_IN).union(*(_all(variant) for variant in run.variants))
     foreign = tuple(engine for engine in asked if engine not in known)
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}

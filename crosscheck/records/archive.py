@@ -3,8 +3,8 @@
 A file of records is the archive: verdicts and report are made from it alone, with no engine installed. Signals are
 stored as float64, deflated and in base64, so that replaying a verdict gives the same digits. A run that was killed
 leaves at most one broken line at the end, which reading skips and resuming cuts off. Any other line that is no record
-is a `BrokenLine` to whoever reads: it is named, what it held counts as lost, and no session that has one is green.
-Resuming sets such lines aside, in a file of their own, and runs again what they held.
+is read as a `BrokenLine`, which names it: what it held counts as lost, and a session that has one is never as expected.
+Resuming moves such lines to a file of their own, and runs again what they held.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def _lines(stream: BinaryIO) -> Iterator[bytes]:
 
 
 def _checked(record: Any, limit: int) -> int:
-    """Bytes of memory that a record's arrays take. ValueError where the record contradicts itself, or is a bomb."""
+    """Bytes of memory that a record's arrays take; ValueError where it contradicts itself or they exceed `limit`."""
     if isinstance(record, CaseRecord):
         check_recorded(record.run)
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
@@ -111,7 +111,7 @@ def _checked(record: Any, limit: int) -> int:
 
 
 def _check_shapes(record: RunRecord) -> None:
-    """Channels are tables of a row a time. ValueError names one that is not."""
+    """Every channel must be an array (T, k) at T times; ValueError names one that is not."""
     rows = None if record.times is None else record.times.shape
     if record.status == "finished" and not (rows and rows[0]):
         raise ValueError("it is finished but has no times")

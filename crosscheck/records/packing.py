@@ -20,13 +20,16 @@ class Packed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
 
 def pack(values: Real) -> Packed:
-    """Real -> text; exact."""
+    """The array as text, exact to the last bit."""
     data = np.ascontiguousarray(values, dtype="<f8")
     return Packed(shape=data.shape, data=base64.b64encode(zlib.compress(data.tobytes(), 6)).decode())
 
 
 def unpack(packed: Packed) -> Real:
-    """Text -> array; exact. ValueError where the data are not the shape's; takes no more memory than the shape says."""
+    """The array of a text, exact to the last bit. ValueError where the data do not fill the shape just so.
+
+    It takes no more memory than the shape says, whatever the data would unpack to.
+    """
     size = packed_bytes(packed)
     unpacker = zlib.decompressobj()
     try:

@@ -37,7 +37,10 @@ REPEATS = 3
 
 
 def execute(job: Job, emit: Emit) -> None:
-    """Run a job; every outcome but the end of the process is a record, and a string says what is being done."""
+    """Run a job. Every outcome is emitted as a record, and what is being done as a string.
+
+    Only the end of the process leaves no record.
+    """
     blank = RunRecord(
         case=job.case,
         variant=job.variant,
@@ -129,7 +132,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
 
 
 def _key(engine: Engine, version: str, job: Job, rungs: int) -> str:
-    """What makes the engine's results, scene and effort apart: see `made_by`; channels not stored are not there."""
+    """The key of everything that the results depend on, but for scene and effort; see `made_by`."""
     code = made_by({type(engine).__module__, home(job.engine)} - {""})
     kept = job.kept if rungs > FULLY_STORED else ()
     return hashlib.sha256(f"{code} {version} {kept}".encode()).hexdigest()[:16]
@@ -150,7 +153,7 @@ def _run(
         channels = channels_of(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # the same as above, for one effort: the others may still work
+    except BaseException as error:  # as in `execute`, but the other efforts may still work
         return msgspec.structs.replace(record, status="failed", message=describe(error))
     return msgspec.structs.replace(
         record,

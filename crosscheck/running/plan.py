@@ -28,7 +28,7 @@ MAIN, REFINED = "main", "refined"
 
 
 class Done(NamedTuple):
-    """A run that is recorded: its effort, what made it, and its place: a ladder of another length is run anew."""
+    """A run that is recorded: its effort, what made it, and its rung of how many; another ladder is run anew."""
 
     effort: str
     made_by: str
@@ -149,7 +149,7 @@ def scene_identity(scene: Scene, times: Real) -> str:
 def _attempt(
     case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
 ) -> tuple[Scene | None, str]:
-    """The checked scene of a variant, or why there is none: one bad variant must not stop the others."""
+    """The checked scene of a variant, or None and the reason: one bad variant must not stop the others."""
     try:
         scene = case.scene(variant)
         if control is not None:  # a fault in what the variant models, hence at its level

@@ -65,7 +65,7 @@ def sweep(
 
 
 def _engine(job: Job) -> str:
-    """A worker stays with its engine: each loads its library, or compiles its kernels, once."""
+    """The kind of a job: a worker stays with one engine, so that it loads its library or compiles its kernels once."""
     return COMPILED_LIKE.get(job.engine, job.engine)
 
 

@@ -1,4 +1,4 @@
-"""What `crosscheck verify` shows beside its verdicts: a line for each channel."""
+"""The table of `crosscheck verify`: a line for each channel of a CSV."""
 
 from __future__ import annotations
 

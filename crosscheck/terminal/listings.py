@@ -1,4 +1,4 @@
-"""What there is: tables of the cases, the engines and the maps."""
+"""Tables of the cases, the engines and the maps that there are."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What is being done right now: a bar over all jobs, a line for each at work, a lasting line for each that ended."""
+"""Progress of a run: a bar over all jobs, a line for each job at work, and a line that stays for each that ended."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Text for the terminal that stands as it is, whatever is in it."""
+"""Text for the terminal, shown literally whatever it contains."""
 
 from __future__ import annotations
 

@@ -150,7 +150,7 @@ def _judge(reference: Result, channel: str, values: Real, rough: Real | None, go
 
 
 def _known_as(channel: str, reference: Result) -> str:
-    """The channel; a load that no hinge has is that of the wheel of the same name."""
+    """The channel's name in the reference: the load of a wheel where no hinge has that name."""
     wheel = f"wheel_{channel}"
     return wheel if channel not in reference.channels and wheel in reference.channels else channel
 
