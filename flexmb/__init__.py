@@ -23,13 +23,15 @@ if TYPE_CHECKING:
     from flexmb.closure.system import ClosureError
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+    from flexmb.linear.linear_model import LinearModel
     from flexmb.linear.linearize import linearize
-    from flexmb.linear.model import LinearModel
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
     from flexmb.run.trajectory import Trajectory
-    from flexmb.system.system import Evaluation, System, compile
+    from flexmb.system.observables import Evaluation
+    from flexmb.system.system import compile
+    from flexmb.system.tree_system import System
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
     from flexmb.tables.status import Status
 
@@ -43,16 +45,16 @@ _LATER = {
     "EquilibriumError": "flexmb.linear.equilibrium",
     "linearize": "flexmb.linear.linearize",
     "Interrupted": "flexmb.run.interruption",
-    "LinearModel": "flexmb.linear.model",
+    "LinearModel": "flexmb.linear.linear_model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
     "simulate": "flexmb.run.simulate",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
-    "Evaluation": "flexmb.system.system",
+    "Evaluation": "flexmb.system.observables",
     "PrecisionWarning": "flexmb.tables.state",
     "State": "flexmb.tables.state",
-    "System": "flexmb.system.system",
+    "System": "flexmb.system.tree_system",
     "compile": "flexmb.system.system",
     "Trajectory": "flexmb.run.trajectory",
 }

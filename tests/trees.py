@@ -7,7 +7,9 @@ code.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import get_args
 
+import msgspec
 import numpy as np
 from numpy.random import Generator
 from scipy.spatial.transform import Rotation
@@ -15,12 +17,15 @@ from scipy.spatial.transform import Rotation
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.convert import plain
+from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.shapes import beam_section
 
-KINDS = (
+STRUCTS = {struct.__struct_config__.tag: struct for struct in get_args(s.Hinge)}
+_DRAWN = (  # in an order that keeps the random scenes of a seed what they are
     "revolute", "spherical", "prismatic", "universal", "free", "cylindrical", "gimbal", "planar", "weld", "gimbal2",
 )  # fmt: skip
+KINDS = (*_DRAWN, *(kind for kind in STRUCTS if kind not in _DRAWN))
 CARRIERS = ("rigid", "modal", "beam", "floating")
 
 
@@ -243,16 +248,6 @@ def _hinge(
     axis = tuple(direction(rng))
     loss = 0.0 if recipe.conservative else 0.3
     match kind:
-        case "weld":
-            scene.add(s.Weld(**joint))
-        case "revolute":
-            scene.add(s.Revolute(**joint, axis=axis, rotation=angle()))
-        case "prismatic":
-            scene.add(s.Prismatic(**joint, axis=axis, translation=displacement()))
-        case "cylindrical":
-            scene.add(s.Cylindrical(**joint, axis=axis, rotation=angle(), translation=displacement()))
-        case "universal":
-            scene.add(s.Universal(**joint, first=angle(), second=angle()))
         case "gimbal":
             sequence = str(rng.choice(["xyz", "zxz", "yzx"]))
             # the middle angle of zxz stays away from zero, that of xyz from a right angle
@@ -260,8 +255,6 @@ def _hinge(
             scene.add(s.Gimbal(**joint, sequence=sequence, rotations=(angle(), middle, angle())))
         case "gimbal2":
             scene.add(s.Gimbal(**joint, sequence="zy", rotations=(angle(), angle())))
-        case "planar":
-            scene.add(s.Planar(**joint, x=displacement(), y=displacement(), rotation=angle()))
         case "spherical":
             scene.spherical(
                 name, parent, child, **place, quaternion=quaternion(rng), angular_velocity=vector(rng, 2.0),
@@ -272,6 +265,16 @@ def _hinge(
                 name, parent, child, **place, position=vector(rng, 1.0), quaternion=quaternion(rng),
                 angular_velocity=vector(rng, 2.0), velocity=vector(rng, 1.0),
             )  # fmt: skip
+        case _:
+            drawn = {s.AngularCoordinate: angle, s.LinearCoordinate: displacement}
+            own = {key: drawn[type(c)]() for key, c in scalar_coordinates(STRUCTS[kind])}
+            scene.add(STRUCTS[kind](**joint, **({"axis": axis} if kind in WITH_AXIS else {}), **own))
+
+
+def scalar_coordinates(struct: type) -> list[tuple[str, s.AngularCoordinate | s.LinearCoordinate]]:
+    """(key, default) of every field of a hinge's struct that is a scalar coordinate."""
+    defaults = [(field.name, field.default) for field in msgspec.structs.fields(struct)]
+    return [(key, c) for key, c in defaults if isinstance(c, s.AngularCoordinate | s.LinearCoordinate)]
 
 
 def _struct_placement(place: dict) -> dict:

@@ -42,7 +42,6 @@ from flexmb.scene.schema import (
     Spherical,
     Universal,
     Vector,
-    Weld,
     Wheel,
 )
 from flexmb.scene.tree import GROUND, coordinates, ordered
@@ -181,25 +180,25 @@ def _closed_frame(scene: Scene, chain: tuple[Link, ...], body: str, node: str, o
     return Attachment(at.link, at.frame @ offset)
 
 
+def axes(hinge: Hinge) -> tuple[Vector, ...]:
+    """Axis of every scalar coordinate, in the axes that the coordinates before it have carried along."""
+    match hinge:
+        case Revolute() | Prismatic():
+            return (hinge.axis,)
+        case Cylindrical():
+            return hinge.axis, hinge.axis
+        case Universal():
+            return X, Y
+        case Gimbal():
+            return tuple({"x": X, "y": Y, "z": Z}[letter] for letter in hinge.sequence)
+        case Planar():
+            return X, Y, Z
+    return ()
+
+
 def freedoms(hinge: Hinge) -> tuple[Freedom, ...]:
     """The elementary joints of a hinge, base to tip; none for a weld."""
     match hinge:
-        case Weld():
-            return ()
-        case Revolute():
-            return (_scalar(True, hinge.axis, hinge.rotation),)
-        case Prismatic():
-            return (_scalar(False, hinge.axis, hinge.translation),)
-        case Cylindrical():
-            return (_scalar(True, hinge.axis, hinge.rotation), _scalar(False, hinge.axis, hinge.translation))
-        case Universal():
-            return (_scalar(True, X, hinge.first), _scalar(True, Y, hinge.second))
-        case Gimbal():
-            axes = {"x": X, "y": Y, "z": Z}
-            pairs = zip(hinge.sequence, hinge.rotations, strict=True)
-            return tuple(_scalar(True, axes[letter], rotation) for letter, rotation in pairs)
-        case Planar():
-            return (_scalar(False, X, hinge.x), _scalar(False, Y, hinge.y), _scalar(True, Z, hinge.rotation))
         case Spherical():
             return (
                 Ball(
@@ -218,6 +217,8 @@ def freedoms(hinge: Hinge) -> tuple[Freedom, ...]:
                     np.array(hinge.velocity_m_s),
                 ),
             )
+    pairs = zip(axes(hinge), coordinates(hinge), strict=True)
+    return tuple(_scalar(isinstance(c, AngularCoordinate), axis, c) for axis, (_, c) in pairs)
 
 
 def _scalar(angular: bool, axis: Vector, coordinate: AngularCoordinate | LinearCoordinate) -> Scalar:

@@ -26,12 +26,14 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
-from flexmb.integrate.settings import FIXED, LINEARISING, Method
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
-from flexmb.system.closed import ClosedSystem
-from flexmb.system.system import ERRATA, Algorithm, System, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ALGORITHMS
+from flexmb.system.system import System, compile
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)
@@ -69,7 +71,7 @@ class NativeEngine:
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
         """A ladder of tolerances, by which adaptive methods find the steps that fit the scene; or of steps."""
-        if self._method in FIXED:
+        if INTEGRATORS[self._method].fixed:
             return tuple(Effort("step", value, self._method) for value in _STEPS)
         return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
@@ -79,11 +81,8 @@ class NativeEngine:
         NotImplementedError where an algorithm or method has no loops.
         """
         system = compile(scene)
-        if isinstance(system, ClosedSystem):
-            system.route(self._algorithm, 0.0)
-        if self._algorithm in ERRATA:
-            system.nested(self._algorithm)
-        if scene.closures and self._method in LINEARISING:
+        system.route(self._algorithm)
+        if scene.closures and INTEGRATORS[self._method].linearises:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         return NativeModel(system, self._algorithm, self._method)
 
@@ -133,7 +132,7 @@ class NativeModel:
 
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
-        effort = Effort("step" if self._method in FIXED else "tolerance", 1e-3, self._method)
+        effort = Effort("step" if INTEGRATORS[self._method].fixed else "tolerance", 1e-3, self._method)
         self.simulate(Run(np.array([0.0, 1e-6])), effort)
 
     def evaluate(self) -> Snapshot:
@@ -184,12 +183,11 @@ def _approximation(scene: Scene, algorithm: Algorithm) -> str:
     flexible = [body for body in scene.bodies if not isinstance(body, RigidBody) and body.level != "rigid"]
     full = [f'"{body.name}"' for body in flexible if body.level == "full"]
     first_order = f'level "full" of {", ".join(full)} to first order in the modal coordinates' if full else ""
-    match algorithm:
-        case "frisch":
-            return first_order
-        case "frisch_as_printed" if flexible:
-            return f"{first_order}; the print's errors included" if full else "the print's errors included"
-    return ""
+    declared = ALGORITHMS[algorithm]
+    if not declared.is_first_order:
+        return ""
+    errors = "the print's errors included" if declared.errata and flexible else ""
+    return "; ".join(part for part in (first_order, errors) if part)
 
 
 def _status(done: NativeTrajectory) -> Status:

@@ -13,6 +13,7 @@ import numpy as np
 
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
+from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.run.propagate import recursion
 from flexmb.system.system import System
 from flexmb.tables.state import pack
@@ -35,9 +36,9 @@ class StoppedError(ArithmeticError):
 def flow(system: System, start: Real, time: float) -> Real:
     """State [q, u, work] at `time` (s) of the motion from `start`; StoppedError where it ends before."""
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
-    counts, controlled = np.zeros(COUNTS, np.int64), system.nq + system.nu
+    counts, accuracy = np.zeros(COUNTS, np.int64), Accuracy(RTOL, ATOL, system.nq + system.nu, MAX_STEPS)
     equations = recursion(system.recursion_constants, system.recursion_workspace())
-    status, _ = dop853(equations, start.copy(), times, times[1:], RTOL, ATOL, controlled, MAX_STEPS, out, counts)
+    status, _ = dop853(equations, start.copy(), Clock(times, times[1:]), accuracy, out, counts)
     if status != OK:
         raise StoppedError(Status(status))
     return np.asarray(out[1])

@@ -11,10 +11,10 @@ from flexmb.advisor.bench import Bench
 from flexmb.advisor.confirm import Confirmation, NoReference, Reference
 from flexmb.advisor.indicators import Indicators, indicators, of_level, predicted
 from flexmb.advisor.ladder import Cost, Step, cost, model_cost, rungs, step
-from flexmb.advisor.methods import Method
-from flexmb.advisor.models import Model, Rung, built, flexible_bodies, levels
+from flexmb.advisor.methods import RunMethod
+from flexmb.advisor.modal_response import FAMILIES, RigidRun, modal_response, rigid_run
+from flexmb.advisor.models import BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
-from flexmb.advisor.response import FAMILIES, RigidRun, modal_response, rigid_run
 from flexmb.advisor.search import search
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import check_scene
@@ -45,7 +45,7 @@ class BodyAdvice:
     """The rung of one body, its own predicted error, and why: the indicators in words."""
 
     body: str
-    rung: Rung
+    rung: BodyModel
     predicted: float
     reason: str
 
@@ -67,7 +67,7 @@ class Advice:
     quantities: tuple[Quantity, ...]
     refusal: str = ""
     bodies: tuple[BodyAdvice, ...] = ()
-    method: Method | None = None
+    method: RunMethod | None = None
     scene: Scene | None = None
     predicted: float = np.nan
     measured: float = np.nan
@@ -210,7 +210,7 @@ def _stirred(body: Indicators, least: float) -> list[str]:
     return [name for i, name in enumerate(FAMILIES) if np.any(body.static[body.family == i] > least)]
 
 
-def _trial(model: Model, steps: dict[tuple[str, Rung], Step], confirmation: Confirmation) -> Trial:
+def _trial(model: Model, steps: dict[tuple[str, BodyModel], Step], confirmation: Confirmation) -> Trial:
     return Trial(
         model,
         sum(steps[each].error for each in model),

@@ -11,28 +11,30 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.methods import Method, operations, simulated, steps_within
+from flexmb.advisor.methods import RunMethod, operations, simulated, steps_within
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure import dynamics as closed
 from flexmb.closure.system import ClosureError
-from flexmb.entry import articulated, composite
-from flexmb.jain.places import matrices
 from flexmb.jit.counting import count
 from flexmb.scene.schema import Scene
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.system import Algorithm, System, compile
+from flexmb.system.system import System, compile
 from flexmb.tables.state import pack
 from flexmb.tables.status import Status
 
 SAMPLES = 401
 MAX_STEPS = 400_000
+EXACT = tuple(each.name for each in ALGORITHMS.values() if each.route is not None and not each.is_first_order)
+"""Algorithms that run what the model says."""
 AROUND = 4e8
 """Time to compile a model and to evaluate the output of its run (0.2 s), expressed in operations."""
 
 
 @dataclass(frozen=True)
-class Outcome:
+class BenchRun:
     """One run. `signals` as far as it got; `message`: why it stopped, or "" if it finished. `operations` counted,
     `seconds` measured of the integration alone. `cut`: it would have taken more operations than it was allowed."""
 
@@ -56,7 +58,7 @@ class Bench:
         self.times = np.linspace(0.0, t_end, samples)
         self.spent = 0.0  # operations of all runs, compilation and output included
         self._systems: dict[Model, System | str] = {}
-        self._outcomes: dict[tuple[Model, Method], Outcome] = {}
+        self._outcomes: dict[tuple[Model, RunMethod], BenchRun] = {}
         self._operations: dict[tuple[Model, Algorithm], int] = {}
 
     def system(self, model: Model) -> System | str:
@@ -81,10 +83,9 @@ class Bench:
 
     def algorithm(self, model: Model) -> Algorithm:
         """The algorithm with fewer operations; both give the same accelerations."""
-        found: tuple[Algorithm, ...] = ("articulated", "composite")
-        return min(found, key=lambda algorithm: self.operations(model, algorithm))
+        return min(EXACT, key=lambda algorithm: self.operations(model, algorithm))
 
-    def run(self, model: Model, method: Method, most: float = np.inf) -> Outcome:
+    def run(self, model: Model, method: RunMethod, most: float = np.inf) -> BenchRun:
         """The run, made at the first call; it ends where it has executed about `most` operations."""
         found = self._outcomes.get((model, method))
         if found is None or (found.cut and most > found.operations):
@@ -92,18 +93,18 @@ class Bench:
             self.spent += found.operations + AROUND
         return found
 
-    def _run(self, model: Model, method: Method, most: float) -> Outcome:
+    def _run(self, model: Model, method: RunMethod, most: float) -> BenchRun:
         system = self.system(model)
         if isinstance(system, str):
-            return Outcome({}, system, 0, 0.0, 0.0)
+            return BenchRun({}, system, 0, 0.0, 0.0)
         each = self.operations(model, method.algorithm)
         steps = steps_within(method, each, most)
         try:
             done = simulated(system, self.times, method, min(steps, MAX_STEPS))
         except ClosureError as error:  # a mechanism that cannot move
-            return Outcome({}, str(error), 0, 0.0, 0.0)
+            return BenchRun({}, str(error), 0, 0.0, 0.0)
         cost = done.statistics
-        return Outcome(
+        return BenchRun(
             signals=measured(self.wanted, done) if len(done.t) else {},
             message="" if done.finished else done.message,
             evaluations=cost.evaluations,
@@ -117,13 +118,7 @@ def _operations(system: System, algorithm: Algorithm) -> int:
     state = system.initial_state
     y = pack(state)
     if isinstance(system, ClosedSystem):
-        chain = system.closures.chain("composite" if algorithm == "composite" else "articulated")
+        chain = system.closures.chain(algorithm)
         return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
-    if algorithm == "composite":
-        places = matrices(system.constants)
-        return count(
-            composite.accelerations, 0.0, y, system.constants, system.workspace(), places
-        ).operations.total
-    return count(
-        articulated.accelerations, 0.0, y, system.recursion_constants, system.recursion_workspace()
-    ).operations.total
+    kernel, tables = ALGORITHMS[algorithm].kernel(system)
+    return count(kernel, 0.0, y, *tables).operations.total

@@ -13,11 +13,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from flexmb.advisor.bench import Bench, Outcome
+from flexmb.advisor.bench import Bench, BenchRun
 from flexmb.advisor.ladder import STAGES, Cost, highest_frequency, model_cost, references
-from flexmb.advisor.methods import ADAPTIVE, FACTORS, FINEST, Method, ladders
+from flexmb.advisor.methods import FINEST, RunMethod, ladders
 from flexmb.advisor.models import Model
 from flexmb.advisor.quantity import Signals, error, scales
+from flexmb.integrate.catalogue import INTEGRATORS
 
 AGREED = 0.25
 """Two references are good enough if they differ by less than this part of the tolerance."""
@@ -61,13 +62,13 @@ class Confirmation:
         self.measured: dict[Model, float] = {}
         self.reference = self._reference(hidden, budget)
 
-    def run(self, model: Model) -> Outcome:
+    def run(self, model: Model) -> BenchRun:
         """The model integrated so finely that only the model's own error is left."""
         return self.bench.run(model, self.finely(model))
 
-    def finely(self, model: Model) -> Method:
+    def finely(self, model: Model) -> RunMethod:
         """The method of fine runs, whose own error does not matter."""
-        return Method("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
+        return RunMethod("dop853", max(FINEST, self.fine), self.bench.algorithm(model))
 
     def error(self, model: Model) -> float:
         """Error of a model, U included; infinite where it does not exist or does not finish."""
@@ -77,7 +78,7 @@ class Confirmation:
                 self.measured[model] = self._distance(self.run(model)) + self.reference.uncertainty
         return self.measured[model]
 
-    def total_error(self, model: Model, method: Method) -> float:
+    def total_error(self, model: Model, method: RunMethod) -> float:
         """Error of a run of the model by that method, U included."""
         done = self.bench.run(model, method)
         return self._distance(done) + self.reference.uncertainty if done.finished else np.inf
@@ -86,19 +87,19 @@ class Confirmation:
         """Operations of the model's fine run, infinite where there is none."""
         return np.inf if isinstance(self.bench.system(model), str) else self.run(model).operations
 
-    def _distance(self, done: Outcome) -> float:
+    def _distance(self, done: BenchRun) -> float:
         return error(done.signals, self.reference.signals, self.reference.scale)
 
     def adequate(self, model: Model) -> bool:
         """Whether the model leaves the integrator its share of the tolerance."""
         return self.error(model) <= (1.0 - ROOM) * self.tolerance
 
-    def integration_error(self, model: Model, method: Method) -> float:
+    def integration_error(self, model: Model, method: RunMethod) -> float:
         """How far a run is from the same model integrated finely."""
         done = self.bench.run(model, method)
         return error(done.signals, self.run(model).signals, self.reference.scale) if done.finished else np.inf
 
-    def cheapest_method(self, model: Model) -> Method:
+    def cheapest_method(self, model: Model) -> RunMethod:
         """The method with the fewest operations whose error fits beside the model's.
 
         In the ladder of every integrator, from loose to tight, it takes the first method that fits and whose successor
@@ -110,11 +111,11 @@ class Confirmation:
         highest, slow = highest_frequency(scene, model), self.cost.slow / (STAGES * self.bench.t_end)
         best, least, steady = self.finely(model), self.run(model).operations, self.run(model).evaluations < FEW
         for ladder in ladders(highest, slow, algorithm, not scene.closures):
-            if steady and ladder[0].integrator in FACTORS:
+            if steady and INTEGRATORS[ladder[0].integrator].linearises:
                 continue
-            before: Method | None = None
+            before: RunMethod | None = None
             for method in ladder:
-                if method.integrator in ADAPTIVE and method.value <= self.finely(model).value:
+                if method.adaptive and method.value <= self.finely(model).value:
                     break
                 done = self.bench.run(model, method, least if before is None else np.inf)
                 if done.cut:

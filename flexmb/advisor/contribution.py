@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.advisor.response import Response, RigidRun, mass_shapes
+from flexmb.advisor.modal_response import ModalResponse, RigidRun, mass_shapes
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.schema import Free, Hinge, Marker, Scene
 from flexmb.scene.tree import GROUND
@@ -22,14 +22,14 @@ from flexmb.typing import Real
 class Moved:
     """The response of one body in World axes: momenta of its modes about its origin, (T,3,m), and where it is."""
 
-    response: Response
+    response: ModalResponse
     position: Real
     turn: Real
     linear: Real
     angular: Real
 
 
-def moved(rigid: RigidRun, response: Response) -> Moved:
+def moved(rigid: RigidRun, response: ModalResponse) -> Moved:
     """Momentum shapes sum m phi and sum m r x phi of the modes, turned to World."""
     model = response.model
     shapes, centre = mass_shapes(model), model.position + model.com_offset

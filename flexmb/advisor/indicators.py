@@ -21,12 +21,12 @@ from msgspec.structs import replace
 from numpy.typing import NDArray
 
 from flexmb.advisor.contribution import contribution, free_share, moved
-from flexmb.advisor.models import Rung
-from flexmb.advisor.response import FAMILIES, Response, RigidRun, eigenmodes
+from flexmb.advisor.modal_response import FAMILIES, ModalResponse, RigidRun, eigenmodes
+from flexmb.advisor.models import BodyModel
 from flexmb.advisor.sprung import fitted_hinge
-from flexmb.frisch.equivalence.advice import coupling_error
 from flexmb.frisch.equivalence.appendage import appendage_of
-from flexmb.modal.model import FlexibleModel
+from flexmb.frisch.equivalence.comparison import coupling_error
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -74,7 +74,7 @@ class Indicators:
         return "; ".join(parts)
 
 
-def indicators(rigid: RigidRun, scene: Scene, response: Response, scale: dict[str, float]) -> Indicators:
+def indicators(rigid: RigidRun, scene: Scene, response: ModalResponse, scale: dict[str, float]) -> Indicators:
     """All indicators of one body for the channels of `scale`, which maps them to what their error is relative to."""
     part = moved(rigid, response)
     modes = response.model.mode_count
@@ -100,7 +100,7 @@ def indicators(rigid: RigidRun, scene: Scene, response: Response, scale: dict[st
     )  # fmt: skip
 
 
-def predicted(rung: Rung, body: Indicators) -> float:
+def predicted(rung: BodyModel, body: Indicators) -> float:
     """Error of a rung, part of the scale; infinite where it would fail."""
     whole = body.flexibility
     if rung.kind == "rigid":
@@ -147,7 +147,7 @@ def _axis(body: BeamBody) -> tuple[Real, Real, Real]:
     return x[order], np.concatenate([model.mass, [0.0, 0.0]])[order], slopes[order]
 
 
-def _geometric(response: Response) -> Real:
+def _geometric(response: ModalResponse) -> Real:
     """kappa (T,m'): axial force against the modal stiffness, for the two lowest modes of a beam."""
     body = response.body
     if not isinstance(body, BeamBody):
@@ -165,7 +165,7 @@ def _geometric(response: Response) -> Real:
     return stiffness / response.frequencies[: g.shape[1]] ** 2
 
 
-def _like_a_cantilever(response: Response) -> Real:
+def _like_a_cantilever(response: ModalResponse) -> Real:
     """|kappa| (T,1) of a raw body, whose slopes are unknown, taken as that of a uniform cantilever of the same length.
 
     Of its first mode: 1.1933 w^2 by spin, 1.5709 a / L by acceleration and 4.6478 P / (m L) by a force at the tip, all
@@ -179,7 +179,7 @@ def _like_a_cantilever(response: Response) -> Real:
     return np.atleast_2d(stiffness / max(response.frequencies.min() ** 2, _TINY)).T
 
 
-def _shortening(response: Response) -> float:
+def _shortening(response: ModalResponse) -> float:
     """Half the integral of the squared slope (m); of a raw body that of a cantilever's first mode, 0.58 of the squared
     deflection over the length."""
     if not isinstance(response.body, BeamBody):
@@ -190,7 +190,7 @@ def _shortening(response: Response) -> float:
     return float(np.max(0.5 * np.trapezoid(np.sum(angle**2, axis=2), x, axis=1)))
 
 
-def _deflection(response: Response) -> float:
+def _deflection(response: ModalResponse) -> float:
     model = response.model
     size = _length(model)
     far = int(np.argmax(np.sum(model.translation[:, :, 0] ** 2, axis=1)))

@@ -10,15 +10,14 @@ import numpy as np
 from msgspec.structs import replace
 from scipy.linalg import eigvalsh
 
-from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, Model, Rung, built, flexible_bodies, levels
+from flexmb.advisor.models import COUNTS, LEVELS, PIECES, SEGMENTS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.jain.cost import articulated
+from flexmb.levels.body import BY_NAME
 from flexmb.modal import flexible_model
 from flexmb.modal.integrals import modal_integrals
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
 from flexmb.scene.schema import Scene
 
-LEVEL_COST = {"rigid": 1.0, "ruthless": 1.0, "linear": 1.25, "full": 1.4, "stiffened": 1.8}
-"""Operations of a body relative to a ruthless one, counted with four modes."""
 STEP_AT_HIGHEST = 3.4
 """Step of DOP853 times the highest frequency, where that frequency limits the step (measured)."""
 STAGES = 12
@@ -32,7 +31,7 @@ class Step:
     """A rung with what is predicted of it: error as a part of the scale, operations of one evaluation of the body's
     part of the scene, highest frequency (rad/s)."""
 
-    rung: Rung
+    rung: BodyModel
     error: float
     operations: float
     fastest: float
@@ -56,25 +55,26 @@ class Cost:
         return each * max(self.slow, STAGES * self.t_end * fastest / STEP_AT_HIGHEST)
 
 
-def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> tuple[Rung, ...]:
+def rungs(scene: Scene, body: BeamBody | ModalBody, moving: frozenset[str]) -> tuple[BodyModel, ...]:
     """Every rung of one body, in no order. `moving`: families of a beam that something excites, as far as known."""
     if isinstance(body, ModalBody):
         every = flexible_model(body).mode_count
         counts = sorted({n for n in COUNTS if n < every} | {every})
-        return (Rung("rigid"), Rung("sprung"), *(Rung("modes", n, level) for level in levels(body) for n in counts))
+        by_modes = (BodyModel("modes", n, level) for level in levels(body) for n in counts)
+        return (BodyModel("rigid"), BodyModel("sprung"), *by_modes)
     sets: list[tuple[str, ...]] = [()]
     some = tuple(family for family in body.modes.families if family in moving)
     if some and set(some) != set(body.modes.families):
         sets.append(some)
     carries = body.modes.static or any(hinge.parent == body.name for hinge in scene.hinges)
-    found = [Rung("rigid"), Rung("sprung")]
+    found = [BodyModel("rigid"), BodyModel("sprung")]
     for families in sets:
         for level in LEVELS:
-            found += [Rung("modes", n, level, False, families) for n in COUNTS]
+            found += [BodyModel("modes", n, level, False, families) for n in COUNTS]
             if carries:
-                found += [Rung("modes", n, level, True, families) for n in (0, 1, 2, 4)]
-    found += [Rung("segments", pieces=n) for n in SEGMENTS]
-    found += [Rung("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
+                found += [BodyModel("modes", n, level, True, families) for n in (0, 1, 2, 4)]
+    found += [BodyModel("segments", pieces=n) for n in SEGMENTS]
+    found += [BodyModel("pieces", pieces=n, level=level) for n in PIECES for level in LEVELS[-2:]]
     return tuple(found)
 
 
@@ -89,12 +89,12 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
     bent = {state.body for state in scene.modal_states}
     splits = [b.name for b in bodies if isinstance(b, BeamBody) and b.name not in bent]
 
-    def rung(body: BeamBody | ModalBody, more: int, pieces: int) -> Rung:
+    def rung(body: BeamBody | ModalBody, more: int, pieces: int) -> BodyModel:
         if isinstance(body, ModalBody):
-            return Rung("modes", flexible_model(body).mode_count, levels(body)[-1])
+            return BodyModel("modes", flexible_model(body).mode_count, levels(body)[-1])
         if pieces and body.name in splits:
-            return Rung("pieces", 0, LEVELS[-1], pieces=pieces)
-        return Rung("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
+            return BodyModel("pieces", 0, LEVELS[-1], pieces=pieces)
+        return BodyModel("modes", body.modes.count + more, LEVELS[-1], body.modes.static)
 
     first = tuple((b.name, rung(b, 0 if isinstance(b, BeamBody) and b.modes.static else 4, 0)) for b in bodies)
     finer = [(f"{n} pieces", tuple((b.name, rung(b, 4, n)) for b in bodies)) for n in (2, 4, 8, 16)]
@@ -103,7 +103,7 @@ def references(scene: Scene) -> tuple[tuple[str, Model], ...]:
     return (("modes" if bodies else "the scene", first), *((name, model) for name, model in finer if model != first))
 
 
-def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:
+def step(scene: Scene, name: str, rung: BodyModel, error: float) -> Step | None:
     """The predictions for one rung, operations by the polynomials of Jain & Rodriguez' section VII; None where it does
     not fit the body."""
     try:
@@ -114,7 +114,7 @@ def step(scene: Scene, name: str, rung: Rung, error: float) -> Step | None:
         fastest = _fastest(next(b for b in scene.bodies if b.name == name), rung, parts)
     except ValueError:
         return None
-    each = sum(LEVEL_COST[level] * articulated([n]).total for n, level in counts)
+    each = sum(BY_NAME[level].cost * articulated([n]).total for n, level in counts)
     return Step(rung, error, float(each), fastest)
 
 
@@ -140,7 +140,7 @@ def _mode_count(body: Body) -> int:
     return len(_squares(body)) if isinstance(body, BeamBody | ModalBody) and body.level != "rigid" else 0
 
 
-def _fastest(body: Body, rung: Rung, parts: list[Body]) -> float:
+def _fastest(body: Body, rung: BodyModel, parts: list[Body]) -> float:
     """Highest frequency (rad/s) of the bodies that a rung makes of one body."""
     if rung.kind == "segments" and isinstance(body, BeamBody):
         return ZIGZAG * rung.pieces**2 * _beam_rate(body)

@@ -8,9 +8,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Integrator
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Statistics, Trajectory
-from flexmb.system.system import Algorithm, System
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.tree_system import System
 
 ABSOLUTE = 1e-2
 """Absolute over relative tolerance, SI: modal coordinates and small rates are of the order of hundredths."""
@@ -21,17 +24,12 @@ STEPS = (2.5, 1.25, 0.6, 0.3, 0.15, 0.075)
 """Fixed steps times the highest frequency; RK4 is stable up to 2.83."""
 
 
-ADAPTIVE = frozenset({"dop853", "radau5", "exponential"})
 COMPLEX = 4
 """Operations of an evaluation in complex numbers against one in real ones."""
-EVALUATIONS = {"dop853": 11, "rk4": 4}
-"""Evaluations of a step, at least; methods that linearise take 1."""
-FACTORS = {"radau5": (10.0 / 3.0, 10.0), "exponential": (40.0, 10.0), "generalised_alpha": (2.0 / 3.0, 2.0)}
-"""Operations over n^3 a factorisation (real and complex; exponential; real), over n^2 for each evaluation."""
 
 
 @dataclass(frozen=True)
-class Method:
+class RunMethod:
     """A way to integrate; `value` is the relative tolerance if the integrator controls its step, else the step (s)."""
 
     integrator: str
@@ -40,7 +38,7 @@ class Method:
 
     @property
     def adaptive(self) -> bool:
-        return self.integrator in ADAPTIVE
+        return not INTEGRATORS[self.integrator].fixed
 
     def options(self) -> dict[str, Any]:
         """Keyword arguments of `flexmb.simulate`."""
@@ -60,44 +58,43 @@ class Method:
         return f"{self.integrator}, {kind} {self.value:.3g}{unit}, {self.algorithm}"
 
 
-def simulated(system: System, times: NDArray[np.float64], method: Method, max_steps: int = 1_000_000) -> Trajectory:
+def simulated(system: System, times: NDArray[np.float64], method: RunMethod, max_steps: int = 1_000_000) -> Trajectory:
     """A run with output at `times` (s)."""
     return simulate(system, float(times[-1]), samples=times, max_steps=max_steps, **method.options())
 
 
-def steps_within(method: Method, each: int, most: float) -> int:
+def steps_within(method: RunMethod, each: int, most: float) -> int:
     """Steps after which a run has executed `most` operations, `each` for an evaluation."""
-    return int(min(most / (each * EVALUATIONS.get(method.integrator, 1)), 1e9)) + 1
+    return int(min(most / (each * INTEGRATORS[method.integrator].evaluations), 1e9)) + 1
 
 
-def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[Method, ...], ...]:
+def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tuple[tuple[RunMethod, ...], ...]:
     """For each integrator its methods from loose to tight, those that linearise first.
 
     Fixed steps follow the frequency `highest` (rad/s), those of implicit methods `slow`, the frequency of the scene
     with all bodies rigid. Methods that linearise are for trees and the recursion only.
     """
-    explicit = (
-        tuple(Method("dop853", rtol, algorithm) for rtol in TOLERANCES),
-        tuple(Method("rk4", step / max(highest, slow), algorithm) for step in STEPS),
-    )
-    if not tree:
-        return explicit
-    return (
-        tuple(Method("radau5", rtol) for rtol in TOLERANCES[:-3]),
-        tuple(Method("exponential", rtol) for rtol in TOLERANCES[:-3]),
-        tuple(Method("generalised_alpha", step / slow) for step in STEPS),
-        *explicit,
+    chosen = [each for each in INTEGRATORS.values() if tree or not each.linearises]
+    return tuple(
+        _ladder(each, slow if each.linearises else max(highest, slow), "articulated" if each.linearises else algorithm)
+        for each in sorted(chosen, key=lambda each: not each.linearises)
     )
 
 
-def operations(method: Method, each: int, size: int, done: Statistics) -> float:
+def _ladder(integrator: Integrator, frequency: float, algorithm: Algorithm) -> tuple[RunMethod, ...]:
+    """Loose to tight; those that linearise are slow at tight tolerances."""
+    if integrator.fixed:
+        return tuple(RunMethod(integrator.name, step / frequency, algorithm) for step in STEPS)
+    tolerances = TOLERANCES[:-3] if integrator.linearises else TOLERANCES
+    return tuple(RunMethod(integrator.name, rtol, algorithm) for rtol in tolerances)
+
+
+def operations(method: RunMethod, each: int, size: int, done: Statistics) -> float:
     """Operations of a run: `each` for an evaluation of the accelerations, `size` entries of the state.
 
     A Jacobian is an evaluation in complex numbers for each of its columns; linear algebra is counted by its leading
     terms, substitutions with every evaluation.
     """
-    if method.integrator not in FACTORS:
-        return float(each) * done.evaluations
-    cubic, square = FACTORS[method.integrator]
+    cubic, square = INTEGRATORS[method.integrator].algebra
     evaluations = done.evaluations + COMPLEX * size * done.jacobians
     return float(each * evaluations + cubic * size**3 * done.factorisations + square * size**2 * done.evaluations)

@@ -1,7 +1,7 @@
 """The models that can replace a flexible body; each turns a scene into another scene.
 
-A `Rung` is one model of one body, a `Model` has a rung for every flexible body. Which rung is cheaper or finer is not
-decided here but in `flexmb.advisor.ladder`.
+A `BodyModel` is one model of one body, a rung of its ladder; a `Model` has one for every flexible body. Which rung is
+cheaper or finer is not decided here but in `flexmb.advisor.ladder`.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from msgspec.structs import replace
 
 from flexmb.advisor.modes import with_modes
 from flexmb.advisor.sprung import spring_hinged
+from flexmb.levels import body as fidelity
 from flexmb.scene.bodies import BeamBody, Level, ModalBody
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.modal_data import modal_arrays
@@ -20,7 +21,7 @@ from flexmb.scene.problems import Place
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, substructured
 
-LEVELS: tuple[Level, ...] = ("ruthless", "linear", "full", "stiffened")
+LEVELS: tuple[Level, ...] = tuple(level.name for level in fidelity.LEVELS if level.flexible)
 COUNTS = (1, 2, 3, 4, 6, 8)
 SEGMENTS = (2, 4, 8)
 PIECES = (2, 4, 8, 16)
@@ -30,7 +31,7 @@ Kind = Literal["rigid", "sprung", "modes", "segments", "pieces"]
 
 
 @dataclass(frozen=True)
-class Rung:
+class BodyModel:
     """One model of a flexible body.
 
     "rigid"; "sprung": rigid on a spring hinge; "modes": its `modes` lowest of `families` (all if empty), at `level`,
@@ -59,7 +60,7 @@ class Rung:
         return f"{self.modes} {PLURAL.get(self.modes, 'modes')}{of}{static}, {self.level}"
 
 
-Model = tuple[tuple[str, Rung], ...]
+Model = tuple[tuple[str, BodyModel], ...]
 """(body, rung) of every flexible body, in the scene's order."""
 
 
@@ -83,7 +84,7 @@ def built(scene: Scene, model: Model) -> Scene:
     return scene
 
 
-def with_rung(model: Model, name: str, rung: Rung) -> Model:
+def with_rung(model: Model, name: str, rung: BodyModel) -> Model:
     """The same model with another rung for one body."""
     return tuple((each, rung if each == name else own) for each, own in model)
 
@@ -94,7 +95,7 @@ def rigid(scene: Scene, name: str) -> Scene:
     return replace(scene, bodies=bodies, modal_states=tuple(s for s in scene.modal_states if s.body != name))
 
 
-def _applied(scene: Scene, name: str, rung: Rung) -> Scene:
+def _applied(scene: Scene, name: str, rung: BodyModel) -> Scene:
     match rung.kind:
         case "rigid":
             return rigid(scene, name)

@@ -9,8 +9,8 @@ from msgspec.structs import replace
 from scipy.linalg import eigh
 
 from flexmb.modal import flexible_model
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, Level, ModalBody, ModalNode
 from flexmb.scene.modal_data import inertia_points, modal_arrays, node_arrays
 from flexmb.scene.schema import ModalState, Scene

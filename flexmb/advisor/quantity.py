@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.run.channels import Run, channels_of, distance, family, magnitude, matches, signal_range, unit
+from flexmb.run.channels import Recorded, channels_of, distance, family, magnitude, matches, signal_range, unit
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -62,7 +62,7 @@ def quantities(words: str | Quantity | Sequence[str | Quantity] | None, scene: S
     return tuple(word if isinstance(word, Quantity) else Quantity.parse(word) for word in listed)
 
 
-def measured(wanted: tuple[Quantity, ...], run: Run) -> Signals:
+def measured(wanted: tuple[Quantity, ...], run: Recorded) -> Signals:
     """The channels of a run that the quantities name, each (T,k). ValueError for a quantity that names none."""
     channels = channels_of(run)
     found: Signals = {}

@@ -19,8 +19,8 @@ import numpy as np
 
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import Step, highest_frequency
-from flexmb.advisor.methods import Method
-from flexmb.advisor.models import LEVELS, Model, Rung
+from flexmb.advisor.methods import RunMethod
+from flexmb.advisor.models import LEVELS, BodyModel, Model
 
 HOPELESS = 20.0
 """Models predicted to miss the tolerance by this factor are tried last on the way up, and never on the way down."""
@@ -45,7 +45,7 @@ class Found:
     """A model and its cheapest method; `exhausted`: whether the budget ended the walk down."""
 
     model: Model
-    method: Method
+    method: RunMethod
     exhausted: bool
 
 
@@ -79,7 +79,7 @@ class _Walk:
             name: tuple(step for step in steps if step.fastest <= known) for name, steps in ladders.items()
         }
         self.most = confirmation.bench.spent + budget
-        self.missed: dict[str, set[Rung]] = {name: set() for name in ladders}
+        self.missed: dict[str, set[BodyModel]] = {name: set() for name in ladders}
         self.hopeless = HOPELESS * confirmation.tolerance
 
     def fits(self, choice: Choice) -> bool:

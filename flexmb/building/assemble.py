@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from flexmb.building.carried import moved_inertia
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
-from flexmb.building.links import Link, Port, closure_sides, port
+from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.numbering import Numbering
-from flexmb.hinges import catalogue
+from flexmb.hinges.catalogue import KINDS
+from flexmb.levels.body import LEVELS
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
@@ -35,7 +38,7 @@ class Functions:
 class Ports:
     """Ports by body; numbered when all are known."""
 
-    def __init__(self, chain: list[Link]) -> None:
+    def __init__(self, chain: list[BodyLink]) -> None:
         self.by_body: list[list[Port]] = [[] for _ in chain]
 
     def add(self, body: int, at: Port) -> tuple[int, int]:
@@ -53,15 +56,22 @@ class Ports:
         return [port for ports in self.by_body for port in ports]
 
 
-def body_port(link: Link, node: str, offset: s.Vector) -> Port:
+def body_port(link: BodyLink, node: str, offset: s.Vector) -> Port:
     """Port at a node of a link for wheels, loads and markers, in the link's frame."""
     return port(link.model, node, offset, IDENTITY, np.eye(3))
 
 
-def assemble(
-    scene: s.Scene, chain: list[Link], numbering: Numbering, null_partitions: bool = False
-) -> tuple[a.Constants, dict[str, tuple[int, int]], list[tuple[int, int]]]:
-    """Constants of the scene, (body, port) of every marker, and of both sides of every closure; -1, -1 on the ground.
+@dataclass(frozen=True)
+class Assembled:
+    """The arrays of a scene, and which of its ports belong to whom: (body, port) each, (-1, -1) on the ground."""
+
+    constants: a.Constants
+    markers: dict[str, tuple[int, int]]  # by name
+    closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
+
+
+def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
+    """The arrays of a scene, from its links and the places of its coordinates.
 
     `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
     computed all the same.
@@ -97,12 +107,13 @@ def assemble(
     points["point"]["second"], second_shape = second_order_rows(of_points, len(of_ports), m)
     body = inertia.pop("body")
     body["parent"] = [index.get(link.parent, -1) for link in chain]
-    body["level"] = [link.level for link in chain]
-    body["hinge_kind"] = [link.kind for link in chain]
+    body["level"] = [LEVELS.index(link.level) for link in chain]
+    body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
+    body["axis"] = [link.kind.axis for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
     body["q_index"] = [numbering.q[link.hinge.name].start for link in chain]
     body["u_index"] = [numbering.u[link.hinge.name].start for link in chain]
-    body["nv"] = [catalogue.KINDS[link.kind].NV for link in chain]
+    body["nv"] = [link.kind.speeds for link in chain]
     body["modes"] = [link.model.mode_count for link in chain]
     body["eta_index"] = [numbering.q[f"{link.name}.modes"].start for link in chain]
     body["etad_index"] = [numbering.u[f"{link.name}.modes"].start for link in chain]
@@ -132,10 +143,10 @@ def assemble(
     )
     constants.speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
-    return constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides]
+    return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
 
 
-def _moved(inboard: Port, parent: Link) -> Port:
+def _moved(inboard: Port, parent: BodyLink) -> Port:
     """An inboard port in its parent's link frame (the parent may have been referred to its own hinge frame)."""
     if parent.outboard.deforms:
         return inboard
@@ -171,7 +182,7 @@ def _loads(loads: list[s.Load], ports: list[int], functions: Functions) -> a.Rec
 
 
 def _speeds(
-    chain: list[Link], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
+    chain: list[BodyLink], wheels: list[s.Wheel], numbering: Numbering, functions: Functions, body: a.Record
 ) -> a.Record:
     """Springs, dampers, motors and prescribed motion by speed; isotropic springs of spherical hinges by body."""
     out = np.zeros(numbering.nu, a.SPEED)
@@ -179,9 +190,9 @@ def _speeds(
         out[name] = -1
     for k, link in enumerate(chain):
         q, u = numbering.q[link.hinge.name].start, numbering.u[link.hinge.name].start
-        if isinstance(link.hinge, s.Spherical):
-            body["ball_spring"][k] = link.hinge.stiffness_Nm_rad
-            out["damping"][u : u + 3] = link.hinge.damping_Nms_rad
+        body["ball_spring"][k], damping = link.kind.ball(link.hinge)
+        if damping:
+            out["damping"][u : u + 3] = damping
         for n, (_, c) in enumerate(link.scalar):
             if isinstance(c, s.AngularCoordinate):
                 spring, motor, prescribed = (

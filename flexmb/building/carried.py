@@ -4,13 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.hinges.catalogue import CYLINDRICAL, FREE, PLANAR, PRISMATIC, TRANSLATION2, TRANSLATION3
+from flexmb.hinges.catalogue import KINDS
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real
-
-_LINEAR = {  # speeds of a hinge that are displacements; all others are rotations
-    PRISMATIC: (0,), CYLINDRICAL: (1,), PLANAR: (0, 1), TRANSLATION2: (0, 1), TRANSLATION3: (0, 1, 2), FREE: (3, 4, 5),
-}  # fmt: skip
 
 
 def moved_inertia(c: Constants) -> Real:
@@ -25,7 +21,7 @@ def moved_inertia(c: Constants) -> Real:
     for k in range(bodies - 1, -1, -1):
         body = c.body[k]
         about_hinge = _about(inertia[k], mass[k], _distance(c, body["outboard_port"]))
-        linear = _LINEAR.get(int(body["hinge_kind"]), ())
+        linear = KINDS[body["hinge_kind"]].displacements
         for n in range(body["nv"]):
             moved[body["u_index"] + n] = mass[k] if n in linear else about_hinge
         for n in range(body["modes"]):

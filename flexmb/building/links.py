@@ -11,23 +11,24 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.hinges import catalogue
+from flexmb.hinges.catalogue import kind_of
+from flexmb.hinges.kind import HingeKind, z_to
+from flexmb.levels.body import BY_NAME
+from flexmb.levels.level import FidelityLevel
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel, ModalNode, with_node
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
-from flexmb.tables.arrays import FULL, LINEAR, RIGID, RUTHLESS, STIFFENED
 from flexmb.typing import Real
-
-LEVELS = {"rigid": RIGID, "ruthless": RUTHLESS, "linear": LINEAR, "full": FULL, "stiffened": STIFFENED}
 
 
 @dataclass(frozen=True)
 class Port:
     """A frame on a body: node, offset from it and rotation port -> body at rest, both in body axes."""
 
-    node: ModalNode
+    node: FlexibleNode
     offset: Real
     frame: Real
 
@@ -45,7 +46,7 @@ class Port:
 
 
 @dataclass(frozen=True)
-class Link:
+class BodyLink:
     """One body as the dynamics sees it, and the hinge that holds it.
 
     The last `wheels` points of its model are the despun wheels of the body.
@@ -54,26 +55,26 @@ class Link:
     name: str
     hinge: s.Hinge | s.PointMass
     parent: str
-    level: int
+    level: FidelityLevel
     model: FlexibleModel
     wheels: int
-    kind: int
+    kind: HingeKind
     sequence: tuple[int, ...]
     inboard: Port
     outboard: Port
     scalar: tuple[NamedCoordinate, ...]
 
 
-def links(scene: s.Scene) -> list[Link]:
+def links(scene: s.Scene) -> list[BodyLink]:
     """All links base to tip: bodies depth-first, then point masses."""
     models = {GROUND: _ground()} | {body.name: _model(body) for body in scene.bodies}
     for wheel in scene.wheels:
         models[wheel.body] = _with_wheel(models[wheel.body], wheel)
     found = []
     for body, hinge in ordered(scene):
-        kind, sequence, turn = _kind(hinge)
+        kind, (sequence, turn) = kind_of(hinge)
         found.append(
-            Link(
+            BodyLink(
                 name=body.name,
                 hinge=hinge,
                 parent=hinge.parent,
@@ -113,7 +114,7 @@ class Side:
 
 def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
     """Frames A and B of a closure."""
-    turn = _z_to(closure.axis) if closure.type in ("revolute", "prismatic", "cylindrical") else np.eye(3)
+    turn = z_to(closure.axis) if closure.type in WITH_AXIS else np.eye(3)
     return (
         Side(closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a, turn),
         Side(closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b, turn),
@@ -147,13 +148,13 @@ def _rigid_model(mass: float, com: Real, inertia: Real, nodes: dict[str, tuple[R
         rotation=np.zeros((1, 3, 0)),
         stiffness=np.zeros((0, 0)),
         damping=np.zeros((0, 0)),
-        nodes={name: ModalNode(position, rotation, none, none) for name, (position, rotation) in nodes.items()},
+        nodes={name: FlexibleNode(position, rotation, none, none) for name, (position, rotation) in nodes.items()},
         clamped=True,
     )
 
 
-def _level(body: s.Body) -> int:
-    return RIGID if isinstance(body, s.RigidBody) else LEVELS[body.level]
+def _level(body: s.Body) -> FidelityLevel:
+    return BY_NAME["rigid" if isinstance(body, s.RigidBody) else body.level]
 
 
 def _model(body: s.Body) -> FlexibleModel:
@@ -164,7 +165,7 @@ def _model(body: s.Body) -> FlexibleModel:
     if isinstance(body, s.SidBody):
         raise NotImplementedError(f'body "{body.name}": SID files are not supported yet; use kind = "modal"')
     model = flexible_model(body)
-    return _without_modes(model) if body.level == "rigid" else model
+    return model if _level(body).flexible else _without_modes(model)
 
 
 def _without_modes(model: FlexibleModel) -> FlexibleModel:
@@ -199,66 +200,26 @@ def _with_wheel(model: FlexibleModel, wheel: s.Wheel) -> FlexibleModel:
     )
 
 
-def _kind(hinge: s.Hinge) -> tuple[int, tuple[int, ...], Real]:
-    """Number of the kind, gimbal axes, and the turn that brings the hinge axis to z."""
-    identity = np.eye(3)
-    match hinge:
-        case s.Weld():
-            return catalogue.WELD, (), identity
-        case s.Revolute(axis=axis):
-            return catalogue.REVOLUTE, (), _z_to(axis)
-        case s.Prismatic(axis=axis):
-            return catalogue.PRISMATIC, (), _z_to(axis)
-        case s.Cylindrical(axis=axis):
-            return catalogue.CYLINDRICAL, (), _z_to(axis)
-        case s.Universal():
-            return catalogue.GIMBAL2, (0, 1), identity
-        case s.Gimbal(sequence=sequence):
-            kind = catalogue.GIMBAL2 if len(sequence) == 2 else catalogue.GIMBAL3
-            return kind, tuple("xyz".index(axis) for axis in sequence), identity
-        case s.Spherical():
-            return catalogue.SPHERICAL, (), identity
-        case s.Planar():
-            return catalogue.PLANAR, (), identity
-    return catalogue.FREE, (), identity
-
-
-def _z_to(axis: s.Vector) -> Real:
-    """A rotation whose third column is `axis`."""
-    z = np.asarray(axis, float) / np.linalg.norm(axis)
-    helper = np.eye(3)[np.argmin(np.abs(z))]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
-
-
-def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> Link:
+def _point_mass(mass: s.PointMass, models: dict[str, FlexibleModel]) -> BodyLink:
     """A point mass as a body without rotary inertia on translations along its directions."""
-    free = len(mass.directions)
-    kind = (catalogue.WELD, catalogue.PRISMATIC, catalogue.TRANSLATION2, catalogue.TRANSLATION3)[free]
-    turn = np.eye(3)
-    if free == 1:
-        turn = _z_to(mass.directions[0])
-    elif free > 1:
-        x, y = np.asarray(mass.directions[:2], float)
-        turn = np.column_stack([x, y, np.cross(x, y)])
+    kind, (sequence, turn) = kind_of(mass)
     point = _rigid_model(mass.mass_kg, np.zeros(3), np.zeros((3, 3)), {"origin": (np.zeros(3), np.eye(3))})
-    return Link(
+    return BodyLink(
         name=mass.name,
         hinge=mass,
         parent=mass.body,
-        level=RIGID,
+        level=BY_NAME["rigid"],
         model=point,
         wheels=0,
         kind=kind,
-        sequence=(),
+        sequence=sequence,
         inboard=port(models[mass.body], mass.node, mass.offset_m, IDENTITY, turn),
         outboard=Port(point.nodes["origin"], np.zeros(3), turn),
         scalar=coordinates(mass),
     )
 
 
-def _in_hinge_frame(link: Link) -> Link:
+def _in_hinge_frame(link: BodyLink) -> BodyLink:
     """Refer the body to its outboard hinge frame, unless that frame moves with the modes."""
     if link.outboard.deforms:
         return link

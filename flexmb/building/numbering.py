@@ -4,27 +4,23 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.building.links import Link
-from flexmb.hinges import catalogue
+from flexmb.building.links import BodyLink
 from flexmb.scene import schema as s
 from flexmb.tables.state import Layout
-
-_QUATERNION = {catalogue.SPHERICAL: 0, catalogue.FREE: 3}  # where it starts: the helper `catalogue.quaternion_offset`
 
 
 class Numbering:
     """Places of all coordinates in q and speeds in u, Jain & Rodriguez (3), (4): body by body hinge, modes, wheels."""
 
-    def __init__(self, chain: list[Link], wheels: dict[str, list[s.Wheel]]) -> None:
+    def __init__(self, chain: list[BodyLink], wheels: dict[str, list[s.Wheel]]) -> None:
         self.q: dict[str, slice] = {}
         self.u: dict[str, slice] = {}
         self.nq = self.nu = 0
         quaternions = list[int]()
         for link in chain:
-            kind = catalogue.KINDS[link.kind]
-            if link.kind in _QUATERNION:
-                quaternions.append(self.nq + _QUATERNION[link.kind])
-            self._append(link.hinge.name, kind.NQ, kind.NV)
+            if link.kind.quaternion >= 0:
+                quaternions.append(self.nq + link.kind.quaternion)
+            self._append(link.hinge.name, link.kind.coordinates, link.kind.speeds)
             self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
             for wheel in wheels.get(link.name, ()):
                 self._append(wheel.name, 1, 1)

@@ -8,8 +8,8 @@ jump over the place where they vanish.
 So every evaluation of a step compares its Q with that of the state from which the step starts, row by row. A row that
 has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
 their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
-branches apart. A part d of the mechanism away from it they differ by d^2 in the gap of the closure, which is closed to
-2^-44: a run ends where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+branches apart: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
+to 2^-44. So a run ends where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
 """
 
 from math import inf
@@ -37,8 +37,9 @@ def is_further(t, cw):
 def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
-    By the time that is left at the rate of the step, in the time in which ports pass through the whole mechanism, as
-    fast as in that step: where they come to rest, they have no speed.
+    At the rate at which it has fallen since the step started, a pivot vanishes after some time. This time is short
+    beside that in which the ports move as far as the mechanism is large. Their speed is the larger of those now and
+    where the step started: where they come to rest, they have none.
     """
     for a in range(cw.rank[0]):
         i = cc.row[cw.chosen[a]].closure
@@ -51,7 +52,7 @@ def at_crossing(t, cc, cw):
 
 @helper
 def turned_over(cw):
-    """The first chosen row whose direction is another than where the step started, or -1. Needs what the above does."""
+    """The first chosen row that points another way than when the step started, or -1. Needs the same."""
     for a in range(cw.rank[0]):
         total = 0.0
         for j in range(cw.basis.shape[1]):
@@ -77,7 +78,7 @@ def remember(t, cw):
 
 @helper
 def recall(cw):
-    """Rows as they were chosen where the step starts, to try it again."""
+    """Choose the rows that were chosen where the step starts, to try it again."""
     if has_started(cw):
         for r in range(cw.chosen.shape[0]):
             cw.chosen[r] = cw.former_rows[r]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.building.links import Link, closure_sides, matrix
+from flexmb.building.links import BodyLink, closure_sides, matrix
 from flexmb.closure import tables as t
 from flexmb.scene import schema as s
 from flexmb.tables.arrays import Constants
@@ -73,7 +73,7 @@ def _length(constants: Constants, sides: np.ndarray) -> float:
     return largest or 1.0
 
 
-def slowest_mode(chain: list[Link]) -> float:
+def slowest_mode(chain: list[BodyLink]) -> float:
     """The lowest frequency (rad/s) of a mode by itself, body held; infinite where none has stiffness."""
     found = [np.inf]
     for link in chain:

@@ -8,7 +8,7 @@ from flexmb.closure.sizes import measure_ports
 from flexmb.entry.articulated import world_loads
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import kernel
-from flexmb.motion.coordinates import configuration_rate, load_state
+from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.spatial.vector import mat3, store3, times
 from flexmb.tables.status import OK
 
@@ -34,13 +34,7 @@ def rhs(t, y, dy, s, _):
     if status != OK:
         return status
     accelerate(s.route, s)
-    configuration_rate(c, w)
-    nq, nu = w.q.shape[0], w.u.shape[0]
-    for i in range(nq):
-        dy[i] = w.rate[i]
-    for j in range(nu):
-        dy[nq + j] = w.speed[j].acceleration
-    dy[nq + nu] = power(c, w)
+    store_slope(c, w, power(c, w), dy)
     return OK
 
 

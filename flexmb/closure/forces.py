@@ -9,6 +9,7 @@ from flexmb.closure import generalised
 from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
+from flexmb.closure.tables import Recursion
 from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
@@ -79,19 +80,19 @@ def _locate(route, t, y, s):
     evaluate_rows(s.c, s.w, s.cc, s.cw, False)
 
 
-# A route with an array "speed" is one of generalised forces. Each takes s.route, then:
+# By unit loads where the route is the Recursion, else by generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
-free_tree = by_bundle("speed", generalised.tree_and_rows, _tree_and_rows)
+free_tree = by_bundle(Recursion, _tree_and_rows, generalised.tree_and_rows)
 # (s, i, x): x, zero before, of the load in slot 0 of the bodies on the path of closure i.
-pass_load = by_bundle("speed", generalised.pass_load, _pass_load)
+pass_load = by_bundle(Recursion, _pass_load, generalised.pass_load)
 # (s, x, v): v = M^-1 J'f, the change of all speeds, where x is that of the rows' loads f.
-respond = by_bundle("speed", generalised.respond, _pass_outward)
+respond = by_bundle(Recursion, _pass_outward, generalised.respond)
 # (s): let cw.row.load act beside everything else: accelerations and drive loads.
-accelerate = by_bundle("speed", generalised.accelerate, _accelerate)
+accelerate = by_bundle(Recursion, _accelerate, generalised.accelerate)
 # (s): loads across hinges, body axes, into w.body.load, after `accelerate`.
-transmit = by_bundle("speed", generalised.hinge_and_drive_loads, _hinge_loads)
+transmit = by_bundle(Recursion, _hinge_loads, generalised.hinge_and_drive_loads)
 # (t, y, s): rows' values and rates at y; the factors of the last forward dynamics stay.
-locate = by_bundle("speed", generalised.locate, _locate)
+locate = by_bundle(Recursion, _locate, generalised.locate)
 
 
 @helper

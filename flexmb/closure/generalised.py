@@ -15,6 +15,7 @@ from flexmb.closure.unit_loads import apply_load, apply_unit_load, clear_body, c
 from flexmb.jain import composite, innovations
 from flexmb.jain.inverse import inverse_dynamics
 from flexmb.jain.kinematics import acceleration_sweep, pose_sweep, velocity_sweep
+from flexmb.jain.places import Matrices
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import by_bundle, helper
 from flexmb.motion.coordinates import load_state
@@ -80,9 +81,9 @@ def _rest_by_composite_bodies(m, c, w, y, v):
         v[m.speed[m.order[a]]] = m.x[a]
 
 
-_tree = by_bundle("U", _by_composite_bodies, _by_recursion)
-_half = by_bundle("U", _half_by_composite_bodies, _half_by_recursion)
-_rest = by_bundle("U", _rest_by_composite_bodies, _rest_by_recursion)
+_tree = by_bundle(Matrices, _by_composite_bodies, _by_recursion)
+_half = by_bundle(Matrices, _half_by_composite_bodies, _half_by_recursion)
+_rest = by_bundle(Matrices, _rest_by_composite_bodies, _rest_by_recursion)
 
 
 @helper

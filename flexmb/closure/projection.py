@@ -1,7 +1,7 @@
-"""Back to where the closures are closed: the nearest coordinates and speeds in the metric of kinetic energy.
+"""Projection on closed closures: the nearest coordinates and speeds in the metric of kinetic energy.
 
 Positions: dq = -M^-1 J' (J M^-1 J')^-1 g, repeated with the same matrices until g vanishes to round-off; then speeds
-likewise with J u. Prescribed coordinates stay. It only uses the independent rows; the others must follow.
+likewise with J u. Prescribed coordinates stay. Only independent rows are corrected; the others must follow.
 """
 
 import numpy as np

@@ -1,17 +1,19 @@
 """What a closure suppresses: value, rate and acceleration of each row, from the motion of its two ports.
 
-Relative motion of frame B seen from frame A, in A axes: R = R_A'R_B, p = R_A'(x_B - x_A), and their rates. A
-translation row along axis i is p_i. A rotation row sets an axis a of A at right angles to an axis b of B, g = a . R b:
+Relative motion of frame B seen from frame A, in A axes: R_AB = R_WA'R_WB, p_AB = R_WA'(p_WB - p_WA), W being World,
+and their rates. A translation row along axis i is p_AB,i. A rotation row sets an axis a of A at right angles to an axis
+b of B, g = a . R_AB b:
 
     about x: a = -y, b = z      about y: a = x, b = z      about z: a = -x, b = y,
 
-so that near R = 1 the row is the component of the relative rotation about that axis. Its unit load is the torque
-R b x a.
+so that near R_AB = 1 the row is the component of the relative rotation about that axis. Its unit load is the torque
+R_AB b x a.
 """
 
 from flexmb.closure.tables import ON_GROUND, ROTATION
-from flexmb.jain.kinematics import port_acceleration, port_velocity
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jit.kernel import helper
+from flexmb.spatial.spatial_vector import ZERO6, sub6, times6, times6_t
 from flexmb.spatial.vector import (
     add,
     cross,
@@ -41,22 +43,18 @@ def pose(w, side):
 
 @helper
 def velocity(w, side):
-    """Angular and linear velocity of a port, World axes."""
+    """Velocity of a port, World axes."""
     if side.body == ON_GROUND:
-        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    R = mat3(w.body[side.body].pose_rotation, 0)
-    omega, v = port_velocity(w, side.body, side.port)
-    return times(R, omega), times(R, v)
+        return ZERO6
+    return times6(mat3(w.body[side.body].pose_rotation, 0), port_velocity(w, side.body, side.port))
 
 
 @helper
 def acceleration(c, w, side):
-    """Angular and linear acceleration of a port, minus gravity, World axes."""
+    """Acceleration of a port, minus gravity, World axes."""
     if side.body == ON_GROUND:
         return (0.0, 0.0, 0.0), vec3(w.ground, 0)
-    R = mat3(w.body[side.body].pose_rotation, 0)
-    alpha, a = port_acceleration(c, w, side.body, side.port)
-    return times(R, alpha), times(R, a)
+    return times6(mat3(w.body[side.body].pose_rotation, 0), port_acceleration(c, w, side.body, side.port))
 
 
 @helper
@@ -66,80 +64,101 @@ def norm1(x):
 
 @helper
 def evaluate_rows(c, w, cc, cw, accelerated):
-    """Fill cw.closure and cw.row; row accelerations only where `accelerated`, which needs those of the bodies."""
+    """Fill cw.closure and cw.row; row accelerations only where `accelerated`, which needs those of the bodies.
+
+    p_WA, R_WA, V_WA, A_WA are frame A's position, rotation, velocity and acceleration in World; those of B from A, in A
+    axes, are p_AB, R_AB, V_AB, A_AB.
+    """
     fastest = 0.0
     for rate in w.u:
         fastest = max(fastest, abs(rate))
     for i in range(cc.closure.shape[0]):
         A, B = cc.side[i, 0], cc.side[i, 1]
-        x_a, R_a = pose(w, A)
-        x_b, R_b = pose(w, B)
-        omega_a, v_a = velocity(w, A)
-        omega_b, v_b = velocity(w, B)
-        R = matmul(transpose(R_a), R_b)
-        p = times_t(R_a, sub(x_b, x_a))
-        carrier = times_t(R_a, omega_a)
-        spin = times_t(R_a, sub(omega_b, omega_a))
-        speed = sub(times_t(R_a, sub(v_b, v_a)), cross(carrier, p))
-        store9(cw.closure[i].rotation, 0, R)
-        store3(cw.closure[i].position, 0, p)
-        store9(cw.closure[i].world, 0, R_a)
-        cw.closure[i].size = cc.length[0] + norm1(x_a)
-        turns = norm1(omega_a) + norm1(omega_b)
-        cw.closure[i].speed = norm1(v_a) + norm1(v_b) + cc.length[0] * (turns + fastest)
+        p_WA, R_WA = pose(w, A)
+        p_WB, R_WB = pose(w, B)
+        V_WA, V_WB = velocity(w, A), velocity(w, B)
+        R_AB = matmul(transpose(R_WA), R_WB)
+        p_AB = times_t(R_WA, sub(p_WB, p_WA))
+        w_A = times_t(R_WA, V_WA[0])
+        V_AB = _relative_velocity(times6_t(R_WA, sub6(V_WB, V_WA)), w_A, p_AB)
+        store9(cw.closure[i].rotation, 0, R_AB)
+        store3(cw.closure[i].position, 0, p_AB)
+        store9(cw.closure[i].world, 0, R_WA)
+        cw.closure[i].size = cc.length[0] + norm1(p_WA)
+        turns = norm1(V_WA[0]) + norm1(V_WB[0])
+        cw.closure[i].speed = norm1(V_WA[1]) + norm1(V_WB[1]) + cc.length[0] * (turns + fastest)
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
-            _row(cc, cw, r, R, p, spin, speed)
+            _row(cc, cw, r, R_AB, p_AB, V_AB)
         if accelerated:
-            alpha_a, a_a = acceleration(c, w, A)
-            alpha_b, a_b = acceleration(c, w, B)
-            turning = times_t(R_a, alpha_a)
-            spin_rate = sub(times_t(R_a, sub(alpha_b, alpha_a)), cross(carrier, spin))
-            inner = add(cross(carrier, p), scale(2.0, speed))
-            speed_rate = sub(sub(times_t(R_a, sub(a_b, a_a)), cross(turning, p)), cross(carrier, inner))
+            A_WA, A_WB = acceleration(c, w, A), acceleration(c, w, B)
+            alpha_A = times_t(R_WA, A_WA[0])
+            A_AB = _relative_acceleration(times6_t(R_WA, sub6(A_WB, A_WA)), alpha_A, w_A, p_AB, V_AB)
             for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
-                _row_acceleration(cc, cw, r, R, spin, spin_rate, speed_rate)
+                _row_acceleration(cc, cw, r, R_AB, V_AB, A_AB)
 
 
 @helper
-def axes(axis, R):
-    """The axes a of A and R b, b of B, that rotation row `axis` sets at right angles, in A axes."""
+def _relative_velocity(difference, w_A, p_AB):
+    """V_AB from the difference of both frames' velocities and the angular velocity of A, A axes."""
+    return difference[0], sub(difference[1], cross(w_A, p_AB))
+
+
+@helper
+def _relative_acceleration(difference, alpha_A, w_A, p_AB, V_AB):
+    """A_AB from the difference of both frames' accelerations and the rotation of A, A axes."""
+    inner = add(cross(w_A, p_AB), scale(2.0, V_AB[1]))
+    linear = sub(sub(difference[1], cross(alpha_A, p_AB)), cross(w_A, inner))
+    return sub(difference[0], cross(w_A, V_AB[0])), linear
+
+
+@helper
+def axes(axis, R_AB):
+    """The axes a of A and R_AB b, b of B, that rotation row `axis` sets at right angles, in A axes."""
     if axis == 0:
-        return (0.0, -1.0, 0.0), (R[2], R[5], R[8])
+        return (0.0, -1.0, 0.0), (R_AB[2], R_AB[5], R_AB[8])
     if axis == 1:
-        return (1.0, 0.0, 0.0), (R[2], R[5], R[8])
-    return (-1.0, 0.0, 0.0), (R[1], R[4], R[7])
+        return (1.0, 0.0, 0.0), (R_AB[2], R_AB[5], R_AB[8])
+    return (-1.0, 0.0, 0.0), (R_AB[1], R_AB[4], R_AB[7])
 
 
 @helper
-def _row(cc, cw, r, R, p, spin, speed):
+def _row(cc, cw, r, R_AB, p_AB, V_AB):
+    """Direction, value and rate of row r."""
     axis = cc.row[r].axis
     if cc.row[r].type == ROTATION:
-        a, b = axes(axis, R)
+        a, b = axes(axis, R_AB)
         direction = cross(b, a)
         store3(cw.row[r].direction, 0, direction)
         cw.row[r].value = dot(a, b)
-        cw.row[r].rate = dot(direction, spin)
+        cw.row[r].rate = dot(direction, V_AB[0])
     else:
         for n in range(3):
             cw.row[r].direction[n] = 1.0 if n == axis else 0.0
-        cw.row[r].value = p[0] if axis == 0 else p[1] if axis == 1 else p[2]
-        cw.row[r].rate = speed[0] if axis == 0 else speed[1] if axis == 1 else speed[2]
+        cw.row[r].value = _component(p_AB, axis)
+        cw.row[r].rate = _component(V_AB[1], axis)
 
 
 @helper
-def _row_acceleration(cc, cw, r, R, spin, spin_rate, speed_rate):
+def _row_acceleration(cc, cw, r, R_AB, V_AB, A_AB):
+    """J udot + Jdot u of row r."""
     axis = cc.row[r].axis
     if cc.row[r].type == ROTATION:
-        a, b = axes(axis, R)
-        cw.row[r].acceleration = dot(cross(b, a), spin_rate) + dot(a, cross(spin, cross(spin, b)))
+        a, b = axes(axis, R_AB)
+        spin = V_AB[0]
+        cw.row[r].acceleration = dot(cross(b, a), A_AB[0]) + dot(a, cross(spin, cross(spin, b)))
     else:
-        cw.row[r].acceleration = speed_rate[0] if axis == 0 else speed_rate[1] if axis == 1 else speed_rate[2]
+        cw.row[r].acceleration = _component(A_AB[1], axis)
+
+
+@helper
+def _component(v, axis):
+    return v[0] if axis == 0 else v[1] if axis == 1 else v[2]
 
 
 @helper
 def load_on_b(cc, cw, i):
     """[torque about B, force] of the rows' loads of closure i on B, A axes."""
-    tau, f = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    tau, f = ZERO6
     for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
         part = scale(cw.row[r].load, vec3(cw.row[r].direction, 0))
         if cc.row[r].type == ROTATION:

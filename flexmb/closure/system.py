@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
-from typing import Literal, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,8 +15,9 @@ from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.response import Response, response
+from flexmb.levels.body import LEVELS
 from flexmb.scene.schema import Closure
-from flexmb.tables.arrays import RUTHLESS, Constants, Workspace
+from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
 from flexmb.tables.status import OUT_OF_RANGE
 from flexmb.typing import Index, Real
@@ -63,7 +64,7 @@ class Closures:
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
 
-    def chain(self, algorithm: Literal["articulated", "composite"], rate: float = 0.0) -> Closed:
+    def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
         bodies, modes = c.mode.shape
@@ -76,7 +77,7 @@ class Closures:
         c = self.constants[0]
         if algorithm == "composite":
             return matrices(c)
-        if np.any((c.body["level"] == RUTHLESS) & (c.body["modes"] > 0)):
+        if any(LEVELS[body["level"]].at_rest and body["modes"] for body in c.body):
             return response(c)
         return Recursion()
 

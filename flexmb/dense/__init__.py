@@ -7,4 +7,4 @@ slow, short and independent: the compiled algorithms, the recursion and Frisch's
 shares with them the scene and the modal data of flexible bodies, nothing else.
 """
 
-from flexmb.dense.system import DenseSystem as DenseSystem
+from flexmb.dense.dense_system import DenseSystem as DenseSystem

@@ -52,25 +52,25 @@ class Jet:
 
 
 @dataclass(frozen=True)
-class Frame:
+class MovingFrame:
     """Frames that move: origins (B,K,3) and rotations (B,K,3,3), in the axes of the frame they are seen from."""
 
     position: Jet
     rotation: Jet
 
-    def carry(self, inner: Frame) -> Frame:
+    def carry(self, inner: MovingFrame) -> MovingFrame:
         """`inner`, seen from this frame, seen from where this frame is seen."""
-        return Frame(self.position + turn(self.rotation, inner.position), self.rotation @ inner.rotation)
+        return MovingFrame(self.position + turn(self.rotation, inner.position), self.rotation @ inner.rotation)
 
-    def inverse(self) -> Frame:
+    def inverse(self) -> MovingFrame:
         """The frame this one is seen from, seen from this one."""
         back = self.rotation.transpose
-        return Frame(-turn(back, self.position), back)
+        return MovingFrame(-turn(back, self.position), back)
 
     @property
-    def first(self) -> Frame:
+    def first(self) -> MovingFrame:
         """Along the first of B motions."""
-        return Frame(self.position[0], self.rotation[0])
+        return MovingFrame(self.position[0], self.rotation[0])
 
     def angular_velocity(self) -> Real:
         """w (...,3) with dR/dt = w~ R."""

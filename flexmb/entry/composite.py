@@ -7,7 +7,7 @@ from flexmb.jain.balance import power
 from flexmb.jain.places import Matrices
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import kernel
-from flexmb.motion.coordinates import configuration_rate, load_state
+from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.status import OK
 from flexmb.typing import Index
@@ -54,11 +54,5 @@ def rhs(t, y, dy, c, w):
     status = composite.forward_dynamics(c, w.sweeps, w.matrices)
     if status != OK:
         return status
-    configuration_rate(c, w.sweeps)
-    nq, nu = w.sweeps.q.shape[0], w.sweeps.u.shape[0]
-    for i in range(nq):
-        dy[i] = w.sweeps.rate[i]
-    for j in range(nu):
-        dy[nq + j] = w.sweeps.speed[j].acceleration
-    dy[nq + nu] = power(c, w.sweeps)
+    store_slope(c, w.sweeps, power(c, w.sweeps), dy)
     return OK

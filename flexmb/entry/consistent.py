@@ -1,4 +1,4 @@
-"""Entry point of the underactuated problem: hinges and wheels move as told, modes follow.
+"""Entry point of the underactuated problem: hinges and wheels move at given rates, and the modes follow.
 
 Jain & Rodriguez, after (45): generalised forces act on hinges only, hence T^f = 0 decides the modal accelerations. It
 is the articulated recursion with every hinge and wheel prescribed, O(N).

@@ -101,7 +101,7 @@ def _complex_type(dtype: np.dtype) -> np.dtype:
 
 
 def _columns(c: Constants, nq: int, nu: int) -> Index:
-    """Everything but work, prescribed coordinates with their speeds, and angles of wheels without springs."""
+    """All places in y but those of work, prescribed coordinates with their speeds, and angles of unsprung wheels."""
     needed = np.ones(nq + nu, bool)
     prescribed = np.flatnonzero(c.speed["prescribed"] >= 0)
     needed[c.speed["coordinate"][prescribed]] = needed[nq + prescribed] = False

@@ -8,6 +8,7 @@ frame of a wheel turns with its node.
 
 from flexmb.frisch.tables import FIXED_SPIN_AXIS, NO_LOADS_ON_MODES, SECOND_ORDER
 from flexmb.jit.kernel import helper
+from flexmb.spatial.spatial_vector import dot6, shift_force
 from flexmb.spatial.vector import (
     add,
     add3,
@@ -58,7 +59,7 @@ def body_terms(c, w, k):
     store3(nest.alpha, 0, alpha_world)
     nest.mass = mass
     store3(nest.first, 0, scale(mass, alpha_world))
-    store6(nest.inertia, 0, rotate_sym(R, sym_axpy(mass, steiner(alpha, alpha), Phi)))  # Phi + G (98)
+    store_sym6(nest.inertia, 0, rotate_sym(R, sym_axpy(mass, steiner(alpha, alpha), Phi)))  # Phi + G (98)
     turning = add(sym_times(Phi_rate, omega), cross(omega, add(sym_times(Phi, omega), momentum)))  # (87), (101)
     coriolis = cross(omega, add(cross(omega, alpha), scale(2.0, moved_rate)))
     force = scale(-mass, add(times(R, coriolis), vec3(nest.path, 0)))  # - C (100)
@@ -107,15 +108,15 @@ def wheel_terms(c, w, k, i):
     inertia = (
         transverse + d * x * x, transverse + d * y * y, transverse + d * z * z, d * x * y, d * x * z, d * y * z,
     )  # fmt: skip
-    node = vec3(port.w, 0)
+    node, node_rate = vec3(port.v, 0), vec3(port.a, 0)  # the angular parts
     total = add(omega, axpy(spin, axis, node))  # (120), inertial
-    bias, rate = vec3(port.alpha, 0), cross(omega, sym_times(inertia, total))
+    bias, rate = node_rate, cross(omega, sym_times(inertia, total))
     if c.printed[FIXED_SPIN_AXIS] == 0:
         # the tensor is fixed in the node's frame: rate of I_W . total with the angular rate omega + node
         bias = axpy(spin, cross(node, axis), bias)
         rate = add(rate, sub(cross(node, sym_times(inertia, total)), sym_times(inertia, cross(node, total))))
     store3(wheel.axis, 0, axis)
-    store6(wheel.inertia, 0, inertia)
+    store_sym6(wheel.inertia, 0, inertia)
     store3(wheel.spin_bias, 0, bias)
     store3(wheel.rate, 0, rate)
     at = c.column[c.wheel[i].u_index].start
@@ -124,32 +125,33 @@ def wheel_terms(c, w, k, i):
         for n in range(c.body[k].modes):  # partition phiR_W (121) of (126)
             start = c.column[c.body[k].etad_index + n].start + c.wheel_entry[i]
             store3(w.S, start, vec3(w.port_mode[c.wheel[i].port, n].W, 0))
-    store6(w.nest[k].inertia, 0, sym_add(sym6(w.nest[k].inertia, 0), inertia))
+    store_sym6(w.nest[k].inertia, 0, sym_add(sym6(w.nest[k].inertia, 0), inertia))
     add3(w.nest[k].torque, 0, scale(-1.0, rate))
 
 
 @helper
 def load_terms(c, w, k, i):
     """Load i at its node: on the body (80), (81), and on its modes, which the third partition of (111) leaves out."""
-    port, tau, f = node_load(c, w, i)
-    add3(w.nest[k].force, 0, f)
-    add3(w.nest[k].torque, 0, add(tau, cross(vec3(w.port[port].r, 0), f)))
+    port, F = node_load(c, w, i)
+    torque, force = shift_force(F, vec3(w.port[port].r, 0))
+    add3(w.nest[k].force, 0, force)
+    add3(w.nest[k].torque, 0, torque)
     if c.printed[NO_LOADS_ON_MODES] == 0:
         for n in range(c.body[k].modes):
-            W, L = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)
-            w.mode[k, n].row += dot(W, tau) + dot(L, f)
+            phi = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)  # phiR, phiT
+            w.mode[k, n].row += dot6(phi, F)
 
 
 @helper
 def node_load(c, w, i):
-    """Load i as (port, torque, force), World axes."""
+    """Load i as (port, [torque; force] about the port), World axes."""
     port, zero = c.load[i].port, (0.0, 0.0, 0.0)
     value = scale(w.function[c.load[i].function, 0], vec3(c.load[i].direction, 0))
     if c.load[i].frame == NODE_AXES:
         value = times(mat3(w.port[port].R, 0), value)
     if c.load[i].type == FORCE:
-        return port, zero, value
-    return port, value, zero
+        return port, (zero, value)
+    return port, (value, zero)
 
 
 @helper
@@ -166,6 +168,7 @@ def steiner(a, b):
 
 
 @helper
-def store6(a, i, m):
+def store_sym6(a, i, s):
+    """Store a symmetric 6-tuple."""
     for n in range(6):
-        a[i + n] = m[n]
+        a[i + n] = s[n]

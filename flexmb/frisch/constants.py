@@ -7,7 +7,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 
-from flexmb.building.links import Link
+from flexmb.building.links import BodyLink
 from flexmb.frisch import tables as t
 from flexmb.frisch.errata import Erratum
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
@@ -20,7 +20,7 @@ _SWITCHES = (
 
 
 def nested_constants(
-    constants: a.Constants, chain: list[Link], errata: Set[Erratum], null_partitions: bool = False
+    constants: a.Constants, chain: list[BodyLink], errata: Set[Erratum], null_partitions: bool = False
 ) -> t.NestedConstants:
     """The scene's constants with the tables Frisch's equations need, keeping the print's `errata`.
 
@@ -46,10 +46,10 @@ def nested_constants(
     )
 
 
-def _parameters(link: Link, errata: Set[Erratum]) -> ModeParameters:
+def _parameters(link: BodyLink, errata: Set[Erratum]) -> ModeParameters:
     """(48)-(72) of one body; the tensors of its despun wheels are left to I_W (26), their masses are elements."""
     model = link.model
-    if link.level == a.STIFFENED:
+    if link.level.second_order:
         raise ValueError(
             f'body "{link.name}": these equations are of first order in the deformation and know no geometric '
             'stiffness, for which level "stiffened" stands; use level "linear" or "full", or algorithm "articulated"'

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
-from flexmb.modal.model import FlexibleModel
 from flexmb.typing import Real
 
 

@@ -8,8 +8,9 @@ from flexmb.frisch.partitions import coefficient_matrix
 from flexmb.frisch.reduction import reduce, solve
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.range import is_out_of_range
-from flexmb.motion.coordinates import configuration_rate, hinge_forces, load_state
-from flexmb.spatial.vector import add, cross, dot, vec3
+from flexmb.motion.coordinates import hinge_forces, load_state, speed_power, store_slope
+from flexmb.spatial.spatial_vector import dot6, shift_motion, sum6, vec6
+from flexmb.spatial.vector import vec3
 from flexmb.tables.status import OK, OUT_OF_RANGE
 
 
@@ -19,13 +20,7 @@ def rhs(t, y, dy, c, w):
     status = _solution(t, y, c, w)
     if status != OK:
         return status
-    configuration_rate(c, w)
-    nq, nu = w.q.shape[0], w.u.shape[0]
-    for i in range(nq):
-        dy[i] = w.rate[i]
-    for j in range(nu):
-        dy[nq + j] = w.speed[j].acceleration
-    dy[nq + nu] = _power(c, w)
+    store_slope(c, w, _power(c, w), dy)
     return OK
 
 
@@ -79,24 +74,15 @@ def _equations(c, w):
 
 @helper
 def _power(c, w):
-    """Power (W) of motors, dampers, drives, node loads and modal damping."""
-    total = 0.0
-    for j in range(w.u.shape[0]):
-        rate = w.u[j]
-        total -= c.speed[j].damping * rate * rate
-        f = c.speed[j].motor
-        if f >= 0:
-            total += w.function[f, 0] * rate
-        if c.speed[j].prescribed >= 0:
-            total += w.speed[j].drive * rate
+    """Power of motors, dampers, drives, node loads and modal damping (W)."""
+    total = speed_power(c, w)
     for k in range(c.body.shape[0]):
         start = c.body[k].etad_index
         for n in range(c.body[k].modes):
             for m in range(c.body[k].modes):
                 total -= w.u[start + n] * c.pair[k, n, m].damping * w.u[start + m]
-        omega, v = vec3(w.nest[k].omega, 0), vec3(w.nest[k].velocity, 0)
+        V = vec3(w.nest[k].omega, 0), vec3(w.nest[k].velocity, 0)
         for i in range(c.body[k].load_start, c.body[k].load_stop):
-            port, tau, f = node_load(c, w, i)
-            moved = add(add(v, cross(omega, vec3(w.port[port].r, 0))), vec3(w.port[port].v, 0))
-            total += dot(tau, add(omega, vec3(w.port[port].w, 0))) + dot(f, moved)
+            port, F = node_load(c, w, i)
+            total += dot6(F, sum6(shift_motion(V, vec3(w.port[port].r, 0)), vec6(w.port[port].v, 0)))
     return total

@@ -10,7 +10,9 @@ translation shapes, turned by the exponential of the rotation shapes. As printed
 from flexmb.frisch.tables import FIXED_SHAPES
 from flexmb.hinges import catalogue
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.levels.field import field_motion
+from flexmb.spatial.spatial_vector import ZERO6, axpy6, shift_motion, store6, sum6, times6, vec6
 from flexmb.spatial.vector import (
     add,
     axpy,
@@ -25,14 +27,13 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
-from flexmb.tables.arrays import RUTHLESS
 
 
 @helper
 def relative_motion(c, w):
     """Poses, rates and kinematic biases of all bodies and ports, World axes, and the entries of S."""
     for k in range(c.body.shape[0]):
-        seen = c.body[k].level != RUTHLESS
+        seen = not is_at_rest(c.body[k].level)
         for n in range(c.body[k].modes):
             w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if seen else 0.0
             w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if seen else 0.0
@@ -45,27 +46,33 @@ def relative_motion(c, w):
 
 @helper
 def _port_in_body(c, w, k, i):
-    """Pose and motion of port i of body k, body axes: (2), (43), (44), (118), (121), (124) and their derivatives."""
+    """Pose and motion of port i of body k, body axes: (2), (43), (44) and their derivatives."""
     nm = c.body[k].modes
     x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
     r, R, w_rel, v_rel, alpha, a = field_motion(x, p, c.port_mode[i], w.mode[k], nm, w.port_mode[i])
+    V, A = (w_rel, v_rel), (alpha, a)
     if c.printed[FIXED_SHAPES] == 1:
-        zero = (0.0, 0.0, 0.0)
-        r, w_rel, v_rel, alpha, a = add(x, p), zero, zero, zero, zero
-        for n in range(nm):
-            psi = vec3(c.port_mode[i, n].rotation, 0)
-            phi = add(vec3(c.port_mode[i, n].translation, 0), cross(psi, p))
-            store3(w.port_mode[i, n].W, 0, psi)
-            store3(w.port_mode[i, n].L, 0, phi)
-            r = axpy(w.mode[k, n].eta, phi, r)
-            w_rel = axpy(w.mode[k, n].etad, psi, w_rel)
-            v_rel = axpy(w.mode[k, n].etad, phi, v_rel)
+        r, V = _by_constant_shapes(c, w, k, i)
+        A = ZERO6
     store3(w.port[i].r, 0, r)
     store9(w.port[i].R, 0, matmul(R, mat3(c.port[i].frame, 0)))
-    store3(w.port[i].w, 0, w_rel)
-    store3(w.port[i].v, 0, v_rel)
-    store3(w.port[i].alpha, 0, alpha)
-    store3(w.port[i].a, 0, a)
+    store6(w.port[i].v, 0, V)
+    store6(w.port[i].a, 0, A)
+
+
+@helper
+def _by_constant_shapes(c, w, k, i):
+    """Place of port i and its velocity relative to body k as printed, by constant shapes: (118), (121), (124)."""
+    x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
+    r, V = add(x, p), ZERO6
+    for n in range(c.body[k].modes):
+        psi = vec3(c.port_mode[i, n].rotation, 0)
+        phi = add(vec3(c.port_mode[i, n].translation, 0), cross(psi, p))
+        store3(w.port_mode[i, n].W, 0, psi)
+        store3(w.port_mode[i, n].L, 0, phi)
+        r = axpy(w.mode[k, n].eta, phi, r)
+        V = axpy6(w.mode[k, n].etad, (psi, phi), V)
+    return r, V
 
 
 @helper
@@ -75,10 +82,8 @@ def _port_in_world(c, w, k, i):
     port = w.port[i]
     store9(port.R, 0, matmul(R, mat3(port.R, 0)))
     store3(port.r, 0, times(R, vec3(port.r, 0)))
-    store3(port.w, 0, times(R, vec3(port.w, 0)))
-    store3(port.v, 0, times(R, vec3(port.v, 0)))
-    store3(port.alpha, 0, times(R, vec3(port.alpha, 0)))
-    store3(port.a, 0, times(R, vec3(port.a, 0)))
+    store6(port.v, 0, times6(R, vec6(port.v, 0)))
+    store6(port.a, 0, times6(R, vec6(port.a, 0)))
     for n in range(c.body[k].modes):
         store3(w.port_mode[i, n].W, 0, times(R, vec3(w.port_mode[i, n].W, 0)))
         store3(w.port_mode[i, n].L, 0, times(R, vec3(w.port_mode[i, n].L, 0)))
@@ -86,54 +91,77 @@ def _port_in_world(c, w, k, i):
 
 @helper
 def _across_hinge(c, w, k):
-    """Body k relative to its parent: rates (116), (117), (123), at udot = 0 (119), (125); its motion in World."""
-    zero = (0.0, 0.0, 0.0)
-    p, i, o = c.body[k].parent, c.body[k].inboard_port, c.body[k].outboard_port
-    R_parent, omega = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), zero
+    """Body k relative to its parent: rates (116), (117), (123), at udot = 0 (119), (125); its motion in World.
+
+    V and A are motions relative to the parent, World axes: [rotation; translation], with rates at udot = 0.
+    """
+    p, o = c.body[k].parent, c.body[k].outboard_port
+    R_parent, omega = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
     if p >= 0:
         R_parent, omega = mat3(w.nest[p].rotation, 0), vec3(w.nest[p].omega, 0)
-    r, R = times(R_parent, vec3(c.body[k].placement_position, 0)), mat3(c.body[k].placement_rotation, 0)
-    R, w_node, v_node, alpha_node, a_node = matmul(R_parent, R), zero, zero, zero, zero
-    if i >= 0:
-        r, R = vec3(w.port[i].r, 0), mat3(w.port[i].R, 0)
-        w_node, v_node = vec3(w.port[i].w, 0), vec3(w.port[i].v, 0)
-        alpha_node, a_node = vec3(w.port[i].alpha, 0), vec3(w.port[i].a, 0)
+    r, R, V_node, A_node = _inboard_node(c, w, k, R_parent)
     kind, at_q, at_u, sequence = c.body[k].hinge_kind, c.body[k].q_index, c.body[k].u_index, c.body[k].sequence
     R_hinge, translation = catalogue.pose(kind, w.q, at_q, sequence)
-    w_hinge, v_hinge, alpha_hinge, a_hinge = catalogue.motion(
+    (w_hinge, v_hinge), (alpha_hinge, a_hinge) = catalogue.motion(
         kind, w.q, at_q, w.u, at_u, sequence, w.nest[k].hinge_map
     )
     arm = times(R, translation)
     R = matmul(R, R_hinge)
-    w_hinge, v_hinge = times(R, w_hinge), times(R, v_hinge)
-    spin = add(w_node, w_hinge)  # (116), (129)
-    beta = add(r, arm)
-    beta_rate = add(add(v_node, cross(w_node, arm)), v_hinge)  # (123), (124)
-    spin_rate = add(add(alpha_node, cross(w_node, w_hinge)), times(R, alpha_hinge))  # (130)
-    turning = add(cross(w_node, add(cross(w_node, arm), scale(2.0, v_hinge))), times(R, a_hinge))
-    beta_rate2 = add(add(a_node, cross(alpha_node, arm)), turning)
-    back = zero
+    V_hinge, A_hinge = times6(R, (w_hinge, v_hinge)), times6(R, (alpha_hinge, a_hinge))
+    beta, back = add(r, arm), (0.0, 0.0, 0.0)
+    V, A = _carried(V_node, A_node, arm, V_hinge, A_hinge)
     _hinge_columns(c, w, k, R)
-    if o >= 0:
-        # from O to the body frame, which the modes move away from it
+    if o >= 0:  # from O to the body frame, which the modes move away from it
         R = matmul(R, transpose(mat3(w.port[o].R, 0)))
         back = times(R, vec3(w.port[o].r, 0))
-        w_own, v_own = times(R, vec3(w.port[o].w, 0)), times(R, vec3(w.port[o].v, 0))
-        spin = sub(spin, w_own)
-        spin_rate = sub(spin_rate, add(times(R, vec3(w.port[o].alpha, 0)), cross(spin, w_own)))
         beta = sub(beta, back)
-        beta_rate = sub(beta_rate, add(cross(spin, back), v_own))
-        turning = cross(spin, add(cross(spin, back), scale(2.0, v_own)))
-        beta_rate2 = sub(beta_rate2, add(add(cross(spin_rate, back), turning), times(R, vec3(w.port[o].a, 0))))
+        V, A = _carrier(V, A, back, times6(R, vec6(w.port[o].v, 0)), times6(R, vec6(w.port[o].a, 0)))
     _modal_columns(c, w, k, R, arm, back)
-    nest = w.nest[k]
+    nest, spin = w.nest[k], V[0]
     store9(nest.rotation, 0, R)
     store3(nest.beta, 0, beta)
     store3(nest.hinge_point, 0, back)
     store3(nest.omega, 0, add(omega, spin))
-    store3(nest.spin_bias, 0, add(spin_rate, cross(omega, spin)))  # (119)
-    store3(nest.beta_bias, 0, beta_rate2)  # (125)
-    origin, velocity, path = zero, zero, zero
+    store3(nest.spin_bias, 0, add(A[0], cross(omega, spin)))  # (119)
+    store3(nest.beta_bias, 0, A[1])  # (125)
+    _follow_parent(w, k, p, omega, beta, V[1])
+
+
+@helper
+def _inboard_node(c, w, k, R_parent):
+    """The node of the parent that carries hinge k: place, attitude, and its motion (124) and rates, World axes."""
+    i = c.body[k].inboard_port
+    if i >= 0:
+        return vec3(w.port[i].r, 0), mat3(w.port[i].R, 0), vec6(w.port[i].v, 0), vec6(w.port[i].a, 0)
+    r = times(R_parent, vec3(c.body[k].placement_position, 0))
+    return r, matmul(R_parent, mat3(c.body[k].placement_rotation, 0)), ZERO6, ZERO6
+
+
+@helper
+def _carried(V, A, arm, V_rel, A_rel):
+    """Motion of a point `arm` away that moves by V_rel, A_rel, on a frame that moves by V, A: (116), (123), (129)."""
+    omega, (w_rel, v_rel) = V[0], V_rel
+    turning = add(cross(omega, add(cross(omega, arm), scale(2.0, v_rel))), A_rel[1])
+    alpha = add(add(A[0], cross(omega, w_rel)), A_rel[0])  # (130)
+    return sum6(shift_motion(V, arm), V_rel), (alpha, add(add(A[1], cross(A[0], arm)), turning))
+
+
+@helper
+def _carrier(V_point, A_point, arm, V_rel, A_rel):
+    """Motion of the frame whose point `arm` away moves by V_point, A_point: what `_carried` undoes."""
+    w_rel, v_rel = V_rel
+    omega = sub(V_point[0], w_rel)
+    alpha = sub(A_point[0], add(A_rel[0], cross(omega, w_rel)))
+    v = sub(V_point[1], add(cross(omega, arm), v_rel))
+    turning = cross(omega, add(cross(omega, arm), scale(2.0, v_rel)))
+    return (omega, v), (alpha, sub(A_point[1], add(add(cross(alpha, arm), turning), A_rel[1])))
+
+
+@helper
+def _follow_parent(w, k, p, omega, beta, beta_rate):
+    """Origin of body k, its velocity, and what its acceleration is at udot = 0, from those of the parent p."""
+    nest = w.nest[k]
+    origin, velocity, path = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if p >= 0:
         origin, velocity, path = vec3(w.nest[p].origin, 0), vec3(w.nest[p].velocity, 0), vec3(w.nest[p].path, 0)
     store3(nest.origin, 0, add(origin, beta))  # (78), (79)

@@ -4,7 +4,7 @@ The sums over S_{k-1} of mass, m gamma, Phi + G and of the right sides all follo
 further out, shifted along beta. So the work is of order N, where the print's double sums are of order N^2.
 """
 
-from flexmb.frisch.bodies import body_terms, load_terms, steiner, store6, wheel_terms
+from flexmb.frisch.bodies import body_terms, load_terms, steiner, store_sym6, wheel_terms
 from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import add, add3, axpy, cross, store3, sym6, sym_add, sym_axpy, vec3
 
@@ -31,7 +31,7 @@ def _join_nest(w, k, p):
     beta, first, mass = vec3(outer.beta, 0), vec3(outer.first, 0), outer.mass
     shifted = sym_add(sym6(outer.inertia, 0), sym_axpy(mass, steiner(beta, beta), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)))
     shifted = sym_axpy(2.0, steiner(first, beta), shifted)
-    store6(inner.inertia, 0, sym_add(sym6(inner.inertia, 0), shifted))
+    store_sym6(inner.inertia, 0, sym_add(sym6(inner.inertia, 0), shifted))
     add3(inner.first, 0, axpy(mass, beta, first))
     inner.mass += mass
     force = vec3(outer.force, 0)

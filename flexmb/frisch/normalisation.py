@@ -8,7 +8,7 @@ import numpy as np
 from scipy.linalg import eigh
 
 from flexmb.frisch.elements import elements, mass_centre, particles, rotary
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.typing import Real
 
 # Shapes printed to ten digits vanish at the clamp this well.

@@ -22,7 +22,7 @@ import numpy as np
 
 from flexmb.frisch.elements import Elements, Particles, elements, mass_centre, particles, rotary, slopes, turning
 from flexmb.frisch.normalisation import check_boundary
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.typing import Real
 
 

@@ -92,10 +92,8 @@ NEST_MODE = _record(("eta", _F), ("etad", _F), ("A", _F, (3,)), ("Q", _F, (3,)),
 NEST_PORT = _record(  # pose from the body origin and motion relative to the body
     ("r", _F, (3,)),
     ("R", _F, (9,)),
-    ("w", _F, (3,)),
-    ("v", _F, (3,)),
-    ("alpha", _F, (3,)),  # accelerations at etaddot = 0
-    ("a", _F, (3,)),
+    ("v", _F, (6,)),  # velocity
+    ("a", _F, (6,)),  # acceleration at etaddot = 0
 )
 NEST_WHEEL = _record(
     ("axis", _F, (3,)),

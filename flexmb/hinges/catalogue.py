@@ -1,4 +1,8 @@
-"""The hinge kinds by number, and the dispatch that the sweeps call."""
+"""The list of all hinge kinds, and what follows from it. The number of a kind is its place in the list."""
+
+from __future__ import annotations
+
+import numpy as np
 
 from flexmb.hinges import (
     cylindrical,
@@ -13,107 +17,36 @@ from flexmb.hinges import (
     translation3,
     weld,
 )
+from flexmb.hinges.kind import HingeKind, Item, Reduced
 from flexmb.jit.kernel import helper
+from flexmb.jit.numbered import numbered
 
-WELD, REVOLUTE, PRISMATIC, CYLINDRICAL, GIMBAL2, GIMBAL3, SPHERICAL, PLANAR, TRANSLATION2, TRANSLATION3, FREE = range(
-    11
-)
+KINDS: tuple[HingeKind, ...] = tuple(
+    module.HINGE
+    for module in (
+        weld, revolute, prismatic, cylindrical, gimbal2, gimbal3, spherical, planar, translation2, translation3, free
+    )
+)  # fmt: skip
+REVOLUTE, PRISMATIC = KINDS.index(revolute.HINGE), KINDS.index(prismatic.HINGE)
 
-KINDS = {
-    WELD: weld,
-    REVOLUTE: revolute,
-    PRISMATIC: prismatic,
-    CYLINDRICAL: cylindrical,
-    GIMBAL2: gimbal2,
-    GIMBAL3: gimbal3,
-    SPHERICAL: spherical,
-    PLANAR: planar,
-    TRANSLATION2: translation2,
-    TRANSLATION3: translation3,
-    FREE: free,
-}
+pose = numbered("pose", [kind.pose for kind in KINDS])
+motion = numbered("motion", [kind.motion for kind in KINDS])
+rate = numbered("rate", [kind.rate for kind in KINDS])
+retract = numbered("retract", [kind.retract for kind in KINDS])
+
+_QUATERNION = np.array([kind.quaternion for kind in KINDS])
 
 
 @helper
-def pose(kind, q, i, sequence):
-    """Relative pose (R, p) of hinge `kind`; see `flexmb.hinges`."""
-    if kind == REVOLUTE:
-        return revolute.pose(q, i, sequence)
-    if kind == PRISMATIC:
-        return prismatic.pose(q, i, sequence)
-    if kind == CYLINDRICAL:
-        return cylindrical.pose(q, i, sequence)
-    if kind == GIMBAL2:
-        return gimbal2.pose(q, i, sequence)
-    if kind == GIMBAL3:
-        return gimbal3.pose(q, i, sequence)
-    if kind == SPHERICAL:
-        return spherical.pose(q, i, sequence)
-    if kind == PLANAR:
-        return planar.pose(q, i, sequence)
-    if kind == TRANSLATION2:
-        return translation2.pose(q, i, sequence)
-    if kind == TRANSLATION3:
-        return translation3.pose(q, i, sequence)
-    if kind == FREE:
-        return free.pose(q, i, sequence)
-    return weld.pose(q, i, sequence)
-
-
-@helper
-def motion(kind, q, i, u, j, sequence, H):
-    """Hinge map into H and (w, v, alpha, a) of hinge `kind`; see `flexmb.hinges`."""
-    if kind == REVOLUTE:
-        return revolute.motion(q, i, u, j, sequence, H)
-    if kind == PRISMATIC:
-        return prismatic.motion(q, i, u, j, sequence, H)
-    if kind == CYLINDRICAL:
-        return cylindrical.motion(q, i, u, j, sequence, H)
-    if kind == GIMBAL2:
-        return gimbal2.motion(q, i, u, j, sequence, H)
-    if kind == GIMBAL3:
-        return gimbal3.motion(q, i, u, j, sequence, H)
-    if kind == SPHERICAL:
-        return spherical.motion(q, i, u, j, sequence, H)
-    if kind == PLANAR:
-        return planar.motion(q, i, u, j, sequence, H)
-    if kind == TRANSLATION2:
-        return translation2.motion(q, i, u, j, sequence, H)
-    if kind == TRANSLATION3:
-        return translation3.motion(q, i, u, j, sequence, H)
-    if kind == FREE:
-        return free.motion(q, i, u, j, sequence, H)
-    return weld.motion(q, i, u, j, sequence, H)
-
-
-@helper
-def rate(kind, q, i, u, j, sequence, dq):
-    """Configuration rate of hinge `kind` into dq; see `flexmb.hinges`."""
-    if kind == SPHERICAL:
-        spherical.rate(q, i, u, j, sequence, dq)
-    elif kind == FREE:
-        free.rate(q, i, u, j, sequence, dq)
-    elif kind in (REVOLUTE, PRISMATIC):
-        revolute.rate(q, i, u, j, sequence, dq)
-    elif kind == CYLINDRICAL:
-        cylindrical.rate(q, i, u, j, sequence, dq)
-    elif kind == GIMBAL2:
-        gimbal2.rate(q, i, u, j, sequence, dq)
-    elif kind == GIMBAL3:
-        gimbal3.rate(q, i, u, j, sequence, dq)
-    elif kind == PLANAR:
-        planar.rate(q, i, u, j, sequence, dq)
-    elif kind == TRANSLATION2:
-        translation2.rate(q, i, u, j, sequence, dq)
-    elif kind == TRANSLATION3:
-        translation3.rate(q, i, u, j, sequence, dq)
-
-
-@helper
-def quaternion_offset(kind):
+def quaternion_offset(number):
     """Where the quaternion of a hinge begins among its coordinates; -1 where it has none."""
-    if kind == SPHERICAL:
-        return 0
-    if kind == FREE:
-        return 3
-    return -1
+    return _QUATERNION[number]
+
+
+def kind_of(item: Item) -> tuple[HingeKind, Reduced]:
+    """The kind of a hinge or point mass of a scene, and its axes as the kernels of that kind take them."""
+    for kind in KINDS:
+        reduced = kind.reduced(item)
+        if reduced is not None:
+            return kind, reduced
+    raise TypeError(f"no kind of flexmb.hinges takes a {type(item).__name__}: {item.name}")

@@ -1,11 +1,17 @@
 """Free: q = [position of O in O+ axes, quaternion], u = [angular velocity; velocity of O], both in O axes."""
 
+from flexmb.hinges import attitude
+from flexmb.hinges.kind import HingeKind, Item, Names, Reduced
 from flexmb.jit.kernel import helper
-from flexmb.spatial.rotation import quaternion_matrix, quaternion_rate
+from flexmb.scene.schema import Free
+from flexmb.spatial.rotation import (
+    exponential_coefficients,
+    left_jacobian_times,
+    quaternion_matrix,
+    quaternion_rate,
+)
 from flexmb.spatial.scalar import sqrt
-from flexmb.spatial.vector import cross, times
-
-NQ, NV = 7, 6
+from flexmb.spatial.vector import cross, dot, times
 
 
 @helper
@@ -25,7 +31,7 @@ def motion(q, i, u, j, sequence, H):
     w = (u[j], u[j + 1], u[j + 2])
     v = (u[j + 3], u[j + 4], u[j + 5])
     # v is held in turning axes: seen from O+ it changes by w x v
-    return w, v, (0.0, 0.0, 0.0), cross(w, v)
+    return (w, v), ((0.0, 0.0, 0.0), cross(w, v))
 
 
 @helper
@@ -42,3 +48,47 @@ def rate(q, i, u, j, sequence, dq):
     dq[i + 4] = dx
     dq[i + 5] = dy
     dq[i + 6] = dz
+
+
+@helper
+def retract(q, i, increment, j, result):
+    """The screw motion of constant speeds, as the velocity is held in turning axes: x + R J_l(theta) v."""
+    theta = (increment[j], increment[j + 1], increment[j + 2])
+    v = (increment[j + 3], increment[j + 4], increment[j + 5])
+    path = times(_attitude(q, i), left_jacobian_times(theta, exponential_coefficients(dot(theta, theta)), v))
+    for n in range(3):
+        result[i + n] = q[i + n] + path[n]
+    attitude.turn(q, i + 3, theta, result)
+
+
+def reduced(item: Item) -> Reduced | None:
+    """Free hinges."""
+    return Reduced() if isinstance(item, Free) else None
+
+
+def state(hinge: Free) -> tuple[list[float], list[float]]:
+    """Position and quaternion, relative angular velocity and velocity."""
+    return [*hinge.position_m, *hinge.quaternion], [*hinge.angular_velocity_rad_s, *hinge.velocity_m_s]
+
+
+def names(hinge: Free) -> tuple[Names, Names]:
+    """Of all these."""
+    position = [(f"position.{axis}", "m") for axis in "xyz"]
+    velocity = [(f"velocity.{axis}", "m/s") for axis in "xyz"]
+    return position + attitude.QUATERNION, attitude.ANGULAR_VELOCITY + velocity
+
+
+HINGE = HingeKind(
+    name="free",
+    coordinates=7,
+    speeds=6,
+    pose=pose,
+    motion=motion,
+    rate=rate,
+    retract=retract,
+    reduced=reduced,
+    quaternion=3,
+    displacements=(3, 4, 5),
+    state=state,
+    names=names,
+)

@@ -1,10 +1,10 @@
 """Two successive rotations about carried axes (universal hinge: "xy"): R = R_a(q1) R_b(q2)."""
 
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
 from flexmb.jit.kernel import helper
+from flexmb.scene.schema import Gimbal, Universal
 from flexmb.spatial.rotation import rotation_axis
 from flexmb.spatial.vector import add, cross, matmul, scale, times_t
-
-NQ, NV = 2, 2
 
 
 @helper
@@ -15,6 +15,11 @@ def unit(axis):
     if axis == 1:
         return 0.0, 1.0, 0.0
     return 0.0, 0.0, 1.0
+
+
+def axis_numbers(sequence: str) -> tuple[int, ...]:
+    """Axis numbers of "xyz" and the like."""
+    return tuple("xyz".index(axis) for axis in sequence)
 
 
 @helper
@@ -36,10 +41,17 @@ def motion(q, i, u, j, sequence, H):
     # in outboard axes the first axis turns with -second u2
     first_rate = cross(scale(-u[j + 1], second), first)
     zero = (0.0, 0.0, 0.0)
-    return add(scale(u[j], first), scale(u[j + 1], second)), zero, scale(u[j], first_rate), zero
+    return (add(scale(u[j], first), scale(u[j + 1], second)), zero), (scale(u[j], first_rate), zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    dq[i] = u[j]
-    dq[i + 1] = u[j + 1]
+def reduced(item: Item) -> Reduced | None:
+    """Universal hinges, and gimbals of two axes."""
+    match item:
+        case Universal():
+            return Reduced((0, 1))
+        case Gimbal(sequence=sequence) if len(sequence) == 2:
+            return Reduced(axis_numbers(sequence))
+    return None
+
+
+HINGE = scalar_hinge("gimbal2", 2, pose=pose, motion=motion, reduced=reduced)

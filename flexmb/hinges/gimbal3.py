@@ -1,11 +1,11 @@
 """Three successive rotations about carried axes: R = R_a(q1) R_b(q2) R_c(q3). Singular where a and c align."""
 
-from flexmb.hinges.gimbal2 import unit
+from flexmb.hinges.gimbal2 import axis_numbers, unit
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
 from flexmb.jit.kernel import helper
+from flexmb.scene.schema import Gimbal
 from flexmb.spatial.rotation import rotation_axis
 from flexmb.spatial.vector import add, cross, matmul, scale, times_t
-
-NQ, NV = 3, 3
 
 
 @helper
@@ -30,10 +30,15 @@ def motion(q, i, u, j, sequence, H):
     bias = add(scale(u[j], cross(after_first, first)), scale(u[j + 1], cross(after_second, second)))
     w = add(add(scale(u[j], first), scale(u[j + 1], second)), scale(u[j + 2], third))
     zero = (0.0, 0.0, 0.0)
-    return w, zero, bias, zero
+    return (w, zero), (bias, zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    for n in range(3):
-        dq[i + n] = u[j + n]
+def reduced(item: Item) -> Reduced | None:
+    """Gimbals of three axes."""
+    match item:
+        case Gimbal(sequence=sequence) if len(sequence) == 3:
+            return Reduced(axis_numbers(sequence))
+    return None
+
+
+HINGE = scalar_hinge("gimbal3", 3, pose=pose, motion=motion, reduced=reduced)

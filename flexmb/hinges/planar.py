@@ -1,10 +1,10 @@
 """Planar: translation in the x-y plane of O+, then rotation about z; q = [x, y, angle]."""
 
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
 from flexmb.jit.kernel import helper
+from flexmb.scene.schema import Planar
 from flexmb.spatial.rotation import rotation_z
 from flexmb.spatial.scalar import cos, sin
-
-NQ, NV = 3, 3
 
 
 @helper
@@ -23,10 +23,13 @@ def motion(q, i, u, j, sequence, H):
     H[2, 2] = 1.0
     # seen from O+ the directions of x and y do not turn: no bias
     zero = (0.0, 0.0, 0.0)
-    return (0.0, 0.0, u[j + 2]), (c * u[j] + s * u[j + 1], -s * u[j] + c * u[j + 1], 0.0), zero, zero
+    v = (c * u[j] + s * u[j + 1], -s * u[j] + c * u[j + 1], 0.0)
+    return ((0.0, 0.0, u[j + 2]), v), (zero, zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    for n in range(3):
-        dq[i + n] = u[j + n]
+def reduced(item: Item) -> Reduced | None:
+    """Planar hinges."""
+    return Reduced() if isinstance(item, Planar) else None
+
+
+HINGE = scalar_hinge("planar", 3, pose=pose, motion=motion, reduced=reduced, displacements=(0, 1))

@@ -1,8 +1,10 @@
 """Two translations along x and y of O+ (a point mass free in a plane)."""
 
-from flexmb.jit.kernel import helper
+import numpy as np
 
-NQ, NV = 2, 2
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
+from flexmb.jit.kernel import helper
+from flexmb.scene.schema import PointMass
 
 
 @helper
@@ -15,10 +17,15 @@ def motion(q, i, u, j, sequence, H):
     H[3, 0] = 1.0
     H[4, 1] = 1.0
     zero = (0.0, 0.0, 0.0)
-    return zero, (u[j], u[j + 1], 0.0), zero, zero
+    return (zero, (u[j], u[j + 1], 0.0)), (zero, zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    dq[i] = u[j]
-    dq[i + 1] = u[j + 1]
+def reduced(item: Item) -> Reduced | None:
+    """Point masses of two directions, which become x and y."""
+    match item:
+        case PointMass(directions=(x, y)):
+            return Reduced(turn=np.column_stack([x, y, np.cross(x, y)]))
+    return None
+
+
+HINGE = scalar_hinge("translation2", 2, pose=pose, motion=motion, reduced=reduced, displacements=(0, 1))

@@ -1,8 +1,10 @@
 """Three translations along the axes of O+ (a point mass free in space)."""
 
-from flexmb.jit.kernel import helper
+import numpy as np
 
-NQ, NV = 3, 3
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
+from flexmb.jit.kernel import helper
+from flexmb.scene.schema import PointMass
 
 
 @helper
@@ -15,10 +17,15 @@ def motion(q, i, u, j, sequence, H):
     for n in range(3):
         H[3 + n, n] = 1.0
     zero = (0.0, 0.0, 0.0)
-    return zero, (u[j], u[j + 1], u[j + 2]), zero, zero
+    return (zero, (u[j], u[j + 1], u[j + 2])), (zero, zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    for n in range(3):
-        dq[i + n] = u[j + n]
+def reduced(item: Item) -> Reduced | None:
+    """Point masses of three directions: the first two become x and y."""
+    match item:
+        case PointMass(directions=(x, y, _)):
+            return Reduced(turn=np.column_stack([x, y, np.cross(x, y)]))
+    return None
+
+
+HINGE = scalar_hinge("translation3", 3, pose=pose, motion=motion, reduced=reduced, displacements=(0, 1, 2))

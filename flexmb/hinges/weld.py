@@ -1,8 +1,8 @@
 """Weld: no freedom."""
 
+from flexmb.hinges.kind import Item, Reduced, scalar_hinge
 from flexmb.jit.kernel import helper
-
-NQ, NV = 0, 0
+from flexmb.scene.schema import PointMass, Weld
 
 
 @helper
@@ -13,9 +13,15 @@ def pose(q, i, sequence):
 @helper
 def motion(q, i, u, j, sequence, H):
     zero = (0.0, 0.0, 0.0)
-    return zero, zero, zero, zero
+    return (zero, zero), (zero, zero)
 
 
-@helper
-def rate(q, i, u, j, sequence, dq):
-    pass
+def reduced(item: Item) -> Reduced | None:
+    """Welds, and point masses without a direction."""
+    match item:
+        case Weld() | PointMass(directions=()):
+            return Reduced()
+    return None
+
+
+HINGE = scalar_hinge("weld", 0, pose=pose, motion=motion, reduced=reduced)

@@ -1,12 +1,13 @@
 """What runs have in common: derivatives that are checked, error scale, first step, change of step, stretches of steps.
 
 The last components of a state y (n,) may be pure quadratures: only the first `controlled` ones enter a norm (see
-`dop853`).
+`Accuracy`).
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -22,9 +23,18 @@ HALVED = 0.5  # change of step where an iteration did not converge
 # to.
 _STEP_SLACK = 1e-9
 
-# Entries of `counts`, and one that is no count: another thread sets STOP while a run goes on, which then ends.
-EVALUATIONS, ACCEPTED, REJECTED, SAMPLES, STOP = range(5)
-COUNTS = 5  # their number: length of `counts`
+# Entries of `counts`: evaluations, steps, samples stored, Jacobians, and factorisations or exponentials of a matrix.
+# One is no count: another thread sets STOP while a run goes on, which then ends.
+EVALUATIONS, ACCEPTED, REJECTED, SAMPLES, STOP, JACOBIANS, FACTORISATIONS = range(7)
+COUNTS = 7  # their number: length of `counts`
+
+
+class Interval(NamedTuple):
+    """A trial step, or a segment of a run, from `start` to `end` (s); no stage is evaluated later than `last`."""
+
+    start: float
+    end: float
+    last: float
 
 
 @helper
@@ -54,15 +64,15 @@ def derivative(problem, t, y, dy, counts):
 
 
 @helper
-def scaled_norm(values, y, rtol, atol, controlled):
+def scaled_norm(values, y, accuracy):
     """Root mean square of values_i / (atol + rtol |y_i|) over the controlled components; 0 where there are none."""
-    if controlled == 0:
+    if accuracy.controlled == 0:
         return 0.0  # nothing moves freely
     total = 0.0
-    for i in range(controlled):
-        ratio = values[i] / (atol + rtol * abs(y[i]))
+    for i in range(accuracy.controlled):
+        ratio = values[i] / (accuracy.atol + accuracy.rtol * abs(y[i]))
         total += ratio * ratio
-    return math.sqrt(total / controlled)
+    return math.sqrt(total / accuracy.controlled)
 
 
 @helper
@@ -88,29 +98,31 @@ def begin(problem, t, y, out, counts):
 
 
 @helper
-def initial_step(problem, t, y, dy, span, last, rtol, atol, controlled, exponent, counts, trial, slope):
-    """First step size: Hairer, Norsett, Wanner I, II.4. `dy` = f(t, y); `trial` and `slope` (n,) are scratch."""
-    d0 = scaled_norm(y, y, rtol, atol, controlled)
-    d1 = scaled_norm(dy, y, rtol, atol, controlled)
+def initial_step(problem, segment, y, dy, accuracy, exponent, counts):
+    """First step size: Hairer, Norsett, Wanner I, II.4. `dy` = f(t, y) at the segment's start."""
+    trial, slope = np.empty(y.shape[0]), np.empty(y.shape[0])
+    span = segment.end - segment.start
+    d0 = scaled_norm(y, y, accuracy)
+    d1 = scaled_norm(dy, y, accuracy)
     h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
     h0 = min(h0, span)
     for i in range(y.shape[0]):
         trial[i] = y[i] + h0 * dy[i]
-    if derivative(problem, min(t + h0, last), trial, slope, counts) != OK:
+    if derivative(problem, min(segment.start + h0, segment.last), trial, slope, counts) != OK:
         return h0
     for i in range(y.shape[0]):
         slope[i] -= dy[i]
-    d2 = scaled_norm(slope, y, rtol, atol, controlled) / h0
+    d2 = scaled_norm(slope, y, accuracy) / h0
     h1 = max(1e-6, h0 * 1e-3) if d1 <= 1e-15 and d2 <= 1e-15 else (0.01 / max(d1, d2)) ** (1.0 / exponent)
     return min(100.0 * h0, h1, span)
 
 
 @helper
-def enter_segment(problem, t, y, dy, h, end, last, rtol, atol, controlled, exponent, counts, trial, slope):
+def enter_segment(problem, segment, y, dy, h, accuracy, exponent, counts):
     """dy = f(t, y), afresh, for it may jump where a segment ends; returns a status code, and h, the first one for 0."""
-    status = derivative(problem, t, y, dy, counts)
+    status = derivative(problem, segment.start, y, dy, counts)
     if status == OK and h == 0.0:
-        h = initial_step(problem, t, y, dy, end - t, last, rtol, atol, controlled, exponent, counts, trial, slope)
+        h = initial_step(problem, segment, y, dy, accuracy, exponent, counts)
     return status, h
 
 

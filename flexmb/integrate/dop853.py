@@ -8,6 +8,7 @@ next step and belongs to the interpolant: both are consistent with the projected
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from flexmb.integrate.control import (
     ACCEPTED,
     REJECTED,
     SAMPLES,
+    Interval,
     all_finite,
     begin,
     copy,
@@ -27,11 +29,20 @@ from flexmb.integrate.control import (
     step_factor,
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
+from flexmb.integrate.integrator import Integrator
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 _END = STAGES  # row of A with the weights of the result; k[_END] is the derivative there
 _ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)
+
+
+class ExplicitStages(NamedTuple):
+    """Arrays of a step: slopes k (STAGES_DENSE,n), the new state (n,), coefficients f (7,n) of the interpolant."""
+
+    k: np.ndarray
+    y_new: np.ndarray
+    f: np.ndarray
 
 
 @helper
@@ -72,28 +83,29 @@ def stages(problem, t, last, y, h, k, trial, counts):
 
 
 @helper
-def error_norm(y, y_new, h, k, rtol, atol, controlled):
+def error_norm(y, y_new, h, k, accuracy):
     """Hairer's blend of the 5th and 3rd order error estimates over the tolerance: 1 is just acceptable."""
     sum5, sum3 = 0.0, 0.0
-    for i in range(controlled):
-        scale = atol + rtol * max(abs(y[i]), abs(y_new[i]))
+    for i in range(accuracy.controlled):
+        scale = accuracy.atol + accuracy.rtol * max(abs(y[i]), abs(y_new[i]))
         sum5 += (weighted_sum(E5, E5.shape[0], k, i) / scale) ** 2
         sum3 += (weighted_sum(E3, E3.shape[0], k, i) / scale) ** 2
     if sum5 == 0.0 and sum3 == 0.0:
         return 0.0
-    return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * controlled)
+    return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * accuracy.controlled)
 
 
 @helper
-def interpolant(problem, t, last, y, y_new, h, k, f, trial, counts):
-    """Coefficients f (7, n) of the interpolant of order 7 on the step from y(t) to y_new; three more stages."""
-    for s in range(STAGES + 1, STAGES_DENSE):
-        combine(y, h, s, k, trial)
-        status = derivative(problem, min(t + C[s] * h, last), trial, k[s], counts)
+def interpolant(problem, step, y, s, trial, counts):
+    """Coefficients s.f (7, n) of the interpolant of order 7 on the step from y to s.y_new; three more stages."""
+    h, k, f = step.end - step.start, s.k, s.f
+    for stage in range(STAGES + 1, STAGES_DENSE):
+        combine(y, h, stage, k, trial)
+        status = derivative(problem, min(step.start + C[stage] * h, step.last), trial, k[stage], counts)
         if status != OK:
             return status
     for i in range(y.shape[0]):
-        change = y_new[i] - y[i]
+        change = s.y_new[i] - y[i]
         f[0, i] = change
         f[1, i] = h * k[0, i] - change
         f[2, i] = 2.0 * change - h * (k[_END, i] + k[0, i])
@@ -113,23 +125,23 @@ def interpolate(y, f, x, result):
 
 
 @helper
-def store_samples(problem, t, t_new, last, y, y_new, k, f, times, out, counts):
-    """Store the samples in (t, t_new]; inside the step by the interpolant, which is only built where it is needed.
+def store_samples(problem, step, y, s, times, out, counts):
+    """Store the samples in the step, its end included; inside by the interpolant, built only where it is needed.
 
     Interpolated states are projected, so that quaternions are unit and prescribed coordinates exact there too.
     """
     sample = counts[SAMPLES]
     built = False
-    while sample < times.shape[0] and times[sample] <= t_new:
-        if times[sample] == t_new:
-            copy(y_new, out[sample])
+    while sample < times.shape[0] and times[sample] <= step.end:
+        if times[sample] == step.end:
+            copy(s.y_new, out[sample])
         else:
             if not built:
-                status = interpolant(problem, t, last, y, y_new, t_new - t, k, f, out[sample], counts)
+                status = interpolant(problem, step, y, s, out[sample], counts)
                 if status != OK:
                     return status
                 built = True
-            interpolate(y, f, (times[sample] - t) / (t_new - t), out[sample])
+            interpolate(y, s.f, (times[sample] - step.start) / (step.end - step.start), out[sample])
             problem.project(times[sample], out[sample], problem.constants)
         sample += 1
         counts[SAMPLES] = sample
@@ -137,64 +149,63 @@ def store_samples(problem, t, t_new, last, y, y_new, k, f, times, out, counts):
 
 
 @helper
-def attempt(problem, t, t_new, last, y, y_new, k, rtol, atol, controlled, counts):
-    """One trial step: y_new = y(t_new), projected, and k[_END] = f(t_new, y_new). Returns (status, error norm)."""
-    h = t_new - t
-    status = stages(problem, t, last, y, h, k, y_new, counts)
+def attempt(problem, step, y, s, accuracy, counts):
+    """One trial step: s.y_new, projected, and its slope s.k[_END]. Returns (status, error norm)."""
+    h = step.end - step.start
+    status = stages(problem, step.start, step.last, y, h, s.k, s.y_new, counts)
     if status != OK:
         return status, math.inf
-    error = error_norm(y, y_new, h, k, rtol, atol, controlled)
+    error = error_norm(y, s.y_new, h, s.k, accuracy)
     if error < 1.0:
-        problem.project(t_new, y_new, problem.constants)
-        status = derivative(problem, min(t_new, last), y_new, k[_END], counts)
+        problem.project(step.end, s.y_new, problem.constants)
+        status = derivative(problem, min(step.end, step.last), s.y_new, s.k[_END], counts)
     return status, error
 
 
 @kernel
-def dop853(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
-    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+def dop853(problem, y, clock, accuracy, out, counts):
+    """Integrate y' = f(t, y) as told by `Integrator`.
 
-    problem: a `Problem`. y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends:
-    increasing, the last is times[-1]; no step crosses one, and the stages before one see the right-hand side's limit
-    from the left. Only the first `controlled` components enter the error norm: what follows are quadratures (work),
-    which nothing depends on; they have no scale of their own to compare `atol` with, and are as smooth as the state,
-    hence integrated as accurately by the same steps.
     A step whose right-hand side fails is retried shorter: it may only have reached too far. When the step gets too
-    short to advance time, the failure's own status is returned. counts (5,): evaluations, accepted and rejected steps,
-    samples stored. Returns (status code, time of the last good state).
+    short to advance time, the failure's own status is returned.
     """
+    times, segment_ends = clock
     n = y.shape[0]
-    k = np.empty((STAGES_DENSE, n))
-    y_new, f = np.empty(n), np.empty((7, n))
+    s = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty(n), np.empty((7, n)))
     t, h = times[0], 0.0
     begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status, h = enter_segment(
-            problem, t, y, k[0], h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, y_new, k[1]
-        )
+        segment = Interval(t, end, last)
+        status, h = enter_segment(problem, segment, y, s.k[0], h, accuracy, _ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
         rejected, trouble = False, STEP_TOO_SMALL
         while t < end:
-            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if status != OK:
                 return status, t
-            length = t_new - t
-            status, error = attempt(problem, t, t_new, last, y, y_new, k, rtol, atol, controlled, counts)
+            step, length = Interval(t, t_new, last), t_new - t
+            status, error = attempt(problem, step, y, s, accuracy, counts)
             trouble = reason(status)
             accepted = status == OK and error < 1.0
             if accepted:
-                status = store_samples(problem, t, t_new, last, y, y_new, k, f, times, out, counts)
+                status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:
                     return status, t
                 h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
                 t = t_new
-                copy(y_new, y)
-                copy(k[_END], k[0])
+                copy(s.y_new, y)
+                copy(s.k[_END], s.k[0])
                 counts[ACCEPTED] += 1
             else:
                 h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t
+
+
+INTEGRATOR = Integrator(
+    "dop853", dop853, order=8, evaluations=11,
+    summary="the default: everything whose fastest mode matters, or is not a thousand times faster than what does",
+)  # fmt: skip

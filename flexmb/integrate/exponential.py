@@ -20,8 +20,10 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    FACTORISATIONS,
     REJECTED,
     SAMPLES,
+    Interval,
     begin,
     copy,
     derivative,
@@ -33,7 +35,8 @@ from flexmb.integrate.control import (
     step_end,
     step_factor,
 )
-from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
@@ -50,9 +53,13 @@ _CONVERGED = 0.02  # what the iteration may leave, in units of the tolerance
 _ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
 
 
-class Scratch(NamedTuple):
-    """Arrays of a step: J (n,n); polynomials v, v_error (TERMS,n), their responses X, X_error, states x (4,n)."""
+class Collocation(NamedTuple):
+    """Arrays of a step: slope f at its start; J (n,n) and its flow; polynomials v, v_error (TERMS,n), their responses
+    X, X_error, states x (4,n).
+    """
 
+    flow: Flow
+    f: np.ndarray
     J: np.ndarray
     v: np.ndarray
     v_error: np.ndarray
@@ -69,38 +76,38 @@ class Scratch(NamedTuple):
 
 
 @helper
-def response(flow, s, terms):
+def response(s, terms):
     """x at the quarters of the step under the first terms of the polynomial v."""
-    respond(flow, s.v, terms, s.X)
-    at_quarters(flow, s.X, s.x)
+    respond(s.flow, s.v, terms, s.X)
+    at_quarters(s.flow, s.X, s.x)
 
 
 @helper
-def change(flow, s, y, rtol, atol, controlled):
+def change(s, y, accuracy):
     """Scaled norm of the change of x at the nodes by a sweep, root mean square over the nodes."""
     total = 0.0
     for node in range(4):
         for i in range(y.shape[0]):
-            s.error[i] = flow.scale[i] * (s.x[node, i] - s.x_before[node, i])
-        total += scaled_norm(s.error, y, rtol, atol, controlled) ** 2
+            s.error[i] = s.flow.scale[i] * (s.x[node, i] - s.x_before[node, i])
+        total += scaled_norm(s.error, y, accuracy) ** 2
     return math.sqrt(0.25 * total)
 
 
 @helper
-def evaluate_rest(problem, t, last, y, f, h, flow, s, counts):
+def evaluate_rest(problem, step, y, s, counts):
     """h r at the nodes, balanced, and from it the polynomial v; returns a status code."""
-    n = y.shape[0]
+    n, h, flow = y.shape[0], step.end - step.start, s.flow
     for node in range(4):
         for i in range(n):
             s.y_new[i] = y[i] + flow.scale[i] * s.x[node, i]
-        status = derivative(problem, min(t + NODES[node] * h, last), s.y_new, s.f_new, counts)
+        status = derivative(problem, min(step.start + NODES[node] * h, step.last), s.y_new, s.f_new, counts)
         if status != OK:
             return status
         for i in range(n):
             row, total = flow.Z[i], 0.0
             for j in range(n):
                 total += row[j] * s.x[node, j]
-            s.rest[node, i] = h * (s.f_new[i] - f[i]) / flow.scale[i] - total
+            s.rest[node, i] = h * (s.f_new[i] - s.f[i]) / flow.scale[i] - total
     for l in range(1, TERMS):
         for i in range(n):
             total = 0.0
@@ -111,21 +118,21 @@ def evaluate_rest(problem, t, last, y, f, h, flow, s, counts):
 
 
 @helper
-def iterate(problem, t, last, y, f, h, flow, s, rtol, atol, controlled, counts):
+def iterate(problem, step, y, s, accuracy, counts):
     """Solve for x at the nodes; returns a status code, NOT_CONVERGED where the iteration would not end in time."""
-    n = y.shape[0]
-    for i in range(n):
-        s.v[0, i] = h * f[i] / flow.scale[i]
-    response(flow, s, 1)
+    h = step.end - step.start
+    for i in range(y.shape[0]):
+        s.v[0, i] = h * s.f[i] / s.flow.scale[i]
+    response(s, 1)
     before = 0.0
     for sweep in range(1, _SWEEPS + 1):
         for node in range(4):
             copy(s.x[node], s.x_before[node])
-        status = evaluate_rest(problem, t, last, y, f, h, flow, s, counts)
+        status = evaluate_rest(problem, step, y, s, counts)
         if status != OK:
             return status
-        response(flow, s, TERMS)
-        size = change(flow, s, y, rtol, atol, controlled)
+        response(s, TERMS)
+        size = change(s, y, accuracy)
         if not math.isfinite(size):
             return NONFINITE
         if size <= _CONVERGED:
@@ -141,12 +148,12 @@ def iterate(problem, t, last, y, f, h, flow, s, rtol, atol, controlled, counts):
 
 
 @helper
-def estimate(y, flow, s, rtol, atol, controlled):
+def estimate(y, s, accuracy):
     """Scaled norm of what the middle node does, to the end of the step or to its middle. Uses x_before.
 
     A component that follows the rest at once sees nothing of the middle node at the end; samples inside the step do.
     """
-    n = y.shape[0]
+    n, flow = y.shape[0], s.flow
     for i in range(n):
         s.term[i] = max(abs(y[i]), abs(s.y_new[i]))
         for l in range(TERMS):
@@ -157,35 +164,35 @@ def estimate(y, flow, s, rtol, atol, controlled):
     for node in (1, 3):
         for i in range(n):
             s.error[i] = flow.scale[i] * s.x_before[node, i]
-        norm = max(norm, scaled_norm(s.error, s.term, rtol, atol, controlled))
+        norm = max(norm, scaled_norm(s.error, s.term, accuracy))
     return norm
 
 
 @helper
-def attempt(problem, t, t_new, last, y, f, flow, s, rtol, atol, controlled, counts):
+def attempt(problem, step, y, s, accuracy, counts):
     """One trial step: y_new, projected, and its slope f_new; returns status, error norm."""
-    h = t_new - t
-    status = iterate(problem, t, last, y, f, h, flow, s, rtol, atol, controlled, counts)
+    status = iterate(problem, step, y, s, accuracy, counts)
     if status != OK:
         return status, math.inf
     for i in range(y.shape[0]):
-        s.y_new[i] = y[i] + flow.scale[i] * s.x[3, i]
-    error = estimate(y, flow, s, rtol, atol, controlled)
+        s.y_new[i] = y[i] + s.flow.scale[i] * s.x[3, i]
+    error = estimate(y, s, accuracy)
     if error < 1.0:
-        problem.project(t_new, s.y_new, problem.constants)
-        status = derivative(problem, min(t_new, last), s.y_new, s.f_new, counts)
+        problem.project(step.end, s.y_new, problem.constants)
+        status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error
 
 
 @helper
-def store_samples(problem, t, t_new, y, flow, s, times, out, counts):
-    """Store the samples in (t, t_new]; inside the step by the exact flow under the same polynomial, projected."""
-    sample = counts[SAMPLES]
-    while sample < times.shape[0] and times[sample] <= t_new:
-        if times[sample] == t_new:
+def store_samples(problem, step, y, s, times, out, counts):
+    """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
+    """
+    sample, flow = counts[SAMPLES], s.flow
+    while sample < times.shape[0] and times[sample] <= step.end:
+        if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            theta = (times[sample] - t) / (t_new - t)
+            theta = (times[sample] - step.start) / (step.end - step.start)
             at_fraction(flow, s.v, s.X, s.x, theta, out[sample], s.term, s.product)
             for i in range(y.shape[0]):
                 out[sample, i] = y[i] + flow.scale[i] * out[sample, i]
@@ -201,56 +208,60 @@ def scratch(n):
         np.empty((n, n)), np.empty(n), np.empty((LEVELS, n, n)), np.empty((TERMS, n, n)), np.empty((5, n, n)),
         np.empty(1, np.int64),
     )  # fmt: skip
-    return flow, Scratch(
-        np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
+    return Collocation(
+        flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
         np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
 
 
 @kernel
-def exponential(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
-    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+def exponential(problem, y, clock, accuracy, out, counts):
+    """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
-    `dop853`, counts (7,) those of `jacobians`. Where the iteration does not converge, the step is halved.
+    The retreat from a failing right-hand side is that of `dop853`. Where the iteration does not converge, the step is
+    halved.
     """
-    flow, s = scratch(y.shape[0])
-    f = np.empty(y.shape[0])
+    times, segment_ends = clock
+    s = scratch(y.shape[0])
     t, h = times[0], 0.0
     begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status, h = enter_segment(
-            problem, t, y, f, h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, s.y_new, s.f_new
-        )
+        status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
         rejected, trouble = False, STEP_TOO_SMALL
         while t < end:
-            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if status != OK:
                 return status, t
-            length = t_new - t
+            step, length = Interval(t, t_new, last), t_new - t
             if not rejected:
                 status = linearisation(problem, t, y, s.J, counts)
                 if status != OK:
                     return status, t
             status, error = NOT_CONVERGED, math.inf
             counts[FACTORISATIONS] += 1
-            if prepare(flow, s.J, length):
-                status, error = attempt(problem, t, t_new, last, y, f, flow, s, rtol, atol, controlled, counts)
+            if prepare(s.flow, s.J, length):
+                status, error = attempt(problem, step, y, s, accuracy, counts)
             trouble = reason(status)
             accepted = status == OK and error < 1.0
             if accepted:
-                store_samples(problem, t, t_new, y, flow, s, times, out, counts)
+                store_samples(problem, step, y, s, times, out, counts)
                 h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
                 t = t_new
                 copy(s.y_new, y)
-                copy(s.f_new, f)
+                copy(s.f_new, s.f)
                 counts[ACCEPTED] += 1
             else:
                 h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t
+
+
+INTEGRATOR = Integrator(
+    "exponential", exponential, order=5, linearises=True, algebra=(40.0, 10.0),  # an exponential of a matrix
+    summary="stiff scenes at higher accuracy, and ringing that must not be damped; order 6 where nothing is stiff",
+)  # fmt: skip

@@ -18,7 +18,9 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    FACTORISATIONS,
     SAMPLES,
+    Interval,
     all_finite,
     begin,
     copy,
@@ -27,7 +29,8 @@ from flexmb.integrate.control import (
     scaled_norm,
     stretch,
 )
-from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
@@ -38,7 +41,7 @@ _WORN = 8  # iterations after which the Jacobian is renewed: it costs more than 
 _SAME = 1e-9  # relative difference of steps that share factors
 
 
-class Scratch(NamedTuple):
+class NewmarkArrays(NamedTuple):
     """Arrays of a step: J (n,n); matrix of Newton's method (nu,nu); a, udot at both ends (nu,); slopes (n,)."""
 
     J: np.ndarray
@@ -74,11 +77,11 @@ def largest(values):
 
 
 @helper
-def factorise(s, h, radius, nq, counts):
+def factorise(s, h, accuracy, counts):
     """Factors of d(udot_1 - f)/d(udot_1); dq/du is the block of J that maps speeds to rates of coordinates."""
-    alpha_m, alpha_f, beta, gamma = parameters(radius)
+    alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
     weight = (1.0 - alpha_f) / (1.0 - alpha_m)
-    nu = s.matrix.shape[0]
+    nq, nu = accuracy.coordinates, s.matrix.shape[0]
     for i in range(nu):
         for j in range(nu):
             total = 0.0
@@ -91,9 +94,10 @@ def factorise(s, h, radius, nq, counts):
 
 
 @helper
-def end_of_step(problem, y, h, radius, nq, s):
+def end_of_step(problem, y, h, s, accuracy):
     """y_new and a_new from udot at both ends; what follows the speeds is left alone."""
-    alpha_m, alpha_f, beta, gamma = parameters(radius)
+    alpha_m, alpha_f, beta, gamma = parameters(accuracy.radius)
+    nq = accuracy.coordinates
     for j in range(s.a.shape[0]):
         a = ((1.0 - alpha_f) * s.rate_new[j] + alpha_f * s.rate[j] - alpha_m * s.a[j]) / (1.0 - alpha_m)
         s.a_new[j] = a
@@ -103,14 +107,14 @@ def end_of_step(problem, y, h, radius, nq, s):
 
 
 @helper
-def newton(problem, t_new, y, h, radius, nq, s, rtol, atol, counts):
+def newton(problem, t_new, y, h, s, accuracy, counts):
     """Solve for udot at the end of the step. Returns (status, iterations).
 
     The first guess is the solution with f linearised at the start, so that no stiff mode is ever far out.
     """
-    nu = s.a.shape[0]
+    nq, nu = accuracy.coordinates, s.a.shape[0]
     copy(s.rate, s.rate_new)
-    end_of_step(problem, y, h, radius, nq, s)
+    end_of_step(problem, y, h, s, accuracy)
     for j in range(nu):
         total = 0.0
         for k in range(nq + nu):
@@ -119,7 +123,7 @@ def newton(problem, t_new, y, h, radius, nq, s, rtol, atol, counts):
     lu_solve(s.matrix, s.pivots, s.correction)
     for j in range(nu):
         s.rate_new[j] += s.correction[j]
-    end_of_step(problem, y, h, radius, nq, s)
+    end_of_step(problem, y, h, s, accuracy)
     for iteration in range(1, _ITERATIONS + 1):
         status = derivative(problem, t_new, s.y_new, s.f_new, counts)
         if status != OK:  # an iterate that runs away is no motion that diverges
@@ -130,54 +134,51 @@ def newton(problem, t_new, y, h, radius, nq, s, rtol, atol, counts):
         for j in range(nu):
             s.rate_new[j] += s.correction[j]
         copy(s.y_new, s.y_before)
-        end_of_step(problem, y, h, radius, nq, s)
+        end_of_step(problem, y, h, s, accuracy)
         if not all_finite(s.y_new):
             return NOT_CONVERGED, iteration
         for i in range(nq + nu):
             s.y_before[i] -= s.y_new[i]
-        size = scaled_norm(s.y_before, s.y_new, rtol, atol, nq + nu)
+        size = scaled_norm(s.y_before, s.y_new, accuracy)
         if size <= 1.0 or largest(s.correction) <= _ROUNDING * largest(s.rate_new):
             return OK, iteration
     return NOT_CONVERGED, _ITERATIONS
 
 
 @helper
-def step_once(
-    problem, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, counts
-):
-    """One step from y(t) to y_new, with a new Jacobian where the old one does not do.
+def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
+    """One step of size h from y to y_new, with a new Jacobian where the old one does not do.
 
     Returns (status, h of the factors, 0 where they are worn).
     """
     status, iterations = NOT_CONVERGED, 0
     if h_factored > 0.0 and abs(h - h_factored) > _SAME * h:
-        h_factored = h if factorise(s, h, radius, nq, counts) else 0.0
+        h_factored = h if factorise(s, h, accuracy, counts) else 0.0
     if h_factored > 0.0:
-        status, iterations = newton(problem, min(t_new, last), y, h, radius, nq, s, rtol, atol, counts)
+        status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
     if status == NOT_CONVERGED:
-        status = linearisation(problem, t, y, s.J, counts)
+        status = linearisation(problem, step.start, y, s.J, counts)
         if status != OK:
             return status, 0.0
-        if not factorise(s, h, radius, nq, counts):
+        if not factorise(s, h, accuracy, counts):
             return NOT_CONVERGED, 0.0
-        status, iterations = newton(problem, min(t_new, last), y, h, radius, nq, s, rtol, atol, counts)
+        status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
         return status, h
     return status, h if iterations < _WORN else 0.0
 
 
 @kernel
-def generalised_alpha(
-    problem, y, times, segment_ends, step, radius, nq, controlled, rtol, atol, max_steps, out, counts
-):
-    """Integrate y = [q (nq,), u, quadratures] from times[0] to times[-1] and store y at every time of `times` in `out`.
+def generalised_alpha(problem, y, clock, accuracy, out, counts):
+    """Integrate y = [q, u, quadratures] as told by `Integrator`; problem: a `StiffProblem`.
 
-    problem: a `StiffProblem`. Steps, samples and segments are those of `rk4`, counts (7,) those of `jacobians`.
-    Newton's method stops where its correction is below rtol |y| + atol over the first `controlled` components.
-    Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end, where udot may
-    jump. Returns (status code, time of the last good state).
+    Steps are those of `rk4`. Newton's method stops where its correction is below rtol |y| + atol over the controlled
+    components. Quadratures follow the trapezoidal rule. a starts as udot, at the start and after every segment end,
+    where udot may jump.
     """
+    times, segment_ends = clock
+    nq, controlled = accuracy.coordinates, accuracy.controlled
     n, nu = y.shape[0], controlled - nq
-    s = Scratch(
+    s = NewmarkArrays(
         np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), np.empty(nu), np.empty(nu), np.empty(nu),
         np.empty(nu), np.empty(nu), np.empty(nu), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
@@ -188,9 +189,9 @@ def generalised_alpha(
     for sample in range(1, times.shape[0]):
         while t < times[sample]:
             start = t
-            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], step)
+            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
             for k in range(steps):
-                status = permitted(max_steps, counts)
+                status = permitted(accuracy.max_steps, counts)
                 if status != OK:
                     return status, t
                 if at_start:
@@ -201,9 +202,8 @@ def generalised_alpha(
                         s.rate[j] = s.a[j] = s.f[nq + j]
                     at_start = False
                 t_new = end if k == steps - 1 else start + (k + 1) * h
-                status, h_factored = step_once(
-                    problem, t, t_new, last, y, h, h_factored, radius, nq, s, rtol, atol, counts
-                )
+                step = Interval(t, t_new, last)
+                status, h_factored = step_once(problem, step, y, h, h_factored, s, accuracy, counts)
                 if status != OK:
                     return status, t
                 for i in range(controlled, n):
@@ -220,3 +220,9 @@ def generalised_alpha(
         copy(y, out[sample])
         counts[SAMPLES] = sample + 1
     return OK, t
+
+
+INTEGRATOR = Integrator(
+    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, damps=True, algebra=(2.0 / 3.0, 2.0),
+    summary="rough answers at large steps, with damping that is chosen",
+)  # fmt: skip

@@ -1,14 +1,10 @@
-"""What methods that linearise have in common: Jacobians that are counted and checked, and where their cost is kept."""
+"""What methods that linearise have in common: Jacobians that are counted and checked."""
 
 from __future__ import annotations
 
-from flexmb.integrate.control import all_finite
+from flexmb.integrate.control import JACOBIANS, all_finite
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import NONFINITE, OK
-
-# Entries of `counts` behind those of `control`: Jacobians, and factorisations or exponentials of a matrix.
-JACOBIANS, FACTORISATIONS = 5, 6
-COUNTS = 7  # length of `counts`
 
 
 @helper

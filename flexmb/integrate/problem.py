@@ -1,8 +1,13 @@
-"""Differential equations as integrators take them: functions and tables by address, so that each is compiled once."""
+"""What an integrator is given: a differential equation, the times of its output and how accurate it shall be.
+
+Functions and tables are given by address, so that each integrator is compiled once.
+"""
 
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from flexmb.jit.bundle import AnyBundle
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, pointer
@@ -37,6 +42,39 @@ class StiffProblem(NamedTuple):
     move: Pointer
     exact: AnyBundle
     tangent: AnyBundle
+
+
+class Clock(NamedTuple):
+    """times (T,) s of the output, increasing, the first is the start of the run and the last is its end.
+
+    segment_ends (S,) s, increasing, the last is times[-1]: no step crosses one, and the stages before one see the
+    right-hand side's limit from the left.
+    """
+
+    times: np.ndarray
+    segment_ends: np.ndarray
+
+
+class Accuracy(NamedTuple):
+    """How a state y (n,) = [q (coordinates,), u, quadratures] is integrated; every method reads what it needs.
+
+    rtol, atol    a norm weighs component i by atol + rtol |y_i|
+    controlled    only so many first components enter a norm: what follows are quadratures (work), which nothing depends
+                  on; they have no scale of their own to compare `atol` with, and are as smooth as the state, hence
+                  integrated as accurately by the same steps
+    max_steps     accepted and rejected together
+    step          s, the longest of methods that take equal steps
+    radius        spectral radius at infinite frequency of generalised-alpha
+    coordinates   number of entries of q, for methods of second-order equations
+    """
+
+    rtol: float
+    atol: float
+    controlled: int
+    max_steps: int
+    step: float = 0.0
+    radius: float = 1.0
+    coordinates: int = 0
 
 
 def problem(rhs: Any, project: Any, constants: Any, workspace: Any) -> Problem:

@@ -14,10 +14,12 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    FACTORISATIONS,
     REJECTED,
     SAFETY,
     SAMPLES,
     SHRINK,
+    Interval,
     begin,
     copy,
     derivative,
@@ -28,7 +30,8 @@ from flexmb.integrate.control import (
     scaled_norm,
     step_end,
 )
-from flexmb.integrate.jacobians import FACTORISATIONS, linearisation
+from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
 from flexmb.jit.kernel import helper, kernel
@@ -42,11 +45,12 @@ _SLOW = 1e-3  # a contraction above this asks for a new Jacobian
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
-class Scratch(NamedTuple):
-    """Arrays of a step: stages Z, those of the step before, slopes F (3,n); factors; unknowns w, v and corrections dw,
-    dv, decoupled.
+class RadauStages(NamedTuple):
+    """Arrays of a step: slope f at its start; stages Z, those of the step before, slopes F (3,n); factors; unknowns w,
+    v and corrections dw, dv, decoupled.
     """
 
+    f: np.ndarray
     J: np.ndarray
     real: np.ndarray
     paired: np.ndarray
@@ -120,34 +124,35 @@ def to_decoupled(Z, w, v):
 
 
 @helper
-def stage_norm(dZ, y, rtol, atol, controlled):
+def stage_norm(dZ, y, accuracy):
     """Root mean square of the scaled norms of three stages (3,n)."""
     total = 0.0
     for s in range(3):
-        total += scaled_norm(dZ[s], y, rtol, atol, controlled) ** 2
+        total += scaled_norm(dZ[s], y, accuracy) ** 2
     return math.sqrt(total / 3.0)
 
 
 @helper
-def newton(problem, t, last, y, h, s, rtol, atol, controlled, counts):
+def newton(problem, step, y, s, accuracy, counts):
     """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
 
     Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
     there in time.
     """
-    tolerance = max(10.0 * 2.0**-52 / rtol, min(0.03, math.sqrt(rtol)))
+    h = step.end - step.start
+    tolerance = max(10.0 * 2.0**-52 / accuracy.rtol, min(0.03, math.sqrt(accuracy.rtol)))
     to_decoupled(s.Z, s.w, s.v)
     rate, before = 0.0, 0.0
     for iteration in range(1, _ITERATIONS + 1):
         for stage in range(3):
             for i in range(y.shape[0]):
                 s.trial[i] = y[i] + s.Z[stage, i]
-            status = derivative(problem, min(t + C[stage] * h, last), s.trial, s.F[stage], counts)
+            status = derivative(problem, min(step.start + C[stage] * h, step.last), s.trial, s.F[stage], counts)
             if status != OK:
                 return status, iteration, rate
         correct(s, h)
         to_stages(s.dw, s.dv, s.F)
-        size = stage_norm(s.F, y, rtol, atol, controlled)
+        size = stage_norm(s.F, y, accuracy)
         to_stages(s.w, s.v, s.Z)
         if not math.isfinite(size):
             return NONFINITE, iteration, rate
@@ -162,13 +167,13 @@ def newton(problem, t, last, y, h, s, rtol, atol, controlled, counts):
 
 
 @helper
-def estimate(y, slope, h, s, rtol, atol, controlled):
+def estimate(y, slope, h, s, accuracy):
     """Scaled norm of the embedded formula's error (8.19): the defect at the start, stiff parts filtered out."""
     for i in range(y.shape[0]):
         s.error[i] = slope[i] + (E[0] * s.Z[0, i] + E[1] * s.Z[1, i] + E[2] * s.Z[2, i]) / h
         s.trial[i] = max(abs(y[i]), abs(s.y_new[i]))
     lu_solve(s.real, s.real_pivots, s.error)
-    return scaled_norm(s.error, s.trial, rtol, atol, controlled)
+    return scaled_norm(s.error, s.trial, accuracy)
 
 
 @helper
@@ -193,40 +198,38 @@ def guess(before, h_before, h, Z):
 
 
 @helper
-def attempt(
-    problem, t, t_new, last, y, f, s, filter_again, rtol, atol, controlled, counts
-):
+def attempt(problem, step, y, s, filter_again, accuracy, counts):
     """One trial step from a guess in Z: y_new, projected, and its slope f_new; returns status, error norm, iterations,
     contraction. `filter_again`: a rejection is confirmed by the estimate (8.20), which no stiff transient can spoil.
     """
-    h = t_new - t
-    status, iterations, rate = newton(problem, t, last, y, h, s, rtol, atol, controlled, counts)
+    h = step.end - step.start
+    status, iterations, rate = newton(problem, step, y, s, accuracy, counts)
     if status != OK:
         return status, math.inf, iterations, rate
     for i in range(y.shape[0]):
         s.y_new[i] = y[i] + s.Z[2, i]
-    error = estimate(y, f, h, s, rtol, atol, controlled)
+    error = estimate(y, s.f, h, s, accuracy)
     if error >= 1.0 and filter_again:
         for i in range(y.shape[0]):
             s.trial[i] = y[i] + s.error[i]
-        status = derivative(problem, t, s.trial, s.f_new, counts)
+        status = derivative(problem, step.start, s.trial, s.f_new, counts)
         if status == OK:
-            error = estimate(y, s.f_new, h, s, rtol, atol, controlled)
+            error = estimate(y, s.f_new, h, s, accuracy)
     if status == OK and error < 1.0:
-        problem.project(t_new, s.y_new, problem.constants)
-        status = derivative(problem, min(t_new, last), s.y_new, s.f_new, counts)
+        problem.project(step.end, s.y_new, problem.constants)
+        status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error, iterations, rate
 
 
 @helper
-def store_samples(problem, t, t_new, y, s, times, out, counts):
-    """Store the samples in (t, t_new]: the collocation polynomial, projected, inside the step."""
+def store_samples(problem, step, y, s, times, out, counts):
+    """Store the samples in the step, its end included; inside by the collocation polynomial, projected."""
     sample = counts[SAMPLES]
-    while sample < times.shape[0] and times[sample] <= t_new:
-        if times[sample] == t_new:
+    while sample < times.shape[0] and times[sample] <= step.end:
+        if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            evaluate_polynomial(s.Z, (times[sample] - t) / (t_new - t), out[sample])
+            evaluate_polynomial(s.Z, (times[sample] - step.start) / (step.end - step.start), out[sample])
             for i in range(y.shape[0]):
                 out[sample, i] += y[i]
             problem.project(times[sample], out[sample], problem.constants)
@@ -237,8 +240,8 @@ def store_samples(problem, t, t_new, y, s, times, out, counts):
 @helper
 def scratch(n):
     """For n components."""
-    return Scratch(
-        np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
+    return RadauStages(
+        np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
         np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
         np.empty(n),
@@ -253,30 +256,28 @@ def after_acceptance(h, length, cut, factor, rejected, worn):
 
 
 @kernel
-def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, out, counts):
-    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+def radau5(problem, y, clock, accuracy, out, counts):
+    """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    problem: a `StiffProblem`. Arguments, samples, segments and the retreat from a failing right-hand side are those of
-    `dop853`, counts (7,) those of `jacobians`. Where Newton's method does not converge, an old Jacobian is renewed,
-    then the step is halved.
+    The retreat from a failing right-hand side is that of `dop853`. Where Newton's method does not converge, an old
+    Jacobian is renewed, then the step is halved.
     """
-    s, f = scratch(y.shape[0]), np.empty(y.shape[0])
+    times, segment_ends = clock
+    s = scratch(y.shape[0])
     t, h = times[0], 0.0
     begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
-        status, h = enter_segment(
-            problem, t, y, f, h, end, last, rtol, atol, controlled, _ERROR_EXPONENT, counts, s.trial, s.error
-        )
+        status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
         h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
         renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
         while t < end:
-            status, t_new = step_end(t, h, end, trouble, max_steps, counts)
+            status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if status != OK:
                 return status, t
-            length = t_new - t
+            step, length = Interval(t, t_new, last), t_new - t
             if renew:
                 status = linearisation(problem, t, y, s.J, counts)
                 if status != OK:
@@ -289,7 +290,7 @@ def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, o
             if h_factored > 0.0:
                 guess(s.Z_before, h_before, length, s.Z)
                 status, error, iterations, rate = attempt(
-                    problem, t, t_new, last, y, f, s, rejected or h_before == 0.0, rtol, atol, controlled, counts
+                    problem, step, y, s, rejected or h_before == 0.0, accuracy, counts
                 )
             trouble = reason(status)
             factor = 1.0
@@ -297,12 +298,12 @@ def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, o
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                store_samples(problem, t, t_new, y, s, times, out, counts)
+                store_samples(problem, step, y, s, times, out, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)
                 copy(s.y_new, y)
-                copy(s.f_new, f)
+                copy(s.f_new, s.f)
                 for stage in range(3):
                     copy(s.Z[stage], s.Z_before[stage])
                 counts[ACCEPTED] += 1
@@ -317,3 +318,9 @@ def radau5(problem, y, times, segment_ends, rtol, atol, controlled, max_steps, o
                 counts[REJECTED] += 1
                 rejected = True
     return OK, t
+
+
+INTEGRATOR = Integrator(
+    "radau5", radau5, order=5, linearises=True, algebra=(10.0 / 3.0, 10.0),  # a real and a complex matrix
+    summary="modes or springs that are damped or hardly ring; moderate accuracy; the smallest cost of a step",
+)  # fmt: skip

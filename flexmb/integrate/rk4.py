@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, begin, copy, derivative, permitted, stretch
+from flexmb.integrate.integrator import Integrator
 from flexmb.jit.kernel import kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -35,15 +36,13 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
 
 
 @kernel
-def rk4(problem, y, times, segment_ends, step, max_steps, out, counts):
-    """Integrate y' = f(t, y) from times[0] to times[-1] and store y at every time of `times` in `out`.
+def rk4(problem, y, clock, accuracy, out, counts):
+    """Integrate y' = f(t, y) as told by `Integrator`.
 
-    problem: a `Problem`. y (n,): initial state, on return the last good one. times (T,) increasing. segment_ends:
-    increasing, the last is times[-1]; no step crosses one, and the stages before one see the right-hand side's limit
-    from the left. Every stretch between samples and segment ends is divided into equal steps not exceeding `step`, and
-    y is put back on its manifold after each. counts (5,): evaluations, accepted and rejected steps, samples stored.
-    Returns (status code, time of the last good state).
+    Every stretch between samples and segment ends is divided into equal steps not exceeding `accuracy.step`, and y is
+    put back on its manifold after each.
     """
+    times, segment_ends = clock
     k, trial = np.empty((4, y.shape[0])), np.empty(y.shape[0])
     t = times[0]
     begin(problem, t, y, out, counts)
@@ -51,9 +50,9 @@ def rk4(problem, y, times, segment_ends, step, max_steps, out, counts):
     for sample in range(1, times.shape[0]):
         while t < times[sample]:
             start = t
-            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], step)
+            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
             for j in range(steps):
-                status = permitted(max_steps, counts)
+                status = permitted(accuracy.max_steps, counts)
                 if status != OK:
                     return status, t
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
@@ -68,3 +67,8 @@ def rk4(problem, y, times, segment_ends, step, max_steps, out, counts):
         copy(y, out[sample])
         counts[SAMPLES] = sample + 1
     return OK, t
+
+
+INTEGRATOR = Integrator(
+    "rk4", rk4, order=4, fixed=True, evaluations=4, summary="comparison with codes of fixed steps"
+)

@@ -1,18 +1,17 @@
-"""The integrators by name, and what a run may ask of them."""
+"""What a run may ask of an integrator."""
 
 from __future__ import annotations
 
 import sys
 from dataclasses import dataclass, replace
-from typing import Literal, get_args
 
 import numpy as np
 
+from flexmb.integrate.catalogue import INTEGRATORS, integrator
+from flexmb.integrate.integrator import Integrator, Method
+from flexmb.integrate.problem import Accuracy
 from flexmb.tables import arguments
 
-Method = Literal["dop853", "rk4", "radau5", "exponential", "generalised_alpha"]
-FIXED: tuple[Method, ...] = ("rk4", "generalised_alpha")  # take equal steps
-LINEARISING: tuple[Method, ...] = ("radau5", "exponential", "generalised_alpha")  # need Jacobians
 FINEST_RTOL = 100 * np.finfo(float).eps
 COARSEST_RTOL = 1e-2  # estimates of a step's error are its leading term, which is none where two digits are lost
 MOST_STEPS = sys.maxsize  # that compiled code counts
@@ -24,17 +23,29 @@ DAMPING_NOTHING_SLOW = 0.8  # spectral radius: a mode that is not resolved loses
 class Settings:
     """How a run is integrated: `step` (s) and `spectral_radius` belong to methods that have them, else None."""
 
-    method: Method
-    rtol: float
-    atol: float
-    step: float | None
-    max_steps: int
+    method: Method = "dop853"
+    rtol: float = 1e-10
+    atol: float = 1e-12
+    step: float | None = None
+    max_steps: int = 1_000_000
     spectral_radius: float | None = None
 
     @property
-    def radius(self) -> float:
-        """Spectral radius at infinite frequency of generalised-alpha."""
-        return DAMPING_NOTHING_SLOW if self.spectral_radius is None else self.spectral_radius
+    def integrator(self) -> Integrator:
+        """The method's declaration; ValueError where there is none of that name."""
+        return integrator(self.method)
+
+    def accuracy(self, coordinates: int, speeds: int) -> Accuracy:
+        """What the integrator is told of a state with so many coordinates and speeds, behind which is the work."""
+        return Accuracy(
+            rtol=self.rtol,
+            atol=self.atol,
+            controlled=coordinates + speeds,
+            max_steps=self.max_steps,
+            step=0.0 if self.step is None else self.step,
+            radius=DAMPING_NOTHING_SLOW if self.spectral_radius is None else self.spectral_radius,
+            coordinates=coordinates,
+        )
 
     def checked(self, t_end: float) -> Settings:
         """The same in plain numbers; ValueError for settings that make no sense, TypeError for what is no number."""
@@ -52,9 +63,8 @@ class Settings:
         return plain
 
     def _check(self, t_end: float) -> None:
-        if self.method not in get_args(Method):
-            raise ValueError(f"method is {self.method!r}: use one of {', '.join(map(repr, get_args(Method)))}")
-        if self.method in FIXED and (self.step is None or self.step <= 0.0):
+        method = self.integrator
+        if method.fixed and (self.step is None or self.step <= 0.0):
             raise ValueError(
                 f'method "{self.method}" takes fixed steps, but step is {self.step}: give a positive step in seconds'
             )
@@ -63,13 +73,14 @@ class Settings:
                 f"step is {self.step:g} s, by which double precision does not advance a time of {t_end:g} s: max_steps "
                 f"allows {self.max_steps} of them, so use {t_end / self.max_steps:.1e} s or more"
             )
-        if self.method not in FIXED and self.step is not None:
+        if not method.fixed and self.step is not None:
             raise ValueError(
                 f'method "{self.method}" chooses its own steps: leave step out and set rtol and atol, or use "rk4"'
             )
         if self.spectral_radius is not None:
-            if self.method != "generalised_alpha":
-                raise ValueError(f'spectral_radius is for method "generalised_alpha": leave it out for "{self.method}"')
+            if not method.damps:
+                damping = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if each.damps)
+                raise ValueError(f'spectral_radius is for method {damping}: leave it out for "{self.method}"')
             if not 0.0 <= self.spectral_radius <= 1.0:
                 raise ValueError(
                     f"spectral_radius is {self.spectral_radius:g}: from 0 (what is not resolved dies in a step) to 1 "

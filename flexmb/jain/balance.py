@@ -1,13 +1,15 @@
 """Energy, momentum and power of a whole system, from the same modal mass matrices that move it."""
 
-from flexmb.hinges.catalogue import SPHERICAL
-from flexmb.jain.forces import load_vector
-from flexmb.jain.kinematics import port_velocity
+from flexmb.jain.forces import load_at_port
+from flexmb.jain.ports import port_velocity
+from flexmb.jain.wheels import spin_axis
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
+from flexmb.motion.coordinates import speed_power
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.rotation import rotation_vector
-from flexmb.spatial.vector import add, add3, axpy, cross, dot, mat3, scale, times, vec3
+from flexmb.spatial.spatial_vector import add6, axpy6, dot6, shift_force, times6, vec6
+from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
 
 KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 
@@ -30,7 +32,7 @@ def energy_and_momentum(c, w, energy, momentum):
         if i >= 0:
             energy[SPRING] += 0.5 * c.speed[j].stiffness * (w.q[i] - c.speed[j].rest) ** 2
     for k in range(c.body.shape[0]):
-        if c.body[k].hinge_kind == SPHERICAL:
+        if c.body[k].ball_spring != 0.0:
             i = c.body[k].q_index
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)
@@ -38,61 +40,41 @@ def energy_and_momentum(c, w, energy, momentum):
 
 @helper
 def _body(c, w, k, energy, momentum):
-    """1/2 [etadot; V]' M_m [etadot; V] plus wheels; momentum [h; p] = M_rf etadot + M_rr V about the origin."""
-    omega, v = vec3(w.body[k].velocity, 0), vec3(w.body[k].velocity, 3)
-    h, p = inertia_times(load_inertia(w.body[k].inertia, 0), (omega, v))
-    twice = dot(h, omega) + dot(p, v)
+    """1/2 [etadot; V]' M_m [etadot; V] plus wheels; momentum h = M_rf etadot + M_rr V about the body origin."""
+    M_rr, V = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].velocity, 0)
+    h = inertia_times(M_rr, V)
+    twice = dot6(h, V)
     for n in range(c.body[k].modes):
-        etad = w.mode[k, n].etad
-        coupling = w.mode[k, n].pfr
-        angular, linear = vec3(coupling, 0), vec3(coupling, 3)
-        twice += 2.0 * etad * (dot(angular, omega) + dot(linear, v))
-        h = axpy(etad, angular, h)
-        p = axpy(etad, linear, p)
+        M_fr, etad = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].etad
+        twice += 2.0 * etad * dot6(M_fr, V)
+        h = axpy6(etad, M_fr, h)
         eta = w.q[c.body[k].eta_index + n]
         for i in range(c.body[k].modes):
             twice += etad * w.pff[k, n, i] * w.mode[k, i].etad
             energy[STRAIN] += 0.5 * eta * c.pair[k, n, i].stiffness * w.q[c.body[k].eta_index + i]
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-        port = c.wheel[i].port
-        axial = c.wheel[i].axial
-        spin = w.u[c.wheel[i].u_index]
-        axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
-        node, _ = port_velocity(w, k, port)
-        twice += axial * spin * (spin + 2.0 * dot(axis, node))
-        h = axpy(axial * spin, axis, h)
+        axial, axis, spin = c.wheel[i].axial, spin_axis(c, w, i), w.u[c.wheel[i].u_index]
+        omega, _ = port_velocity(w, k, c.wheel[i].port)
+        twice += axial * spin * (spin + 2.0 * dot(axis, omega))
+        h = axpy(axial * spin, axis, h[0]), h[1]
     energy[KINETIC] += 0.5 * twice
-    R = mat3(w.body[k].pose_rotation, 0)
-    origin = vec3(w.body[k].pose_position, 0)
-    # first moment: the coupling block of a rigid inertia is skew(s)
-    block = w.body[k].inertia
-    s = (block[13], block[8], block[9])
-    first = add(scale(block[15], origin), times(R, s))
-    energy[GRAVITY] -= dot(vec3(c.gravity, 0), first)
-    p = times(R, p)
-    add3(momentum, 0, add(times(R, h), cross(origin, p)))
-    add3(momentum, 3, p)
+    R_WB, p_WB = mat3(w.body[k].pose_rotation, 0), vec3(w.body[k].pose_position, 0)  # of the body frame in World
+    _, coupling, mass = M_rr
+    s = (coupling[7], coupling[2], coupling[3])  # first moment: the coupling block of a rigid inertia is skew(s)
+    energy[GRAVITY] -= dot(vec3(c.gravity, 0), add(scale(mass[0], p_WB), times(R_WB, s)))
+    add6(momentum, 0, shift_force(times6(R_WB, h), p_WB))
 
 
 @helper
 def power(c, w):
     """Power of everything that is not conservative: motors, dampers, drives, node loads, modal damping (W)."""
-    total = 0.0
-    for j in range(w.u.shape[0]):
-        rate = w.u[j]
-        total -= c.speed[j].damping * rate * rate
-        f = c.speed[j].motor
-        if f >= 0:
-            total += w.function[f, 0] * rate
-        if c.speed[j].prescribed >= 0:
-            total += w.speed[j].drive * rate
+    total = speed_power(c, w)
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
             start, stop = (n, n + 1) if c.body[k].uncoupled else (0, c.body[k].modes)
             for i in range(start, stop):
                 total -= w.u[c.body[k].etad_index + n] * c.pair[k, n, i].damping * w.u[c.body[k].etad_index + i]
         for i in range(c.body[k].load_start, c.body[k].load_stop):
-            port, tau, f = load_vector(c, w, k, i)
-            omega, v = port_velocity(w, k, port)
-            total += dot(tau, omega) + dot(f, v)
+            port, F = load_at_port(c, w, k, i)
+            total += dot6(F, port_velocity(w, k, port))
     return total

@@ -1,9 +1,10 @@
 """Composite-body inertias and the mass matrix of trees: Jain & Rodriguez (47)-(50), O(N^2 n^2); forward dynamics (46).
 
-R(k) is the modal inertia of all that body k carries, frozen. Every speed of body k has a force X = R H', which travels
-inward through the bodies that carry k; what they meet of it are the elements of M (50). All forces on the way through a
-body travel together: the speeds of what a body carries are neighbours in M when M is written in places (`Places`)
-instead of in the order of u. Rows of M are then filled from one end to the other.
+R(k) is the modal inertia of body k with all that it carries, as if frozen to it. A unit rate of a speed of body k asks
+for the force X = R H', which is passed inward through the bodies that carry k: its projections on their motions are the
+elements of M (50). All forces are passed through a body at once. For this M is written in places (`Places`) instead of
+in the order of u, so that the speeds of what a body carries are neighbours; rows of M are filled from one end to the
+other.
 
 A wheel is one more speed of its body, whose force is the torque I q on its node.
 """
@@ -11,6 +12,8 @@ A wheel is one more speed of its body, whose force is the torque I q on its node
 from flexmb.jain import inverse
 from flexmb.jain.explicit import inertia_to_parent, refer_to_hinge
 from flexmb.jain.kinematics import motion_column, velocity_sweep
+from flexmb.jain.ports import mode_motion
+from flexmb.jain.wheels import spin_axis
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.levels.range import is_out_of_range
@@ -18,7 +21,8 @@ from flexmb.motion.coordinates import hinge_forces
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.pivots import is_small
-from flexmb.spatial.vector import dot, mat3, scale, times, vec3
+from flexmb.spatial.spatial_vector import vec6
+from flexmb.spatial.vector import dot, mat3, scale, vec3
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 TILE = 16
@@ -39,7 +43,7 @@ def mass_matrix(c, w, m):
 def forward_dynamics(c, w, m):
     """Accelerations into w.speed.acceleration by (46), drive loads into w.speed.drive; returns a status code.
 
-    Prescribed speeds have their rates; what these cost is part of the bias. m keeps M, bias and factor.
+    The rates of prescribed speeds are given, and what they ask for is part of the bias. m keeps M, bias and factor.
     """
     hinge_forces(c, w)
     for j in range(w.u.shape[0]):
@@ -56,7 +60,7 @@ def forward_dynamics(c, w, m):
 
 @helper
 def _solve(c, w, m):
-    """M x = T - C for the free speeds, tips first: pivots as in articulated bodies, and no fill between branches."""
+    """M x = T - C for the free speeds, tips first: pivots are those of articulated bodies, branches do not fill in."""
     free = m.x.shape[0]
     _reverse(m, free)
     for a in range(free):
@@ -99,7 +103,7 @@ def _reverse(m, n):
 def composite_bodies(c, w, m):
     """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
 
-    Needs w.body.inertia, w.pff and w.mode.pfr of all bodies, M_m; leaves R there.
+    Needs M_m of all bodies in w.body.inertia, w.pff and w.mode.pfr, and leaves R there.
     """
     for k in range(c.body.shape[0] - 1, -1, -1):
         if c.body[k].outboard_port >= 0:
@@ -114,24 +118,22 @@ def composite_bodies(c, w, m):
 
 @helper
 def _own_forces(c, w, m, k):
-    """X of body k's own speeds about O into their columns of m.X, and the rows of its modes and wheels among them."""
+    """X of body k's own speeds about O into their columns of m.X, and M of its modes and wheels among themselves."""
     first, modes, wheels = m.hinge[k], m.modes[k], m.wheels[k]
-    p = load_inertia(w.body[k].inertia, 0)
+    R = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].nv):
-        angular, linear = motion_column(c, w, k, n)
-        tau, f = inertia_times(p, (angular, linear))
-        _store_force(m.X, first + n, tau, f)
+        _store_force(m.X, first + n, inertia_times(R, motion_column(c, w, k, n)))
     nm = c.body[k].modes
     for n in range(nm):
-        _store_force(m.X, modes + n, vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3))
+        _store_force(m.X, modes + n, vec6(w.mode[k, n].pfr, 0))
         for i in range(n, nm):
             m.M[modes + n, modes + i] = w.pff[k, n, i]
     count = c.body[k].wheel_stop - c.body[k].wheel_start
     for i in range(count):
         wheel = c.body[k].wheel_start + i
         port, axial = c.wheel[wheel].port, c.wheel[wheel].axial
-        torque = scale(axial, times(mat3(w.port[port].R, 0), vec3(c.wheel[wheel].axis, 0)))
-        _store_force(m.X, wheels + i, torque, (0.0, 0.0, 0.0))
+        torque = scale(axial, spin_axis(c, w, wheel))
+        _store_force(m.X, wheels + i, (torque, (0.0, 0.0, 0.0)))
         out = c.body[k].outboard_port
         for n in range(nm):
             row = dot(vec3(w.port_mode[port, n].W, 0), torque)
@@ -145,9 +147,8 @@ def _own_forces(c, w, m, k):
 def _hinge_rows(c, w, m, k):
     """M(k, j) = H X(j) of the hinge's speeds and all speeds j of what it carries."""
     for n in range(c.body[k].nv):
-        angular, linear = motion_column(c, w, k, n)
         place = m.hinge[k] + n
-        _project(angular, linear, m.X, m.M[place], place, m.stop[k])
+        _project(motion_column(c, w, k, n), m.X, m.M[place], place, m.stop[k])
 
 
 @helper
@@ -156,8 +157,7 @@ def _forces_to_hinge(c, w, m, k):
     i, start, stop = c.body[k].outboard_port, m.carried[k], m.stop[k]
     _shift(scale(-1.0, vec3(w.port[i].r, 0)), m.X, start, stop)
     for n in range(c.body[k].modes):
-        angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
-        _project_off(angular, linear, m.X, m.M[m.modes[k] + n], start, stop)
+        _project_off(mode_motion(w, i, n), m.X, m.M[m.modes[k] + n], start, stop)
 
 
 @helper
@@ -169,8 +169,7 @@ def _forces_to_parent(c, w, m, k):
     _shift(vec3(w.body[k].arm, 0), m.X, start, stop)
     if i >= 0:
         for n in range(c.body[p].modes):
-            angular, linear = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
-            _project(angular, linear, m.X, m.M[m.modes[p] + n], start, stop)
+            _project(mode_motion(w, i, n), m.X, m.M[m.modes[p] + n], start, stop)
         _shift(vec3(w.port[i].r, 0), m.X, start, stop)
     else:
         for n in range(c.body[p].modes):
@@ -179,16 +178,18 @@ def _forces_to_parent(c, w, m, k):
 
 
 @helper
-def _store_force(X, j, tau, f):
-    """Column j of X."""
+def _store_force(X, j, F):
+    """F into column j of X."""
+    tau, f = F
     for i in range(3):
         X[i, j] = tau[i]
         X[3 + i, j] = f[i]
 
 
 @helper
-def _project(angular, linear, X, row, start, stop):
-    """row = [angular; linear]' X in columns start .. stop."""
+def _project(V, X, row, start, stop):
+    """row = V' X in columns start .. stop."""
+    angular, linear = V
     a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
     for j in range(start, stop):
         row[j] = (
@@ -198,8 +199,9 @@ def _project(angular, linear, X, row, start, stop):
 
 
 @helper
-def _project_off(angular, linear, X, row, start, stop):
-    """row -= [angular; linear]' X in columns start .. stop."""
+def _project_off(V, X, row, start, stop):
+    """row -= V' X in columns start .. stop."""
+    angular, linear = V
     a, b, c, d, e, f = X[0], X[1], X[2], X[3], X[4], X[5]
     for j in range(start, stop):
         row[j] -= (
@@ -217,6 +219,7 @@ def _rotate(R, X, start, stop):
 
 @helper
 def _rotate3(R, x, y, z, start, stop):
+    """Vectors with components in rows x, y, z turned by R."""
     for j in range(start, stop):
         a, b, c = x[j], y[j], z[j]
         x[j] = R[0] * a + R[1] * b + R[2] * c

@@ -7,18 +7,20 @@ Theta = phi' - Pi Psi. The modes follow the body and the loads F at its nodes,
     F_0   = y - T (Ups' z_f + Omega y),
 
 hence P_R = M_rr - zeta + Theta' T Theta and z_R = z_r - Psi' z_f + Theta' F_0: no term knows how many modes there are.
-Kept are L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f, as this loses fewest digits. Where M_fr and Pi change with the
-deformation, the tables are made anew at each evaluation.
+What is kept is L' Psi = L^-1 M_fr, L' Ups and L^-1 z_f, which loses the fewest digits. Where M_fr and Pi change with
+the deformation, the tables are made anew at each evaluation.
 """
 
 from math import sqrt
 
 from flexmb.jain.explicit import cholesky, refer_rigid
+from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
-from flexmb.spatial.vector import add_outer, axpy, dot, scale, store3, sub, vec3
-from flexmb.tables.arrays import RUTHLESS
+from flexmb.spatial.spatial_vector import ZERO6, axpy6, dot6, plus6, scale6, store6, sub6, vec6
+from flexmb.spatial.vector import add_outer, vec3
 
 NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
 
@@ -28,21 +30,30 @@ def eliminate_modes(c, w, k):
     """P_R and z_R of (63), (64) from the constants of (B4); False where T does not exist."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
-    if c.body[k].level != RUTHLESS:
+    if not is_at_rest(c.body[k].level):
         _tables(c, w, k)
     elif c.body[k].outboard_port >= 0:
         refer_rigid(c, w, k)
     _to_orthonormal(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b] - w.zeta[r, b]
-    tau, f = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 0)
-    store3(w.body[k].hinge_force, 0, sub(vec3(w.body[k].force, 0), tau))
-    store3(w.body[k].hinge_force, 3, sub(vec3(w.body[k].force, 3), f))
+    F = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 0)
+    store6(w.body[k].hinge_force, 0, sub6(vec6(w.body[k].force, 0), F))
     if nodes == 0:
         return True
     if not node_inertia(w, r, nodes):
         return False
     _responses(c, w, k)
+    _pass_nodes(w, k, r, nodes)
+    return True
+
+
+@helper
+def _pass_nodes(w, k, r, nodes):
+    """F_0 and T Theta of all nodes, and what they are for the rigid motion: P_R += Theta' T Theta, z_R += Theta' F_0.
+
+    Needs T in w.scratch[2] and the nodes' y and Ups' z_f + Omega y.
+    """
     T = w.scratch[2]
     for i in range(nodes):
         for a in range(6):
@@ -64,7 +75,6 @@ def eliminate_modes(c, w, k):
             add_product(w.body[k].hinge_inertia, 0, 1.0, node.theta[a], node.carried[a])
             for b in range(6):
                 w.body[k].hinge_force[b] += node.theta[a, b] * node.force[a]
-    return True
 
 
 @helper
@@ -73,16 +83,14 @@ def _tables(c, w, k):
     r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
     rows, inverse, modes = w.gain[r], c.compliance[r], w.mode[k]
     for n in range(nm):
-        store3(rows[n, 0], 0, scale(inverse[n, n], vec3(modes[n].pfr, 0)))
-        store3(rows[n, 0], 3, scale(inverse[n, n], vec3(modes[n].pfr, 3)))
+        store6(rows[n, 0], 0, scale6(inverse[n, n], vec6(modes[n].pfr, 0)))
     store_inertia(w.zeta[r], 0, _squares(rows, nm, 0))
     omega = w.scratch[0]
     for j in range(nodes):
-        columns = w.port_mode[c.node[r, j].port]
+        port = c.node[r, j].port
         for n in range(nm):
-            store3(rows[n, 1 + j], 0, scale(inverse[n, n], vec3(columns[n].W, 0)))
-            store3(rows[n, 1 + j], 3, scale(inverse[n, n], vec3(columns[n].L, 0)))
-        _theta(rows, nm, j, vec3(w.port[c.node[r, j].port].r, 0), w.node[r, j].theta)
+            store6(rows[n, 1 + j], 0, scale6(inverse[n, n], mode_motion(w, port, n)))
+        _theta(rows, nm, j, vec3(w.port[port].r, 0), w.node[r, j].theta)
         store_full(omega, 6 * j, _squares(rows, nm, 1 + j))
         for i in range(j):
             _products(rows, nm, 1 + j, 1 + i, omega, 6 * j, 6 * i)
@@ -98,7 +106,8 @@ def _squares(rows, nm, j):
     six, nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     found = six, nine, six
     for n in range(nm):
-        found = sum_inertia(found, outer_inertia(vec3(rows[n, j], 0), vec3(rows[n, j], 3), 1.0))
+        x = vec6(rows[n, j], 0)
+        found = sum_inertia(found, outer_inertia(x[0], x[1], 1.0))
     return found
 
 
@@ -137,8 +146,8 @@ def _theta(rows, nm, j, r, theta):
 def semidefinite_root(a, diagonal, root, n):
     """Rows root[:rank] with a[:n,:n] = root' root to round-off; returns the rank. Overwrites a and diagonal (n,).
 
-    Cholesky, if there is a pivot everywhere. Else with complete pivoting, scaled to a unit diagonal: what is left
-    behind is smaller than the last pivot, and units do not matter.
+    By Cholesky where every pivot is positive; otherwise with complete pivoting of the matrix scaled to a unit diagonal,
+    so that what is left behind is smaller than the last pivot, and units do not matter.
     """
     for i in range(n):
         diagonal[i] = a[i, i]
@@ -185,12 +194,11 @@ def _to_orthonormal(c, w, k):
 
 @helper
 def _sum_of_modes(rows, modes, nm, j):
-    """Psi' z_f for j = 0, Ups' z_f of node j - 1 beyond: angular and linear part."""
-    angular = linear = (0.0, 0.0, 0.0)
+    """Psi' z_f for j = 0, Ups' z_f of node j - 1 beyond."""
+    total = ZERO6
     for n in range(nm):
-        angular = axpy(modes[n].zf, vec3(rows[n, j], 0), angular)
-        linear = axpy(modes[n].zf, vec3(rows[n, j], 3), linear)
-    return angular, linear
+        total = axpy6(modes[n].zf, vec6(rows[n, j], 0), total)
+    return total
 
 
 @helper
@@ -199,9 +207,7 @@ def _responses(c, w, k):
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
-        angular, linear = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 1 + i)
-        store3(w.node[r, i].response, 0, angular)
-        store3(w.node[r, i].response, 3, linear)
+        store6(w.node[r, i].response, 0, _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 1 + i))
     for a in range(w.rank[r]):
         s = 0.0
         for i in range(nodes):
@@ -214,20 +220,18 @@ def _responses(c, w, k):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """etadd from the acceleration of O: outward half of (64)."""
-    alpha, a = A
+    """etadd from the acceleration A of O: outward half of (64)."""
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
         node = w.node[r, i]
         for b in range(6):
-            node.response[b] = node.force[b] + dot(vec3(node.carried[b], 0), alpha) + dot(vec3(node.carried[b], 3), a)
+            node.response[b] = plus6(node.force[b], vec6(node.carried[b], 0), A)
     rows, modes = w.gain[r], w.mode[k]
     for n in range(c.body[k].modes):
-        s = modes[n].zf + dot(vec3(rows[n, 0], 0), alpha) + dot(vec3(rows[n, 0], 3), a)
+        s = plus6(modes[n].zf, vec6(rows[n, 0], 0), A)
         for i in range(nodes):
-            response = w.node[r, i].response
-            s += dot(vec3(rows[n, 1 + i], 0), vec3(response, 0)) + dot(vec3(rows[n, 1 + i], 3), vec3(response, 3))
+            s += dot6(vec6(rows[n, 1 + i], 0), vec6(w.node[r, i].response, 0))
         modes[n].etadd = -s
     for i in range(c.body[k].modes):
         row, s = c.compliance[r, i], w.mode[k, i].etadd

@@ -14,9 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from flexmb.dense import hinge_frames
+from flexmb.dense.body_frames import Motions, field, member_frames, on_body, seat_frame
+from flexmb.dense.hinge_frames import hinge_frame
 from flexmb.dense.jets import skew
-from flexmb.dense.kinematics import Motion, field, hinge_frame, member_frames, on_body, seat_frame
-from flexmb.dense.tree import Member, Rotor, Seat, Tree, rigid_model
+from flexmb.dense.members import DenseTree, Member, Rotor, Seat, rigid_model
 from flexmb.scene import schema as s
 from flexmb.typing import Real
 
@@ -73,10 +75,10 @@ class NodalBody:
 class Configuration:
     """A tree of members at coordinates q and speeds u, with every frame and mode shape in World axes."""
 
-    def __init__(self, tree: Tree, q: Real, u: Real) -> None:
+    def __init__(self, tree: DenseTree, q: Real, u: Real) -> None:
         self.tree, self.q, self.u = tree, q, u
         at_rest = np.zeros((1, tree.nu))
-        self._motion = Motion(q + 1j * STEP * coordinate_rates(tree, q, u), at_rest, at_rest)
+        self._motion = Motions(q + 1j * STEP * coordinate_rates(tree, q, u), at_rest, at_rest)
         self._frames = member_frames(tree, self._motion)
 
     def frame(self, k: int) -> tuple[Complex, Complex]:
@@ -120,7 +122,7 @@ class Configuration:
         """Joint map (n,6): velocity of O_k relative to O_k+ for each hinge speed (8)."""
         member = self.tree.members[k]
         n = member.u_hinge.stop - member.u_hinge.start
-        found = hinge_frame(member, self._unit(member.u_hinge))
+        found = hinge_frame(member.hinge, self._unit(member.u_hinge).hinge(member))
         R = self.seat(member.parent, member.inboard)[1]
         angular = np.broadcast_to(found.angular_velocity()[:, 0], (n, 3))
         linear = np.broadcast_to(found.position.rate[:, 0], (n, 3))
@@ -152,13 +154,13 @@ class Configuration:
         p = np.einsum("pab,pb->pa", turned, model.com_offset)
         return NodalBody(A, spatial_inertia(model.mass, turned @ model.inertia @ np.swapaxes(turned, -1, -2), p), p)
 
-    def _unit_modes(self, k: int) -> Motion:
+    def _unit_modes(self, k: int) -> Motions:
         return self._unit(self.tree.members[k].u_modes)
 
-    def _unit(self, speeds: slice) -> Motion:
+    def _unit(self, speeds: slice) -> Motions:
         """One motion with unit speed for each of `speeds`."""
         units = np.eye(self.tree.nu)[speeds]
-        return Motion(self._motion.q, units, np.zeros_like(units))
+        return Motions(self._motion.q, units, np.zeros_like(units))
 
 
 def spatial_inertia(mass: Real, central: NDArray, p: NDArray) -> NDArray:
@@ -168,12 +170,12 @@ def spatial_inertia(mass: Real, central: NDArray, p: NDArray) -> NDArray:
     return np.block([[central - m * cross @ cross, m * cross], [-m * cross, linear]])
 
 
-def with_wheels(tree: Tree) -> Tree:
+def with_wheels(tree: DenseTree) -> DenseTree:
     """The same tree with its wheels as members, after all others: rigid bodies on revolute hinges."""
     return replace(tree, members=[*tree.members, *(_wheel(tree, rotor) for rotor in tree.rotors)], rotors=[])
 
 
-def _wheel(tree: Tree, rotor: Rotor) -> Member:
+def _wheel(tree: DenseTree, rotor: Rotor) -> Member:
     """At level linear a wheel's mass is an element of the body that carries it: its own body has inertia only."""
     wheel = rotor.wheel
     mass = 0.0 if rotor.member in tree.linear else wheel.mass_kg
@@ -184,7 +186,7 @@ def _wheel(tree: Tree, rotor: Rotor) -> Member:
     return Member(wheel.name, rotor.member, hinge, rotor.seat, own, model, "rigid", q, u, none, none)
 
 
-def undeformed(tree: Tree, q: Real, u: Real) -> tuple[Real, Real]:
+def undeformed(tree: DenseTree, q: Real, u: Real) -> tuple[Real, Real]:
     """q and u with eta = etadot = 0 for members of level ruthless, Appendix B (B1)."""
     q, u = q.copy(), u.copy()
     for member in tree.members:
@@ -193,21 +195,10 @@ def undeformed(tree: Tree, q: Real, u: Real) -> tuple[Real, Real]:
     return q, u
 
 
-def coordinate_rates(tree: Tree, q: Real, u: Real) -> Real:
+def coordinate_rates(tree: DenseTree, q: Real, u: Real) -> Real:
     """dq/dt (nq,)."""
     rates = np.zeros(tree.nq)
     for member in tree.members:
         rates[member.q_modes] = u[member.u_modes]
-        at, speeds = q[member.q_hinge], u[member.u_hinge]
-        if isinstance(member.hinge, s.Spherical):
-            speeds = _quaternion_rate(at, speeds)
-        elif isinstance(member.hinge, s.Free):
-            R = hinge_frame(member, Motion(q, np.zeros((1, tree.nu)), np.zeros((1, tree.nu)))).rotation.value[0, 0]
-            speeds = np.concatenate([R @ speeds[3:], _quaternion_rate(at[3:], speeds[:3])])
-        rates[member.q_hinge] = speeds
+        rates[member.q_hinge] = hinge_frames.coordinate_rates(member.hinge, q[member.q_hinge], u[member.u_hinge])
     return rates
-
-
-def _quaternion_rate(x: Real, w: Real) -> Real:
-    """1/2 x (0, w): scalar first, w in turning axes."""
-    return 0.5 * np.concatenate([[-x[1:] @ w], x[0] * w + np.cross(x[1:], w)])

@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 from scipy.linalg import qr, solve_triangular
 
+from flexmb.levels.body import LEVELS
 from flexmb.tables import arrays as a
 
 Elimination = Literal["fastest", "explicit", "woodbury", "condensed"]
@@ -50,14 +51,14 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
         c.speed["prescribed"][c.wheel["u_index"][i]] < 0 for i in range(body["wheel_start"], body["wheel_stop"])
     )
     ridden = np.any((c.body["parent"] == k) & (c.body["inboard_port"] < 0))
-    floating = body["outboard_port"] >= 0 and (body["level"] != a.RUTHLESS or ridden)
+    floating = body["outboard_port"] >= 0 and (not LEVELS[body["level"]].at_rest or ridden)
     if body["modes"] == 0 or floating or free_wheel:
         return False
-    constant = body["level"] == a.RUTHLESS or (
+    constant = LEVELS[body["level"]].at_rest or (
         variant == a.CONDENSED
         and body["orthogonal"]
         and body["point_start"] == body["point_stop"]
-        and not (body["level"] == a.LINEAR and body["mass_slope"] >= 0)
+        and body["mass_slope"] < 0
     )
     return bool(constant) and _is_regular(_Rest.of(c, k, []).M_ff)
 
@@ -71,7 +72,7 @@ def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
     gain earlier, but not what compiling costs.
     """
     body = c.body[k]
-    return bool(body["modes"] >= (8 if body["level"] == a.RUTHLESS else 14) * max(1, nodes))
+    return bool(body["modes"] >= (8 if LEVELS[body["level"]].at_rest else 14) * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:

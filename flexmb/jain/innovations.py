@@ -18,9 +18,9 @@ from math import log, sqrt
 
 from flexmb.hinges.catalogue import REVOLUTE
 from flexmb.jain.explicit import force_to_parent
-from flexmb.jain.forces import wheel_forces
 from flexmb.jain.kinematics import carried_acceleration, motion_column, store_origin_acceleration, velocity_sweep
 from flexmb.jain.sweeps import SINGLE, inward
+from flexmb.jain.wheels import wheel_forces
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.spatial_vector import shift_force

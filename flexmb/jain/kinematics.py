@@ -6,6 +6,7 @@ accelerations are classical (of the hinge point), not spatial; the body order is
 
 from flexmb.hinges import catalogue
 from flexmb.jit.kernel import helper
+from flexmb.levels.body import is_at_rest
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.vector import (
     add,
@@ -22,7 +23,6 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
-from flexmb.tables.arrays import RUTHLESS
 
 
 @helper
@@ -34,7 +34,7 @@ def velocity_sweep(c, w, shape, rates):
     """
     displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
-        exact = c.body[k].level != RUTHLESS
+        exact = not is_at_rest(c.body[k].level)
         if exact or displaced:
             for n in range(c.body[k].modes):
                 w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
@@ -122,7 +122,8 @@ def _cross_hinge(c, w, k):
     omega, v, alpha, a, arm, R_inboard = _inboard(c, w, k)
     i, j, kind = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind
     R_hinge, p_hinge = catalogue.pose(kind, w.q, i, c.body[k].sequence)
-    w_rel, v_rel, alpha_rel, a_rel = catalogue.motion(kind, w.q, i, w.u, j, c.body[k].sequence, w.body[k].hinge_map)
+    V_rel, A_rel = catalogue.motion(kind, w.q, i, w.u, j, c.body[k].sequence, w.body[k].hinge_map)
+    (w_rel, v_rel), (alpha_rel, a_rel) = V_rel, A_rel
     arm = add(arm, times(R_inboard, p_hinge))
     R = matmul(R_inboard, R_hinge)
     # O as a point of the parent, in outboard axes

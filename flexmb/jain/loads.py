@@ -1,60 +1,58 @@
 """Loads across hinges, at wheel bearings, and of drives, from the accelerations the sweeps have found.
 
-Total load (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
+A load is the total one (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
 """
 
-from flexmb.jain.kinematics import motion_column, port_acceleration, port_velocity
+from flexmb.jain.kinematics import motion_column
+from flexmb.jain.ports import port_acceleration, port_velocity
+from flexmb.jain.wheels import spin_axis
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import inertia_times, load_inertia
-from flexmb.spatial.vector import add, axpy, cross, dot, mat3, scale, store3, sub, times, vec3
+from flexmb.spatial.spatial_vector import dot6, store6, sum6, vec6
+from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub
 
 
 @helper
 def hinge_loads(c, w):
-    """f = P_R alpha + z_R at O of every body, body axes, into w.body.load."""
+    """Loads across all hinges, body axes, into w.body.load."""
     for k in range(c.body.shape[0]):
         hinge_load(w, k)
 
 
 @helper
 def hinge_load(w, k):
-    """Load across the hinge of body k into w.body[k].load."""
-    p = load_inertia(w.body[k].hinge_inertia, 0)
-    tau, f = inertia_times(p, (vec3(w.body[k].accel_hinge, 0), vec3(w.body[k].accel_hinge, 3)))
-    store3(w.body[k].load, 0, add(tau, vec3(w.body[k].hinge_force, 0)))
-    store3(w.body[k].load, 3, add(f, vec3(w.body[k].hinge_force, 3)))
+    """F = P_R A + z_R at O of body k, body axes, into w.body[k].load."""
+    P, A = load_inertia(w.body[k].hinge_inertia, 0), vec6(w.body[k].accel_hinge, 0)
+    store6(w.body[k].load, 0, sum6(inertia_times(P, A), vec6(w.body[k].hinge_force, 0)))
 
 
 @helper
 def drive_loads(c, w):
-    """Generalised load of every prescribed speed, H'f, beyond its spring and damper, into w.speed.drive."""
+    """Generalised load of every prescribed speed, H F, beyond its spring and damper, into w.speed.drive."""
     for k in range(c.body.shape[0]):
-        j = c.body[k].u_index
         for n in range(c.body[k].nv):
-            if c.speed[j + n].prescribed >= 0:
+            j = c.body[k].u_index + n
+            if c.speed[j].prescribed >= 0:
                 hinge_load(w, k)
-                angular, linear = motion_column(c, w, k, n)
-                load = dot(angular, vec3(w.body[k].load, 0)) + dot(linear, vec3(w.body[k].load, 3))
-                w.speed[j + n].drive = load - w.speed[j + n].applied
+                w.speed[j].drive = dot6(motion_column(c, w, k, n), vec6(w.body[k].load, 0)) - w.speed[j].applied
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            j_wheel = c.wheel[i].u_index
-            if c.speed[j_wheel].prescribed >= 0:
-                port = c.wheel[i].port
-                axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
-                alpha, _ = port_acceleration(c, w, k, port)
-                torque = c.wheel[i].axial * (w.speed[j_wheel].acceleration + dot(axis, alpha))
-                w.speed[j_wheel].drive = torque - w.speed[j_wheel].applied
+            j = c.wheel[i].u_index
+            if c.speed[j].prescribed >= 0:
+                axis = spin_axis(c, w, i)
+                alpha, _ = port_acceleration(c, w, k, c.wheel[i].port)
+                torque = c.wheel[i].axial * (w.speed[j].acceleration + dot(axis, alpha))
+                w.speed[j].drive = torque - w.speed[j].applied
 
 
 @helper
 def wheel_load(c, w, k, i):
-    """Load of the bearing and motor of wheel i on the wheel about its centre, body axes: (tau, f).
+    """Load [tau; f] of the bearing and motor of wheel i on the wheel about its centre, body axes.
 
     Rate of its angular momentum h = J_t (w - q q.w) + I (thetad + q.w) q; gravity is in the acceleration.
     """
     port = c.wheel[i].port
     mass, axial, transverse = c.wheel[i].mass, c.wheel[i].axial, c.wheel[i].transverse
-    axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
+    axis = spin_axis(c, w, i)
     omega, _ = port_velocity(w, k, port)
     alpha, a = port_acceleration(c, w, k, port)
     j = c.wheel[i].u_index

@@ -20,8 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag, cho_factor, cho_solve
 
-from flexmb.dense.profiles import profile
-from flexmb.dense.system import DenseSystem, Snapshot
+from flexmb.dense.dense_system import DenseSystem, Instant
+from flexmb.dense.function_jets import profile
 from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
 from flexmb.scene import schema as s
 from flexmb.tables import arguments
@@ -274,7 +274,7 @@ class SpatialOperators:
         """M_m (nbar,nbar) and b_m (nbar,); level linear cut off after the first order, in its own body's frame."""
         M_m, b_m = np.zeros((len(V_m), len(V_m))), np.zeros(len(V_m))
         tree = self._dense.tree
-        linear = Snapshot(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}
+        linear = Instant(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}
         for k, at in enumerate(columns):
             if k in linear:
                 to_world = block_diag(np.eye(at.stop - at.start - 6), linear[k].rotation, linear[k].rotation)

@@ -1,34 +1,26 @@
 """What outboard bodies do to the modes of a reduced body, kept at its nodes: of size 6 each, whatever the mode count.
 
 A node is a port that deforms and carries a hinge. With Gamma and y the articulated inertia and force of what is hinged
-there, A the node's acceleration, F its load on the body, modes included: F = Gamma A + y. Nodes are stacked.
+there, and A the acceleration of the node, its load on the body and its modes is F = Gamma A + y. Matrices of several
+nodes have six rows for each.
 """
 
 from math import sqrt
 
 from flexmb.jit.kernel import helper
-from flexmb.spatial.inertia import (
-    inertia_times,
-    load_inertia,
-    rotate_inertia,
-    shift_inertia,
-    store_inertia,
-)
+from flexmb.spatial.inertia import inertia_times, load_inertia, rotate_inertia, shift_inertia, store_inertia
 from flexmb.spatial.pivots import SINGULAR
-from flexmb.spatial.spatial_vector import shift_force
-from flexmb.spatial.vector import mat3, store3, times, vec3
+from flexmb.spatial.spatial_vector import shift_force, store6, times6, vec6
+from flexmb.spatial.vector import mat3, vec3
 
 
 @helper
-def to_node(c, w, k, p, F):
-    """Gamma = P_R^+ and z_R^+ of body k about the node of its parent, parent axes."""
-    tau, f = F
-    R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
+def to_node(c, w, k, P, F):
+    """Gamma = P_R^+ = P and y = z_R^+ = F of body k, referred to the node of its parent, parent axes."""
+    R_parent_body, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     node = w.node[c.body[c.body[k].parent].reduced, c.body[k].node]
-    store_inertia(node.gamma, 0, shift_inertia(rotate_inertia(R, p), arm))
-    tau, f = shift_force((times(R, tau), times(R, f)), arm)
-    store3(node.force, 0, tau)
-    store3(node.force, 3, f)
+    store_inertia(node.gamma, 0, shift_inertia(rotate_inertia(R_parent_body, P), arm))
+    store6(node.force, 0, shift_force(times6(R_parent_body, F), arm))
 
 
 @helper
@@ -43,9 +35,7 @@ def node_inertia(w, r, nodes):
     for i in range(nodes):
         gamma = load_inertia(w.node[r, i].gamma, 0)
         for a in range(rank):
-            tau, f = inertia_times(gamma, (vec3(root[a], 6 * i), vec3(root[a], 6 * i + 3)))
-            store3(B[a], 6 * i, tau)
-            store3(B[a], 6 * i + 3, f)
+            store6(B[a], 6 * i, inertia_times(gamma, vec6(root[a], 6 * i)))
     for a in range(rank):
         for b in range(a + 1):
             s = 1.0 if a == b else 0.0
@@ -74,8 +64,7 @@ def node_inertia(w, r, nodes):
             T[i, j] = s
             T[j, i] = s
     for i in range(nodes):
-        gamma = load_inertia(w.node[r, i].gamma, 0)
-        _add_block(T, 6 * i, gamma)
+        _add_block(T, 6 * i, load_inertia(w.node[r, i].gamma, 0))
     return True
 
 

@@ -8,7 +8,7 @@ enters as acceleration -g of the ground.
 from flexmb.hinges.catalogue import PRISMATIC, REVOLUTE
 from flexmb.jain.doubt import note_hinge
 from flexmb.jain.explicit import cholesky
-from flexmb.jain.forces import elastic_forces, node_loads, wheel_forces
+from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import (
     inboard_acceleration,
     motion_column,
@@ -18,6 +18,7 @@ from flexmb.jain.kinematics import (
     velocity_sweep,
 )
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations, to_parent
+from flexmb.jain.wheels import wheel_forces
 from flexmb.jit.kernel import helper
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces

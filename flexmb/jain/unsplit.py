@@ -11,7 +11,7 @@ from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
-from flexmb.spatial.vector import add, dot, scale, store3, vec3
+from flexmb.spatial.spatial_vector import axpy6, dot6, less6, plus6, store6, sum6, vec6
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Real
 
@@ -22,7 +22,7 @@ class Joint:
 
     D: Real  # (N,m+6,m+6), then its Cholesky factor L
     gain: Real  # (N,m+6,6) P script-H', then L^-1 of it: what of G = P script-H' D^-1 concerns the rigid motion
-    residual: Real  # (N,m+6) epsilon, then L^-1 of it
+    residual: Real  # (N,m+6) epsilon, then L^-1 of it, then the speeds' rates
 
 
 @helper
@@ -51,36 +51,26 @@ def _eliminate(c, w, x, k):
     if c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
     impose(c, w, k)
-    p = load_inertia(w.body[k].inertia, 0)
-    alpha, a = vec3(w.body[k].bias, 0), vec3(w.body[k].bias, 3)
-    moved = inertia_times(p, (alpha, a))
-    tau, f = add(vec3(w.body[k].force, 0), moved[0]), add(vec3(w.body[k].force, 3), moved[1])
+    P, a = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].bias, 0)
+    z = sum6(vec6(w.body[k].force, 0), inertia_times(P, a))
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
-    for n in range(nm):
-        angular, linear = vec3(w.mode[k, n].pfr, 0), vec3(w.mode[k, n].pfr, 3)
-        store3(gain[n], 0, angular)
-        store3(gain[n], 3, linear)
-        residual[n] = -(w.mode[k, n].zf + dot(angular, alpha) + dot(linear, a))
-        for i in range(n + 1):
-            D[n, i] = w.pff[k, n, i]
+    _mode_rows(c, w, x, k, a)
     rows = nm + find_free(c, w, k)
     for n in range(nm, rows):
         j = w.body[k].free_speed[n - nm]
-        angular, linear = motion_column(c, w, k, j)
-        momentum = inertia_times(p, (angular, linear))
-        store3(gain[n], 0, momentum[0])
-        store3(gain[n], 3, momentum[1])
-        residual[n] = w.speed[c.body[k].u_index + j].applied - dot(angular, tau) - dot(linear, f)
+        H = motion_column(c, w, k, j)
+        F = inertia_times(P, H)
+        store6(gain[n], 0, F)
+        residual[n] = less6(w.speed[c.body[k].u_index + j].applied, H, z)
         for i in range(nm):
-            D[n, i] = dot(vec3(gain[i], 0), angular) + dot(vec3(gain[i], 3), linear)
+            D[n, i] = dot6(vec6(gain[i], 0), H)
         for i in range(nm, n + 1):
-            other = motion_column(c, w, k, w.body[k].free_speed[i - nm])
-            D[n, i] = dot(momentum[0], other[0]) + dot(momentum[1], other[1])
+            D[n, i] = dot6(F, motion_column(c, w, k, w.body[k].free_speed[i - nm]))
     if not cholesky(D, rows):
         return False
     note_modes(c, w, k, D)
     note_hinge(c, w, k, D, nm)
-    store_inertia(w.body[k].hinge_inertia, 0, p)
+    store_inertia(w.body[k].hinge_inertia, 0, P)
     for n in range(rows):
         for i in range(n):
             residual[n] -= D[n, i] * residual[i]
@@ -90,14 +80,25 @@ def _eliminate(c, w, x, k):
         residual[n] *= s
         for b in range(6):
             gain[n, b] *= s
-        angular, linear = vec3(gain[n], 0), vec3(gain[n], 3)
-        add_inertia(w.body[k].hinge_inertia, 0, outer_inertia(angular, linear, -1.0))
-        tau, f = add(tau, scale(residual[n], angular)), add(f, scale(residual[n], linear))
-    store3(w.body[k].hinge_force, 0, tau)
-    store3(w.body[k].hinge_force, 3, f)
+        G = vec6(gain[n], 0)
+        add_inertia(w.body[k].hinge_inertia, 0, outer_inertia(G[0], G[1], -1.0))
+        z = axpy6(residual[n], G, z)
+    store6(w.body[k].hinge_force, 0, z)
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), (tau, f))
+        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), z)
     return True
+
+
+@helper
+def _mode_rows(c, w, x, k, a):
+    """The modes' rows of D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
+    D, gain, residual = x.D[k], x.gain[k], x.residual[k]
+    for n in range(c.body[k].modes):
+        P_fr = vec6(w.mode[k, n].pfr, 0)
+        store6(gain[n], 0, P_fr)
+        residual[n] = -plus6(w.mode[k, n].zf, P_fr, a)
+        for i in range(n + 1):
+            D[n, i] = w.pff[k, n, i]
 
 
 @helper
@@ -105,26 +106,22 @@ def _accelerate(c, w, x, k):
     """chi-dot = nu - G' alpha^+ and alpha = alpha^+ + script-H' chi-dot + a: the outward half of (58)."""
     nm = c.body[k].modes
     rows = nm + w.body[k].free_count
-    alpha, a = inboard_acceleration(c, w, k)
-    D, gain, residual = x.D[k], x.gain[k], x.residual[k]
+    D, gain, rates = x.D[k], x.gain[k], x.residual[k]
+    A_plus = inboard_acceleration(c, w, k)
     for n in range(rows - 1, -1, -1):
-        s = residual[n] - dot(vec3(gain[n], 0), alpha) - dot(vec3(gain[n], 3), a)
+        s = less6(rates[n], vec6(gain[n], 0), A_plus)
         for i in range(n + 1, rows):
-            s -= D[i, n] * residual[i]
-        residual[n] = s / D[n, n]
-    moved_alpha = add(alpha, vec3(w.body[k].bias, 0))
-    moved_a = add(a, vec3(w.body[k].bias, 3))
+            s -= D[i, n] * rates[i]
+        rates[n] = s / D[n, n]
     for n in range(nm):
-        w.mode[k, n].etadd = residual[n]
-        w.speed[c.body[k].etad_index + n].acceleration = residual[n]
+        w.mode[k, n].etadd = rates[n]
+        w.speed[c.body[k].etad_index + n].acceleration = rates[n]
+    A = sum6(A_plus, vec6(w.body[k].bias, 0))
     for n in range(nm, rows):
         j = w.body[k].free_speed[n - nm]
-        w.speed[c.body[k].u_index + j].acceleration = residual[n]
-        angular, linear = motion_column(c, w, k, j)
-        moved_alpha = add(moved_alpha, scale(residual[n], angular))
-        moved_a = add(moved_a, scale(residual[n], linear))
-    store_body_acceleration(c, w, k, (moved_alpha, moved_a))
-    store3(w.body[k].accel_hinge, 0, alpha)
-    store3(w.body[k].accel_hinge, 3, a)
+        w.speed[c.body[k].u_index + j].acceleration = rates[n]
+        A = axpy6(rates[n], motion_column(c, w, k, j), A)
+    store_body_acceleration(c, w, k, A)
+    store6(w.body[k].accel_hinge, 0, A_plus)
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         wheel_acceleration(c, w, k, i)

@@ -6,20 +6,16 @@ Scenes with other choices have ReducedConstants: the kernels are compiled again 
 from flexmb.jain import condensed, explicit, woodbury
 from flexmb.jain.reduced import to_node
 from flexmb.jit.kernel import by_bundle, helper
-from flexmb.levels import full
-from flexmb.levels.body import body_inertia
-from flexmb.levels.ruthless import rigid_block_and_bias
-from flexmb.tables.arrays import CONDENSED, EXPLICIT, FULL, RUTHLESS, WOODBURY
+from flexmb.levels.body import body_inertia, inertia_without_masses
+from flexmb.tables.arrays import CONDENSED, EXPLICIT, WOODBURY, ReducedConstants
 
 
 @helper
 def _inertia(c, w, k):
-    if c.body[k].elimination != EXPLICIT and c.body[k].level == RUTHLESS:
-        rigid_block_and_bias(c, w, k)
-    elif c.body[k].elimination == CONDENSED and c.body[k].level == FULL:
-        full.coupling_and_bias(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
-    else:
+    if c.body[k].elimination == EXPLICIT:
         body_inertia(c, w, k)
+    else:
+        inertia_without_masses(c, w, k)  # no summed points: see `flexmb.jain.elimination.applies`
 
 
 @helper
@@ -49,7 +45,7 @@ def _modal_accelerations(c, w, k, A):
         explicit.modal_accelerations(c, w, k, A)
 
 
-inertia = by_bundle("compliance", _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
-eliminate_modes = by_bundle("compliance", _eliminate_modes, explicit.eliminate_modes)
-to_parent = by_bundle("compliance", _to_parent, explicit.to_parent)
-modal_accelerations = by_bundle("compliance", _modal_accelerations, explicit.modal_accelerations)
+inertia = by_bundle(ReducedConstants, _inertia, body_inertia)  # M_m and b_m as far as the variant needs them
+eliminate_modes = by_bundle(ReducedConstants, _eliminate_modes, explicit.eliminate_modes)
+to_parent = by_bundle(ReducedConstants, _to_parent, explicit.to_parent)
+modal_accelerations = by_bundle(ReducedConstants, _modal_accelerations, explicit.modal_accelerations)

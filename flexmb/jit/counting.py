@@ -18,7 +18,8 @@ from typing import Any
 
 import numpy as np
 
-_PACKAGE = f"{__name__.partition('.')[0]}."  # modules whose functions are interpreted too
+_OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
+_CHOOSERS = f"{__package__}.kernel"  # where `by_bundle` and `by_number` make functions that choose; it needs numba
 
 
 @dataclass(frozen=True)
@@ -144,19 +145,16 @@ class _Interpreter:
 
     def __init__(self, scalar: Any) -> None:
         self._scalar = scalar
-        self._namespaces: dict[str, dict[str, Any]] = {}
+        self._namespaces: dict[int, dict[str, Any]] = {}
 
     def __call__(self, thing: Any) -> Any:
         """The twin of a function, of a module of the package, of a function of `math`; all else is its own."""
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if hasattr(thing, "variants"):  # flexmb.jit.kernel.by_bundle
-            array, having, lacking = map(self, thing.variants)
-            return lambda bundle, *rest: (having if hasattr(bundle, array) else lacking)(bundle, *rest)
-        if hasattr(thing, "of_reals"):  # flexmb.jit.kernel.by_number
-            return self(thing.of_reals)
-        if isinstance(thing, ModuleType) and thing.__name__.startswith(_PACKAGE):
+        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ == _CHOOSERS:
+            return self._function(thing)
+        if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":
             return self._scalar.square_root if thing is math.sqrt else self._scalar.elementary(thing)
@@ -170,9 +168,8 @@ class _Interpreter:
         return twin
 
     def _namespace(self, original: dict[str, Any]) -> dict[str, Any]:
-        name = original["__name__"]
-        if name not in self._namespaces:
-            space = self._namespaces[name] = {}
+        if id(original) not in self._namespaces:
+            space = self._namespaces[id(original)] = {}
             for key, value in original.items():
                 space[key] = self(value)
-        return self._namespaces[name]
+        return self._namespaces[id(original)]

@@ -5,10 +5,15 @@ polynomial in eta: it is carried by the integrals P0_n = sum m phi_n x' and P1_n
 points is left. Points with rotating inertia, or with a mass centre off the point, are summed.
 """
 
+import numpy as np
+
 from flexmb.jit.kernel import helper
-from flexmb.levels.integrals import AXIAL, NUMBERS, sum_integrals, symmetric, vector
+from flexmb.levels.affine_integrals import AXIAL, NUMBERS, blocks_of_cross_products, sum_integrals, symmetric, vector
+from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import ModalIntegrals, modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import (
     add,
@@ -89,3 +94,25 @@ def coriolis(omega, flow, turn):
     """tr(P) w - P w of P = sum m v r' with symmetric part `flow` and axial vector `turn`."""
     moved = add(sym_times(flow, omega), scale(0.5, cross(turn, omega)))
     return sub(scale(flow[0] + flow[1] + flow[2], omega), moved)
+
+
+def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
+    """The polynomial part; every point whose inertia turns is summed."""
+    return polynomial(modal_integrals(model), model)
+
+
+def polynomial(i: ModalIntegrals, model: FlexibleModel) -> InertiaTables:
+    """The same of known integrals."""
+    mode, pair = empty_tables(model)
+    pair["mff"], mode["mfr"] = i.M_ff, np.hstack([i.C0.T, i.s1.T])
+    rigid = np.array([i.mass, *i.s0, *six(i.J0)])
+    return InertiaTables(rigid, mode, pair, i.turning, blocks_of_cross_products(i.J1, i.J2))
+
+
+LEVEL = FidelityLevel(
+    name="full",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=coupling_and_bias,
+    tables=tables,
+    cost=1.4,
+)

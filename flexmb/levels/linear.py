@@ -11,10 +11,19 @@ Not a kinetic energy's equations: power is balanced to first order only, and M_m
 The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from flexmb.jit.kernel import helper
+from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six, sixes
 from flexmb.levels.summed_point import add_point
+from flexmb.modal.first_order import FirstOrder, first_order
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import TurningPoints
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym6, sym_axpy, sym_times, vec3
+from flexmb.tables.arrays import SLOPE
 
 
 @helper
@@ -71,3 +80,44 @@ def _mode(c, w, k, n, omega):
     store3(w.mode[k, n].pfr, 0, angular)
     store3(w.mode[k, n].pfr, 3, linear)
     w.mode[k, n].zf = dot(omega, add(sym_times(gyration, omega), coriolis))
+
+
+def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
+    """First order in eta; the rotary inertia of the wheels belongs to their nodes, which turn exactly: it is summed."""
+    points, rotors = _wheels_apart(model, wheels)
+    mode, pair = empty_tables(model)
+    i: FirstOrder = first_order(points)
+    pair["mff"], mode["mfr"], mode["gyration"] = i.M0, np.hstack([i.C0, i.L0]), -0.5 * sixes(i.E)
+    slope = np.zeros(pair.shape, SLOPE)
+    by_mode = np.swapaxes(i.C1, 0, 1)
+    slope["mfr"] = np.concatenate([by_mode, np.swapaxes(i.L1, 0, 1)], axis=2)
+    slope["coriolis"] = by_mode - i.C1
+    slope["gyration"] = sixes(i.G)
+    mass_slope = np.moveaxis(i.M1, 0, 2) if np.any(i.M1) else None
+    rigid = np.array([i.mass, *i.s0, *six(i.J0)])
+    return InertiaTables(rigid, mode, pair, rotors, slope=slope, mass_slope=mass_slope)
+
+
+def _wheels_apart(model: FlexibleModel, wheels: int) -> tuple[FlexibleModel, TurningPoints]:
+    """The model with its wheels as mere masses, and their rotary inertia as points without mass."""
+    first = len(model.mass) - wheels
+    inertia = model.inertia.copy()
+    inertia[first:] = 0.0
+    rotors = TurningPoints(
+        mass=np.zeros(wheels),
+        position=model.position[first:],
+        com_offset=model.com_offset[first:],
+        inertia=model.inertia[first:],
+        translation=model.translation[first:],
+        rotation=model.rotation[first:],
+    )
+    return replace(model, inertia=inertia), rotors
+
+
+LEVEL = FidelityLevel(
+    name="linear",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=inertia_and_bias,
+    tables=tables,
+    cost=1.25,
+)

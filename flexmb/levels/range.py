@@ -1,7 +1,7 @@
 """How far a modal field means anything."""
 
 from flexmb.jit.kernel import helper
-from flexmb.tables.arrays import RUTHLESS
+from flexmb.levels.body import is_at_rest
 
 RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
 
@@ -12,7 +12,7 @@ def is_out_of_range(c, w, k):
 
     eta as the level sees it: a ruthless body never leaves its range.
     """
-    if c.body[k].modes == 0 or c.body[k].level == RUTHLESS:
+    if c.body[k].modes == 0 or is_at_rest(c.body[k].level):
         return False
     body = c.body[k].rigid
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])

@@ -1,6 +1,12 @@
 """Level rigid: no modes. T = 1/2 m v.v + v.(w x s) + 1/2 w.J w."""
 
+import numpy as np
+
 from flexmb.jit.kernel import helper
+from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six, sixes
+from flexmb.modal.first_order import inertia_slope
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
 from flexmb.spatial.vector import cross, store3, sym6, sym_times, vec3
 
@@ -15,3 +21,24 @@ def inertia_and_bias(c, w, k):
     store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
     store3(w.body[k].force, 0, cross(omega, sym_times(j, omega)))
     store3(w.body[k].force, 3, cross(omega, cross(omega, s)))
+
+
+def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
+    """The rest shape."""
+    integrals = modal_integrals(model)
+    n, block = integrals.mode_count, integrals.spatial_mass
+    mode, pair = empty_tables(model)
+    rr = block[n:, n:]
+    pair["mff"], mode["mfr"] = block[:n, :n], block[:n, n:]
+    mode["gyration"] = -0.5 * sixes(inertia_slope(model))
+    return InertiaTables(np.array([rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]), mode, pair)
+
+
+LEVEL = FidelityLevel(
+    name="rigid",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=inertia_and_bias,
+    tables=tables,
+    cost=1.0,
+    flexible=False,
+)

@@ -2,6 +2,7 @@
 
 from flexmb.jit.kernel import helper
 from flexmb.levels import rigid
+from flexmb.levels.level import FidelityLevel
 from flexmb.levels.masses import modal_masses
 from flexmb.spatial.vector import dot, sym6, sym_times, vec3
 
@@ -23,3 +24,13 @@ def rigid_block_and_bias(c, w, k):
     omega = vec3(w.body[k].velocity, 0)
     for n in range(c.body[k].modes):
         w.mode[k, n].zf = dot(omega, sym_times(sym6(c.mode[k, n].gyration, 0), omega))
+
+
+LEVEL = FidelityLevel(
+    name="ruthless",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=rigid_block_and_bias,
+    tables=rigid.tables,
+    cost=1.0,
+    at_rest=True,
+)

@@ -9,8 +9,16 @@ and its acceleration at wdot = vdot = etaddot = 0 is w x (w x rho) + 2 w x rho' 
 are few (`flexmb.modal.equivalent`).
 """
 
+from dataclasses import replace
+
+import numpy as np
+
 from flexmb.jit.kernel import helper
+from flexmb.levels import full
+from flexmb.levels.level import FidelityLevel, InertiaTables
 from flexmb.levels.summed_point import add_point
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import modal_integrals, stacked, still_points
 from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3
 
@@ -86,3 +94,20 @@ def _motion(c, w, k, j):
         bend = axpy(w.mode[k, n].etad, rate, bend)
         store3(w.point_mode[n].L, 0, phi)
     return r, v, bend
+
+
+def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
+    """Every mass is a point to be summed, what turns another; the tables have the masses at rest."""
+    i = modal_integrals(model)
+    masses = np.flatnonzero((model.mass > 0.0) & ~np.any(model.com_offset != 0.0, axis=1))
+    return replace(full.polynomial(i, model), product=None, summed=stacked(still_points(model, masses), i.turning))
+
+
+LEVEL = FidelityLevel(
+    name="stiffened",
+    inertia_and_bias=inertia_and_bias,
+    without_masses=inertia_and_bias,
+    tables=tables,
+    cost=1.8,
+    second_order=True,
+)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from flexmb.linear.model import Complex, LinearModel, Stability
+from flexmb.linear.linear_model import Complex, LinearModel, Stability
 from flexmb.linear.spin import steady_spin
 from flexmb.scene.schema import Scene
 from flexmb.system.system import System, compile
@@ -48,7 +48,7 @@ class Campbell:
 
     def plot(self, path: Path | str, modes: int | None = None) -> Path:
         """Write the diagram as a picture: frequencies and growth rates of the lowest `modes`, by default of all."""
-        from flexmb.linear.picture import write_campbell_plot  # loads matplotlib
+        from flexmb.linear.campbell_picture import write_campbell_plot  # loads matplotlib
 
         return write_campbell_plot(self, Path(path), modes)
 

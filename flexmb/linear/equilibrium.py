@@ -16,7 +16,7 @@ from scipy.linalg import solve_triangular
 from flexmb.linear.linearize import displacement_names
 from flexmb.linear.variations import Equations, Variations, entering
 from flexmb.scene.schema import Scene
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 

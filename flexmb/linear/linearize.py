@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.hinges.catalogue import quaternion_offset
-from flexmb.linear.model import LinearModel
+from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
 from flexmb.system.labels import state_names
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexmb.linear.equilibrium import balanced
+from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.linearize import linear_model
-from flexmb.linear.model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Revolute, Scene
-from flexmb.system.system import System
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 

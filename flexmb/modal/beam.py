@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.interpolation import BendingField, LineField, Mesh
+from flexmb.modal.interpolation import BendingField, ElementMesh, LineField
 from flexmb.modal.section import SectionTable, section_table
 from flexmb.modal.stations import Lump, Stations, quadrature
 from flexmb.scene.bodies import BeamBody
@@ -31,7 +31,7 @@ class BeamElements:
     `fields` maps family to its field, in the canonical order of `FAMILIES`.
     """
 
-    mesh: Mesh
+    mesh: ElementMesh
     table: SectionTable
     fields: dict[str, LineField | BendingField]
 
@@ -137,7 +137,7 @@ def beam_elements(body: BeamBody) -> BeamElements:
     if not body.modes.families:
         raise ValueError(f"beam '{body.name}': modes.families is empty; name at least one of {', '.join(FAMILIES)}")
     table = section_table(body)
-    mesh = Mesh(np.linspace(0.0, body.length_m, body.elements + 1))
+    mesh = ElementMesh(np.linspace(0.0, body.length_m, body.elements + 1))
     fields: dict[str, LineField | BendingField] = {}
     for name in FAMILIES:
         if name not in body.modes.families:

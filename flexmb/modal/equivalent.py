@@ -16,7 +16,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.linalg import qr
 
-from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
+from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
 from flexmb.typing import Real
 
 NEGLIGIBLE = 1e-12

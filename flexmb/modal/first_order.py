@@ -18,7 +18,7 @@ from dataclasses import dataclass, fields, replace
 import numpy as np
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.typing import Real
 
 TOGETHER = 2**18  # vectors by point and pair of modes in memory at once

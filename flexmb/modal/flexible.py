@@ -10,9 +10,9 @@ from msgspec.structs import replace
 from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
+from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
 from flexmb.modal.equivalent import with_equivalent_masses
-from flexmb.modal.model import FlexibleModel, ModalNode, SecondOrder, undeforming_node
-from flexmb.modal.points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, SecondOrder, undeforming_node
 from flexmb.modal.raw import raw_model
 from flexmb.modal.reduce import beam_modes, damping_matrix
 from flexmb.modal.second_order import beam_second_order
@@ -83,7 +83,7 @@ def _second_order(
     return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None
 
 
-def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, ModalNode]:
+def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, FlexibleNode]:
     """Nodes by name: origin, root, tip and the listed ones."""
     modes = columns.shape[1]
     nodes = {"origin": undeforming_node(modes)}
@@ -96,5 +96,5 @@ def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, M
         turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
         second = _second_order(body, elements, columns, np.array([x]), np.zeros((1, 3)))
         of_node = None if second is None else second.map(lambda G: G[0])
-        nodes[name] = ModalNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:], of_node)
+        nodes[name] = FlexibleNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:], of_node)
     return nodes

@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.modal.cross import cross_matrix
-from flexmb.modal.model import FlexibleModel, SecondOrder, join_second
+from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
 from flexmb.typing import Real
 
 

@@ -108,7 +108,7 @@ def bending_shapes(xi: Real, h: Real, shear: bool) -> BendingValues:
 
 
 @dataclass(frozen=True)
-class Mesh:
+class ElementMesh:
     """Equal elements between x = 0 and the beam's length (m)."""
 
     nodes: Real
@@ -128,7 +128,7 @@ class Mesh:
 class LineField:
     """Axial displacement or twist along the mesh. Coordinates: nodal values, then internal ones element by element."""
 
-    mesh: Mesh
+    mesh: ElementMesh
 
     @property
     def size(self) -> int:
@@ -161,7 +161,7 @@ class BendingField:
     `shear`: Timoshenko's kinematics, otherwise Euler-Bernoulli's.
     """
 
-    mesh: Mesh
+    mesh: ElementMesh
     shear: bool
 
     @property

@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.modal.model import FlexibleModel, ModalNode, undeforming_node
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.raw_second_order import node_second_order, second_order
 from flexmb.scene.bodies import ModalBody, Vector
 from flexmb.scene.modal_data import modal_arrays
@@ -46,7 +46,7 @@ def raw_model(body: ModalBody, folder: Path | None = None) -> FlexibleModel:
     )
 
 
-def _nodes(body: ModalBody, modes: int) -> dict[str, ModalNode]:
+def _nodes(body: ModalBody, modes: int) -> dict[str, FlexibleNode]:
     """Nodes by name, with "origin": the body frame, which does not deform."""
     nodes = {"origin": undeforming_node(modes)}
     for node in body.nodes:
@@ -55,7 +55,7 @@ def _nodes(body: ModalBody, modes: int) -> dict[str, ModalNode]:
                 f"modal body '{body.name}': node '{node.name}' has {len(node.translation_modes)} translation and "
                 f"{len(node.rotation_modes)} rotation modes, expected {modes} of each"
             )
-        nodes[node.name] = ModalNode(
+        nodes[node.name] = FlexibleNode(
             np.array(node.position_m, dtype=float),
             Rotation.from_quat(node.quaternion, scalar_first=True).as_matrix(),
             _columns(node.translation_modes),

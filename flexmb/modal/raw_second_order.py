@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.modal.model import SecondOrder
+from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import ModalNode
 from flexmb.scene.modal_data import ModalArrays, node_arrays
 from flexmb.typing import Real

@@ -27,7 +27,7 @@ class BeamModes:
 
 
 @dataclass(frozen=True)
-class _Part:
+class _Coupled:
     """Families coupled with one another: stiffness K and mass M over their free coordinates `index`.
 
     `rigid` (n, r): M-orthonormal rigid motions (none for a clamped beam). `A` is K made positive definite on them,
@@ -86,7 +86,7 @@ def _order(mode: tuple[float, int, Real]) -> tuple[float, int]:
     return float(f"{mode[0]:.8e}"), mode[1]
 
 
-def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Part]:
+def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Coupled]:
     """Groups of families that M couples (K couples none), in order; those without inertia are left out."""
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
@@ -114,17 +114,17 @@ def _coupled(M_ab: Real, M_aa: Real, M_bb: Real) -> bool:
     return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
 
 
-def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Part:
+def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Coupled:
     """Deflate the rigid motions (n, r): with M-orthonormal R, A = K + s M R R' M and M_elastic = M - M R R' M."""
     if rigid.shape[1] == 0:
-        return _Part(index, rigid, K, M, M)
+        return _Coupled(index, rigid, K, M, M)
     MR = M @ rigid
     R = np.linalg.solve(cholesky(rigid.T @ MR, lower=True), rigid.T).T
     deflation = M @ R @ R.T @ M
-    return _Part(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
+    return _Coupled(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
 
 
-def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Real]]:
+def _eigenmodes(part: _Coupled, count: int) -> list[tuple[float, Real]]:
     """Lowest eigenpairs from M phi = omega^-2 K phi: accurate for low modes, and massless coordinates do no harm."""
     size = len(part.index)
     wanted = min(count, size)
@@ -135,7 +135,7 @@ def _eigenmodes(part: _Part, count: int) -> list[tuple[float, Real]]:
 
 
 def _with_attachment(
-    elements: BeamElements, part: _Part, eigenmodes: list[tuple[float, Real]]
+    elements: BeamElements, part: _Coupled, eigenmodes: list[tuple[float, Real]]
 ) -> list[tuple[float, Real]]:
     """Eigenmodes and the deflections under unit tip forces and moments, orthonormalised by the reduced eigenproblem.
 

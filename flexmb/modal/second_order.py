@@ -19,7 +19,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.modal.beam import BeamElements
-from flexmb.modal.model import SecondOrder
+from flexmb.modal.flexible_model import SecondOrder
 from flexmb.typing import Real
 
 GAUSS_POINTS = 6

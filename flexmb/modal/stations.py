@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from flexmb.modal.interpolation import Mesh
+from flexmb.modal.interpolation import ElementMesh
 from flexmb.modal.section import SectionTable
 from flexmb.scene.bodies import BeamBody
 from flexmb.typing import Real
@@ -42,7 +42,7 @@ class Lump:
     inertia: Real
 
 
-def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Real, Real]:
+def quadrature(mesh: ElementMesh, table: SectionTable) -> tuple[Real, Real]:
     """Gauss points and weights (n,) on every piece between nodes and stations, so that kinks cost no accuracy."""
     inside = table.x[(table.x > mesh.nodes[0]) & (table.x < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
@@ -52,7 +52,7 @@ def quadrature(mesh: Mesh, table: SectionTable) -> tuple[Real, Real]:
     return (middle[:, None] + half[:, None] * s).ravel(), (half[:, None] * w).ravel()
 
 
-def inertia_stations(body: BeamBody, mesh: Mesh, table: SectionTable) -> Stations:
+def inertia_stations(body: BeamBody, mesh: ElementMesh, table: SectionTable) -> Stations:
     """The beam's own inertia: at the Gauss points ("consistent") or at the element nodes ("lumped").
 
     Lumped: each node receives the inertia weighted by its hat function. `points = "line"` leaves the section's inertia

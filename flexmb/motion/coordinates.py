@@ -12,7 +12,7 @@ from flexmb.tables.functions import evaluate
 
 @helper
 def load_state(t, y, c, w):
-    """Copy q and u out of y = [q, u, ...]: functions of time at t, prescribed coordinates exact, quaternions unit."""
+    """Take q and u from y = [q, u, ...], functions of time at t: prescribed coordinates exact, quaternions unit."""
     for f in range(c.function.shape[0]):
         value, rate, acceleration = evaluate(
             c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
@@ -75,6 +75,18 @@ def configuration_rate(c, w):
 
 
 @helper
+def store_slope(c, w, power, dy):
+    """dy/dt of y = [q, u, work]: the rates of q and u in the workspace, and the power that `work` collects."""
+    configuration_rate(c, w)
+    nq, nu = w.q.shape[0], w.u.shape[0]
+    for i in range(nq):
+        dy[i] = w.rate[i]
+    for j in range(nu):
+        dy[nq + j] = w.speed[j].acceleration
+    dy[nq + nu] = power
+
+
+@helper
 def hinge_forces(c, w):
     """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
     for j in range(w.u.shape[0]):
@@ -92,3 +104,18 @@ def hinge_forces(c, w):
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             for n in range(3):
                 w.speed[c.body[k].u_index + n].applied -= c.body[k].ball_spring * theta[n]
+
+
+@helper
+def speed_power(c, w):
+    """Power of all dampers, motors and drives along the speeds (W)."""
+    total = 0.0
+    for j in range(w.u.shape[0]):
+        rate = w.u[j]
+        total -= c.speed[j].damping * rate * rate
+        f = c.speed[j].motor
+        if f >= 0:
+            total += w.function[f, 0] * rate
+        if c.speed[j].prescribed >= 0:
+            total += w.speed[j].drive * rate
+    return total

@@ -1,0 +1,1 @@
+"""Runs: a system integrated in time, and what comes out of it."""

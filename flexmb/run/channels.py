@@ -22,7 +22,7 @@ class Path(Protocol):
     def velocity(self) -> Real: ...
 
 
-class Run(Protocol):
+class Recorded(Protocol):
     """A trajectory, ours or another code's: loads (T,6), drives (T,k), energies (T,), momentum (T,6), work (T,)."""
 
     @property
@@ -53,7 +53,7 @@ UNITS = {
 }
 
 
-def channels_of(trajectory: Run) -> dict[str, Real]:
+def channels_of(trajectory: Recorded) -> dict[str, Real]:
     """All signals of a trajectory, each (T, k), in World axes.
 
     Torque and force, angular and linear parts are channels of their own: a norm never mixes units. The total energy is

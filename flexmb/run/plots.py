@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexmb.output.printable import chart_text
-from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.run.trajectory import Trajectory
 
 _SIZE = (9.0, 5.5)  # inches
 _RESOLUTION = 120  # dots per inch

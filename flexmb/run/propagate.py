@@ -1,31 +1,38 @@
-"""Compiled runs: the integrators applied to the equations of motion. Here the two rooms meet; nothing else happens."""
+"""Compiled runs: the integrators applied to the equations of motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from time import perf_counter
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from flexmb.entry import articulated, tangent
-from flexmb.integrate.dop853 import dop853
-from flexmb.integrate.exponential import exponential
-from flexmb.integrate.generalised_alpha import generalised_alpha
-from flexmb.integrate.problem import Problem, problem, stiff_problem
-from flexmb.integrate.radau5 import radau5
-from flexmb.integrate.rk4 import rk4
-from flexmb.integrate.settings import LINEARISING, Settings
+from flexmb.integrate.control import COUNTS, SAMPLES, STOP
+from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
+from flexmb.integrate.settings import Settings
 from flexmb.motion import coordinates, retraction
+from flexmb.run.interruption import interruptible
+from flexmb.run.switching import switch_times
+from flexmb.system.algorithm import Route
+from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
+from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
-_ADAPTIVE = {"dop853": dop853, "radau5": radau5, "exponential": exponential}
 
+class Raw(NamedTuple):
+    """What an integrator leaves: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
 
-class Route(NamedTuple):
-    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold."""
-
-    tables: Callable[[], tuple[Any, Any]]
-    rhs: Any = articulated.rhs
-    project: Any = coordinates.project
+    states: Real
+    status: Status
+    fault: int
+    t: float
+    counts: list[int]
+    compile_s: float
+    run_s: float
+    interrupted: bool
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -33,35 +40,47 @@ def recursion(constants: Constants, workspace: Any) -> Problem:
     return problem(articulated.rhs, coordinates.project, constants, workspace)
 
 
-class Run:
+class Integration:
     """An integrator with a problem and a workspace of its own, ready to be called."""
 
     def __init__(self, route: Route, settings: Settings, exact: Constants, nq: int, nu: int) -> None:
         """exact: the constants with every body eliminated explicitly, for Jacobians."""
         constants, self._workspace = route.tables()
-        self._settings, self._nq, self._controlled = settings, nq, nq + nu
+        self._integrator, self._accuracy = settings.integrator, settings.accuracy(nq, nu)
         motion = route.rhs, route.project, constants, self._workspace
-        if settings.method in LINEARISING:
+        if self._integrator.linearises:
             moving = tangent.tangent_workspace(exact, nq, nu)
             self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
         else:
             self._problem = problem(*motion)
 
-    def __call__(self, y: Real, times: Real, ends: Real, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `flexmb.integrate.dop853.dop853`."""
-        settings, limit = self._settings, self._settings.max_steps
-        tolerances = settings.rtol, settings.atol
-        if settings.method == "rk4":
-            return rk4(self._problem, y, times, ends, settings.step, limit, out, counts)
-        if settings.method == "generalised_alpha":
-            return generalised_alpha(
-                self._problem, y, times, ends, settings.step, settings.radius, self._nq, self._controlled,
-                *tolerances, limit, out, counts,
-            )  # fmt: skip
-        adaptive = _ADAPTIVE[settings.method]
-        return adaptive(self._problem, y, times, ends, *tolerances, self._controlled, limit, out, counts)
+    def __call__(self, y: Real, clock: Clock, out: Real, counts: Index) -> tuple[int, float]:
+        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`."""
+        return self._integrator.run(self._problem, y, clock, self._accuracy, out, counts)
 
     @property
     def fault(self) -> int:
         """Where an evaluation failed."""
         return int(self._workspace.fault[0])
+
+
+def integrate(system: System, route: Route, times: Real, settings: Settings) -> Raw:
+    """Run once over no time at all, which compiles, and then in earnest."""
+    initial = system.initial_state
+    ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
+
+    def run(times: Real, ends: Real, call: Callable[..., tuple[Any, bool]]) -> Raw:
+        y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
+        counts = np.zeros(COUNTS, np.int64)
+        begun = perf_counter()
+        solve = Integration(route, settings, system.constants, system.nq, system.nu)
+        start = perf_counter()
+        (status, t), interrupted = call(solve, (y, Clock(times, ends), out, counts), counts[STOP : STOP + 1])
+        end = perf_counter()
+        return Raw(
+            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start,
+            interrupted,
+        )  # fmt: skip
+
+    compiled = run(times[:1], ends[:0], lambda solve, arguments, _: (solve(*arguments), False))
+    return run(times, ends, interruptible)._replace(compile_s=compiled.compile_s)

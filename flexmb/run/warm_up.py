@@ -9,22 +9,22 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
 
-from flexmb.entry import articulated
-from flexmb.integrate.settings import FIXED, LINEARISING, Method
-from flexmb.jit.kernel import cache_directory
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
+from flexmb.jit.folder import cache_directory
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
-from flexmb.system.system import Algorithm, System, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
+from flexmb.system.system import System, compile
+from flexmb.tables import arguments
 
 Kind = Literal["tree", "condensed", "closed"]
-RUNNING: tuple[Algorithm, ...] = ("articulated", "composite", "frisch", "frisch_as_printed")
-ON_CHAINS: tuple[Algorithm, ...] = ("articulated", "composite")
 
 
 def pendulum() -> Scene:
@@ -60,30 +60,26 @@ def warm_up(
     "closed", scenes with closures. Every method is compiled with every algorithm and scene that `simulate` runs it
     with. Raises ValueError for a name that does not exist.
     """
-    _check("method", methods, get_args(Method))
-    _check("algorithm", algorithms, RUNNING)
-    _check("scene", scenes, get_args(Kind))
+    for what, names, known in (
+        ("method", methods, INTEGRATORS), ("algorithm", algorithms, RUNNING), ("scene", scenes, SCENES),
+    ):  # fmt: skip
+        for name in names:
+            arguments.one_of(what, name, known)
     start = perf_counter()
     for kind in scenes:
         system = compile(SCENES[kind]())
         for algorithm in algorithms:
             for method in methods:
                 if _runs(kind, algorithm, method):
-                    step = 1e-3 if method in FIXED else None
+                    step = 1e-3 if INTEGRATORS[method].fixed else None
                     simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
         _pointwise(system)
     return perf_counter() - start
 
 
-def _check(what: str, names: Sequence[str], known: Sequence[str]) -> None:
-    for name in names:
-        if name not in known:
-            raise ValueError(f"{what} is {name!r}: use one of {', '.join(map(repr, known))}")
-
-
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
     """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
-    if method in LINEARISING and (kind == "closed" or algorithm != "articulated"):
+    if INTEGRATORS[method].linearises and (kind == "closed" or algorithm not in WITH_JACOBIAN):
         return False
     if kind == "closed":
         return algorithm in ON_CHAINS
@@ -106,20 +102,19 @@ def _bob() -> SceneBuilder:
     )
 
 
-def main(arguments: Sequence[str] | None = None) -> None:
+def main(words: Sequence[str] | None = None) -> None:
     """The command line."""
     parser = argparse.ArgumentParser(prog="python -m flexmb.run.warm_up", description=(__doc__ or "").splitlines()[0])
-    parser.add_argument("--method", action="append", choices=get_args(Method), help="beside dop853 and rk4")
+    parser.add_argument("--method", action="append", choices=tuple(INTEGRATORS), help="beside dop853 and rk4")
     parser.add_argument("--algorithm", action="append", choices=RUNNING, help="beside articulated")
     parser.add_argument("--scene", action="append", choices=get_args(Kind), help="beside trees")
-    asked = parser.parse_args(arguments)
+    asked = parser.parse_args(words)
     seconds = warm_up(
         ("dop853", "rk4", *(asked.method or ())),
         ("articulated", *(asked.algorithm or ())),
         ("tree", *(asked.scene or ())),
     )
-    kept = cache_directory(Path(articulated.__file__))
-    print(f"compiled in {seconds:.1f} s, kept in {Path(kept).parent if kept else 'memory only: no folder is writable'}")
+    print(f"compiled in {seconds:.1f} s, kept in {cache_directory() or 'memory only: no folder is writable'}")
 
 
 if __name__ == "__main__":

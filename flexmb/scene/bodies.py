@@ -17,11 +17,11 @@ IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class SceneStruct(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Every struct of the schema refuses unknown keys and is frozen."""
 
 
-class Node(_Strict, frozen=True, kw_only=True):
+class Node(SceneStruct, frozen=True, kw_only=True):
     """A named frame on a rigid body, in the undeformed body frame.
 
     Every body also has the implicit node "origin": the body frame itself.
@@ -32,7 +32,7 @@ class Node(_Strict, frozen=True, kw_only=True):
     quaternion: Quaternion = IDENTITY
 
 
-class RigidBody(_Strict, frozen=True, kw_only=True, tag="rigid", tag_field="kind"):
+class RigidBody(SceneStruct, frozen=True, kw_only=True, tag="rigid", tag_field="kind"):
     """A rigid body: mass, centre of mass in the body frame, inertia about the centre of mass in body axes."""
 
     name: str
@@ -42,7 +42,7 @@ class RigidBody(_Strict, frozen=True, kw_only=True, tag="rigid", tag_field="kind
     nodes: tuple[Node, ...] = ()
 
 
-class BeamStation(_Strict, frozen=True, kw_only=True):
+class BeamStation(SceneStruct, frozen=True, kw_only=True):
     """Section properties at one station; between stations they vary linearly.
 
     x is the beam axis, y and z the principal section axes: `EIz` resists bending in the x-y plane.
@@ -62,7 +62,7 @@ class BeamStation(_Strict, frozen=True, kw_only=True):
     GAz_N: float | None = None
 
 
-class TipMass(_Strict, frozen=True, kw_only=True):
+class TipMass(SceneStruct, frozen=True, kw_only=True):
     """A rigid lump fixed to the beam section at `x_m`; part of the body, hence of its modes."""
 
     x_m: float
@@ -71,7 +71,7 @@ class TipMass(_Strict, frozen=True, kw_only=True):
     inertia_kg_m2: Matrix3 = (ZERO, ZERO, ZERO)
 
 
-class BeamNode(_Strict, frozen=True, kw_only=True):
+class BeamNode(SceneStruct, frozen=True, kw_only=True):
     """A named node at station `x_m`. "root" (x = 0) and "tip" (x = length) exist without being listed."""
 
     name: str
@@ -79,7 +79,7 @@ class BeamNode(_Strict, frozen=True, kw_only=True):
     quaternion: Quaternion = IDENTITY
 
 
-class Modes(_Strict, frozen=True, kw_only=True):
+class Modes(SceneStruct, frozen=True, kw_only=True):
     """Which modes represent the body: the `count` lowest of the wanted families, clamped at the root or free-free.
 
     `static` adds attachment modes (unit tip force and moment in the wanted families) to the eigenmodes; with `count` 0
@@ -98,7 +98,7 @@ class Modes(_Strict, frozen=True, kw_only=True):
     damping_ratio: float | tuple[float, ...] = 0.0
 
 
-class BeamBody(_Strict, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
+class BeamBody(SceneStruct, frozen=True, kw_only=True, tag="beam", tag_field="kind"):
     """A straight beam along +x of the body frame, root at the origin.
 
     `bending_y` is deflection along y (resisted by EIz), `bending_z` along z. `points` says how the section's inertia is
@@ -119,7 +119,7 @@ class BeamBody(_Strict, frozen=True, kw_only=True, tag="beam", tag_field="kind")
     nodes: tuple[BeamNode, ...] = ()
 
 
-class InertiaPoint(_Strict, frozen=True, kw_only=True):
+class InertiaPoint(SceneStruct, frozen=True, kw_only=True):
     """One inertia point of a raw modal body; docs/notation.md has the equations of the modal field.
 
     `translation_modes[n]` and `rotation_modes[n]` are the point's displacement and rotation for unit modal
@@ -138,7 +138,7 @@ class InertiaPoint(_Strict, frozen=True, kw_only=True):
     second_rotation: VectorSquare = ()
 
 
-class ModalNode(_Strict, frozen=True, kw_only=True):
+class ModalNode(SceneStruct, frozen=True, kw_only=True):
     """A node of a raw modal body with its mode shapes.
 
     For level "stiffened" its second-order field too: `second_translation` and `second_rotation` as at an InertiaPoint,
@@ -155,7 +155,7 @@ class ModalNode(_Strict, frozen=True, kw_only=True):
     force_stiffness: tuple[Square, ...] = ()
 
 
-class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
+class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="kind"):
     """Raw points and modes, inline (`points`) or in an `.npz` beside the scene file (`file`).
 
     The `.npz` holds mass (n,), position (n,3), translation_modes (n,3,m), and optionally rotation_modes (n,3,m),
@@ -182,7 +182,7 @@ class ModalBody(_Strict, frozen=True, kw_only=True, tag="modal", tag_field="kind
     nodes: tuple[ModalNode, ...] = ()
 
 
-class SidBody(_Strict, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
+class SidBody(SceneStruct, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
     """A body from a Standard Input Data file (Wallrapp 1994): a scene can contain it, `compile` refuses it so far."""
 
     name: str

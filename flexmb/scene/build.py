@@ -7,7 +7,7 @@ length and map outboard components to inboard ones. Arrays are accepted wherever
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any, Literal, Self, TypedDict, Unpack, get_args, get_type_hints
+from typing import Any, Literal, Self, Unpack, get_args, get_type_hints
 
 import msgspec
 from numpy.typing import ArrayLike
@@ -17,48 +17,23 @@ from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.check import check_scene
 from flexmb.scene.convert import ROOT, label, plain, to_struct
 from flexmb.scene.hinges import Z_AXIS
+from flexmb.scene.options import (
+    Angle,
+    BeamOptions,
+    ClosureFrames,
+    Displacement,
+    ModalMatrices,
+    Placement,
+    SlidingHinge,
+    TurningHinge,
+    WheelMotion,
+    refuse_others,
+)
 from flexmb.scene.problems import closest
 from flexmb.scene.units import split_unit
 
 AT_REST = s.AngularCoordinate()
 IN_PLACE = s.LinearCoordinate()
-
-
-class Placement(TypedDict, total=False):
-    """Where a hinge sits: nodes of parent and child, and the hinge frames' fixed offsets from them (node axes, m)."""
-
-    parent_node: str
-    child_node: str
-    parent_position: ArrayLike
-    parent_quaternion: ArrayLike
-    child_position: ArrayLike
-    child_quaternion: ArrayLike
-
-
-class Angle(TypedDict, total=False):
-    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad),
-    `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time."""
-
-    angle: float
-    rate: float
-    stiffness: float
-    damping: float
-    rest: float
-    torque: s.Function | None
-    prescribed: s.Function | None
-
-
-class Displacement(TypedDict, total=False):
-    """A linear coordinate: initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m),
-    `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of time."""
-
-    position: float
-    rate: float
-    stiffness: float
-    damping: float
-    rest: float
-    force: s.Function | None
-    prescribed: s.Function | None
 
 
 def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
@@ -78,6 +53,12 @@ def angular(**angle: Unpack[Angle]) -> s.AngularCoordinate:
 def linear(**displacement: Unpack[Displacement]) -> s.LinearCoordinate:
     """One displacement of a hinge with several coordinates, or of a point mass."""
     return make(s.LinearCoordinate, **displacement)
+
+
+def _divided(options: Mapping[str, Any], kind: type) -> tuple[dict[str, Any], dict[str, Any]]:
+    """The options that a typed dictionary names, and all others."""
+    own = {key: value for key, value in options.items() if key in kind.__annotations__}
+    return own, {key: value for key, value in options.items() if key not in own}
 
 
 def _collections() -> dict[type, str]:
@@ -152,16 +133,15 @@ class SceneBuilder:
 
     def beam(
         self, name: str, *, length: float, elements: int, section: s.BeamStation | Sequence[s.BeamStation],
-        modes: int | s.Modes, level: s.Level = "full",
-        theory: Literal["euler-bernoulli", "timoshenko"] = "euler-bernoulli",
-        mass: Literal["consistent", "lumped"] = "consistent",
-        points: Literal["line", "rotary", "section"] = "section",
-        tip_masses: Sequence[s.TipMass] = (), nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
+        modes: int | s.Modes, level: s.Level = "full", nodes: Mapping[str, float] | Sequence[s.BeamNode] = (),
+        **model: Unpack[BeamOptions],
     ) -> Self:  # fmt: skip
         """A beam along +x of `length` (m), root at the body origin.
 
         `section`: one BeamStation for a uniform beam (see `beam_section`), or stations from 0 to `length`. `modes`: how
         many clamped-free modes, or a Modes struct. `nodes`: names and stations (m); "root" and "tip" exist anyway.
+        `model`: `theory` ("euler-bernoulli" or "timoshenko"), `mass` ("consistent" or "lumped"), `points` ("section",
+        "rotary" or "line") and `tip_masses`, see BeamBody.
         """
         if isinstance(section, s.BeamStation):
             section = [msgspec.structs.replace(section, x_m=x) for x in (0.0, length)]
@@ -171,14 +151,13 @@ class SceneBuilder:
             nodes = [make(s.BeamNode, name=node, x=x) for node, x in nodes.items()]
         return self._append(
             s.BeamBody, name=name, length=length, elements=elements, stations=section, modes=modes, level=level,
-            theory=theory, mass=mass, points=points, tip_masses=tip_masses, nodes=nodes,
+            nodes=nodes, **model,
         )  # fmt: skip
 
     def modal_body(
         self, name: str, *, points: Sequence[s.InertiaPoint] = (), file: str | None = None,
-        stiffness: ArrayLike = (), damping: ArrayLike = (),
         boundary: Literal["clamped-free", "free-free"] = "clamped-free", level: s.Level = "full",
-        nodes: Sequence[s.ModalNode] = (), gravity_stiffness: ArrayLike = (), gradient_stiffness: ArrayLike = (),
+        nodes: Sequence[s.ModalNode] = (), **matrices: Unpack[ModalMatrices],
     ) -> Self:  # fmt: skip
         """A flexible body of raw points and modes: `points` (see `inertia_points`) or an `.npz` `file`.
 
@@ -186,9 +165,8 @@ class SceneBuilder:
         `gradient_stiffness` (3,3,m,m): geometric stiffness under unit loads (see ModalBody).
         """
         return self._append(
-            s.ModalBody, name=name, points=points, file=file, stiffness=stiffness, damping=damping, boundary=boundary,
-            level=level, nodes=nodes, gravity_stiffness=gravity_stiffness, gradient_stiffness=gradient_stiffness,
-        )  # fmt: skip
+            s.ModalBody, name=name, points=points, file=file, boundary=boundary, level=level, nodes=nodes, **matrices
+        )
 
     def sid_body(self, name: str, *, file: str, level: s.Level = "full") -> Self:
         """A flexible body from a Standard Input Data file."""
@@ -201,37 +179,32 @@ class SceneBuilder:
         return self._append(s.Weld, name=name, parent=parent, child=child, **placement)
 
     def revolute(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, angle: float = 0.0, rate: float = 0.0,
-        stiffness: float = 0.0, damping: float = 0.0, rest: float = 0.0, torque: s.Function | None = None,
-        prescribed: s.Function | None = None, **placement: Unpack[Placement],
-    ) -> Self:  # fmt: skip
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[TurningHinge]
+    ) -> Self:
         """One rotation about the unit vector `axis` (inboard hinge axes).
 
         Initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad), `damping`
-        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time.
+        (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time; and where it sits, as of
+        every hinge.
         """
-        rotation = angular(
-            angle=angle, rate=rate, stiffness=stiffness, damping=damping, rest=rest, torque=torque,
-            prescribed=prescribed,
-        )  # fmt: skip
+        refuse_others("a Revolute", options, TurningHinge)
+        angle, placement = _divided(options, Angle)
+        rotation = make(s.AngularCoordinate, **angle)
         return self._append(
             s.Revolute, name=name, parent=parent, child=child, axis=axis, rotation=rotation, **placement
         )
 
     def prismatic(
-        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, position: float = 0.0, rate: float = 0.0,
-        stiffness: float = 0.0, damping: float = 0.0, rest: float = 0.0, force: s.Function | None = None,
-        prescribed: s.Function | None = None, **placement: Unpack[Placement],
-    ) -> Self:  # fmt: skip
+        self, name: str, parent: str, child: str, *, axis: ArrayLike = Z_AXIS, **options: Unpack[SlidingHinge]
+    ) -> Self:
         """One translation along the unit vector `axis` (inboard hinge axes).
 
         Initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m), `damping` (N s/m), motor
-        `force` (N) or `prescribed` displacement (m) as functions of time.
+        `force` (N) or `prescribed` displacement (m) as functions of time; and where it sits, as of every hinge.
         """
-        translation = linear(
-            position=position, rate=rate, stiffness=stiffness, damping=damping, rest=rest, force=force,
-            prescribed=prescribed,
-        )  # fmt: skip
+        refuse_others("a Prismatic", options, SlidingHinge)
+        displacement, placement = _divided(options, Displacement)
+        translation = make(s.LinearCoordinate, **displacement)
         return self._append(
             s.Prismatic, name=name, parent=parent, child=child, axis=axis, translation=translation, **placement
         )
@@ -301,8 +274,7 @@ class SceneBuilder:
 
     def wheel(
         self, name: str, body: str, *, axis: ArrayLike, mass: float, axial_inertia: float, transverse_inertia: float,
-        node: str = "origin", offset: ArrayLike = ZERO, angle: float = 0.0, speed: float = 0.0, friction: float = 0.0,
-        torque: s.Function | None = None, prescribed: s.Function | None = None,
+        node: str = "origin", **motion: Unpack[WheelMotion],
     ) -> Self:  # fmt: skip
         """A symmetric wheel at a node plus `offset` (m), spinning about the unit vector `axis` (node axes).
 
@@ -310,9 +282,8 @@ class SceneBuilder:
         `friction` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad). The body's mass excludes the wheel.
         """
         return self._append(
-            s.Wheel, name=name, body=body, node=node, offset=offset, axis=axis, mass=mass, axial_inertia=axial_inertia,
-            transverse_inertia=transverse_inertia, angle=angle, speed=speed, friction=friction, torque=torque,
-            prescribed=prescribed,
+            s.Wheel, name=name, body=body, node=node, axis=axis, mass=mass, axial_inertia=axial_inertia,
+            transverse_inertia=transverse_inertia, **motion,
         )  # fmt: skip
 
     def point_mass(
@@ -357,15 +328,13 @@ class SceneBuilder:
     def closure(
         self, name: str,
         type: Literal["weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar"],
-        body_a: str, body_b: str, *, node_a: str = "origin", node_b: str = "origin", axis: ArrayLike = Z_AXIS,
-        position_a: ArrayLike = ZERO, quaternion_a: ArrayLike = IDENTITY, position_b: ArrayLike = ZERO,
-        quaternion_b: ArrayLike = IDENTITY,
+        body_a: str, body_b: str, *, axis: ArrayLike = Z_AXIS, **frames: Unpack[ClosureFrames],
     ) -> Self:  # fmt: skip
         """A loop closure between nodes of two bodies of the tree ("ground" too), plus fixed offsets in node axes (m).
 
-        `axis`: unit vector with the same components in frames A and B.
+        `axis`: unit vector with the same components in frames A and B. `frames`: `node_a`, `position_a` and
+        `quaternion_a` of frame A, and the same of B.
         """
         return self._append(
-            s.Closure, name=name, type=type, body_a=body_a, node_a=node_a, body_b=body_b, node_b=node_b, axis=axis,
-            position_a=position_a, quaternion_a=quaternion_a, position_b=position_b, quaternion_b=quaternion_b,
-        )  # fmt: skip
+            s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
+        )

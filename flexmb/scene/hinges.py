@@ -10,15 +10,15 @@ A coordinate with `prescribed` follows that function of time; its drive load is 
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
-from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector, _Strict
+from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, SceneStruct, Vector
 from flexmb.scene.functions import Function
 
 Z_AXIS: Vector = (0.0, 0.0, 1.0)
 
 
-class _Hinge(_Strict, frozen=True, kw_only=True, tag_field="kind"):
+class _Hinge(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
     name: str
     parent: str
     child: str
@@ -30,7 +30,7 @@ class _Hinge(_Strict, frozen=True, kw_only=True, tag_field="kind"):
     child_quaternion: Quaternion = IDENTITY
 
 
-class AngularCoordinate(_Strict, frozen=True, kw_only=True):
+class AngularCoordinate(SceneStruct, frozen=True, kw_only=True):
     """One angle: initial value and rate, spring, damper, motor, or prescribed motion."""
 
     angle_rad: float = 0.0
@@ -42,7 +42,7 @@ class AngularCoordinate(_Strict, frozen=True, kw_only=True):
     prescribed_rad: Function | None = None
 
 
-class LinearCoordinate(_Strict, frozen=True, kw_only=True):
+class LinearCoordinate(SceneStruct, frozen=True, kw_only=True):
     """One displacement: initial value and rate, spring, damper, motor, or prescribed motion."""
 
     position_m: float = 0.0
@@ -128,9 +128,13 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
 
 
 Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
+WITH_AXIS = tuple(
+    struct.__struct_config__.tag for struct in get_args(Hinge) if "axis" in struct.__struct_fields__
+)
+"""Kinds that have an axis of their own."""
 
 
-class Closure(_Strict, frozen=True, kw_only=True):
+class Closure(SceneStruct, frozen=True, kw_only=True):
     """A loop closure on top of the tree: a hinge between any two nodes, whose motions are not coordinates.
 
     Frame A is the node frame of `body_a` ("ground" too) displaced by `position_a_m`, `quaternion_a` (fixed offsets in

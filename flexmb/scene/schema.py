@@ -23,10 +23,10 @@ from flexmb.scene.bodies import (
     Node,
     Quaternion,
     RigidBody,
+    SceneStruct,
     SidBody,
     TipMass,
     Vector,
-    _Strict,
 )
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
@@ -46,7 +46,7 @@ from flexmb.scene.hinges import (
 )
 
 
-class Wheel(_Strict, frozen=True, kw_only=True):
+class Wheel(SceneStruct, frozen=True, kw_only=True):
     """A symmetric, balanced wheel on a node of a body; `axis` in node axes, centre at the node plus `offset_m`.
 
     The scene's body does NOT include the wheel: `compile` adds the despun wheel (mass, axial and transverse inertia) to
@@ -69,7 +69,7 @@ class Wheel(_Strict, frozen=True, kw_only=True):
     prescribed_rad: Function | None = None
 
 
-class PointMass(_Strict, frozen=True, kw_only=True):
+class PointMass(SceneStruct, frozen=True, kw_only=True):
     """A point mass on a node of a body, free along 0 to 3 orthonormal `directions` (node axes)."""
 
     name: str
@@ -81,7 +81,7 @@ class PointMass(_Strict, frozen=True, kw_only=True):
     coordinates: tuple[LinearCoordinate, ...] = ()
 
 
-class Load(_Strict, frozen=True, kw_only=True):
+class Load(SceneStruct, frozen=True, kw_only=True):
     """A force or torque at a node: `direction` (unit vector, in World or in turning node axes) times `function`.
 
     Unit: N for type "force", Nm for type "torque".
@@ -96,7 +96,7 @@ class Load(_Strict, frozen=True, kw_only=True):
     function: Function
 
 
-class Marker(_Strict, frozen=True, kw_only=True):
+class Marker(SceneStruct, frozen=True, kw_only=True):
     """A named frame whose motion is an output, at a node plus a fixed offset in node axes."""
 
     name: str
@@ -105,7 +105,7 @@ class Marker(_Strict, frozen=True, kw_only=True):
     offset_m: Vector = ZERO
 
 
-class ModalState(_Strict, frozen=True, kw_only=True):
+class ModalState(SceneStruct, frozen=True, kw_only=True):
     """Initial modal coordinates and rates of one flexible body (zero where not listed)."""
 
     body: str
@@ -113,7 +113,7 @@ class ModalState(_Strict, frozen=True, kw_only=True):
     rates: tuple[float, ...] = ()
 
 
-class Scene(_Strict, frozen=True, kw_only=True):
+class Scene(SceneStruct, frozen=True, kw_only=True):
     """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
 
     name: str

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, Unpack
 
 from flexmb.scene.bodies import BeamStation, Matrix3
+from flexmb.scene.options import SectionShape, refuse_others
 
 
 def inertia_moments(
@@ -28,25 +29,19 @@ def cylinder_inertia(mass: float, radius: float, length: float, axis: Literal["x
 
 
 def beam_section(
-    *,
-    E: float,
-    G: float,
-    A: float,
-    Iy: float,
-    Iz: float,
-    rho: float,
-    J: float | None = None,
-    shear_factor: float = 5.0 / 6.0,
-    x: float = 0.0,
+    *, E: float, G: float, A: float, Iy: float, Iz: float, rho: float, **shape: Unpack[SectionShape]
 ) -> BeamStation:
-    """Section of a homogeneous beam at station `x` (m).
+    """Section of a homogeneous beam at station `x` (m), 0 if not given.
 
     E, G: elastic moduli (Pa); A: area (m²); Iy, Iz: second moments of area about the section's y and z (m⁴), so that
     `Iz` resists bending in the x-y plane; rho: density (kg/m³). J: torsion constant (m⁴), Iy + Iz (exact for a circle
-    only) if not given. `shear_factor` k gives the Timoshenko stiffness k G A; 5/6 is that of a rectangle.
+    only) if not given. `shear_factor` k gives the Timoshenko stiffness k G A; 5/6, that of a rectangle, if not given.
+    TypeError for any other name.
     """
+    refuse_others("a beam section", shape, SectionShape)
+    J, k = shape.get("J"), shape.get("shear_factor", 5.0 / 6.0)
     return BeamStation(
-        x_m=x,
+        x_m=shape.get("x", 0.0),
         EA_N=E * A,
         EIy_Nm2=E * Iy,
         EIz_Nm2=E * Iz,
@@ -54,6 +49,6 @@ def beam_section(
         mass_per_length_kg_m=rho * A,
         rotary_y_kg_m=rho * Iy,
         rotary_z_kg_m=rho * Iz,
-        GAy_N=shear_factor * G * A,
-        GAz_N=shear_factor * G * A,
+        GAy_N=k * G * A,
+        GAz_N=k * G * A,
     )

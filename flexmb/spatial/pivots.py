@@ -2,7 +2,7 @@
 
 A pivot at the level of rounding of its own diagonal, or of the inertia of its body, is none: the motion has no inertia.
 Rounding that came from further out, or was magnified on its way, no such comparison tells. A pivot small enough for
-that is noted in w.doubt, at the cost of two comparisons, and who called asks `flexmb.precision`.
+that is noted in w.doubt, at the cost of two comparisons, and the caller asks `flexmb.jain.precision`.
 """
 
 from flexmb.jit.kernel import helper

@@ -60,6 +60,12 @@ def dot6(V, F):
 
 
 @helper
+def less6(s, V, F):
+    """s - V' F: what a load, or a motion, leaves of s; the angular part is taken off first."""
+    return s - dot(V[0], F[0]) - dot(V[1], F[1])
+
+
+@helper
 def times6(R, V):
     """Components in axes A from components in axes B, with R = R_AB."""
     return times(R, V[0]), times(R, V[1])
@@ -81,3 +87,9 @@ def shift_motion(V, d):
 def shift_force(F, d):
     """phi F: the force about Q of one that is known about O."""
     return add(F[0], cross(d, F[1])), F[1]
+
+
+@helper
+def plus6(s, V, F):
+    """s + V' F; the angular part is added first."""
+    return s + dot(V[0], F[0]) + dot(V[1], F[1])

@@ -5,6 +5,6 @@ a difference between codes.
 """
 
 from flexmb.surrogate.points import modal_points as modal_points
-from flexmb.surrogate.rigid import rigidify as rigidify
+from flexmb.surrogate.rigidified import rigidify as rigidify
 from flexmb.surrogate.segments import finite_segments as finite_segments
 from flexmb.surrogate.substructures import substructured as substructured

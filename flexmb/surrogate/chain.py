@@ -12,7 +12,7 @@ from flexmb.modal import flexible_model
 from flexmb.scene.schema import BeamBody, Body, Hinge, Scene
 
 
-class Place(NamedTuple):
+class NodePlace(NamedTuple):
     """Where a node of the beam went: number of the piece from the root, its body, and the node's name there."""
 
     piece: int
@@ -34,7 +34,7 @@ def inboard_hinge(scene: Scene, beam: BeamBody) -> Hinge:
 
 
 def in_pieces(
-    scene: Scene, beam: BeamBody, pieces: Sequence[Body], joints: Sequence[Hinge], places: Mapping[str, Place]
+    scene: Scene, beam: BeamBody, pieces: Sequence[Body], joints: Sequence[Hinge], places: Mapping[str, NodePlace]
 ) -> Scene:
     """The scene with `pieces` and the `joints` between them in the place of `beam`.
 

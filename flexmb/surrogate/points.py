@@ -8,7 +8,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.modal import flexible_model
-from flexmb.modal.model import SecondOrder
+from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import VectorSquare
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.schema import BeamBody, ModalBody, ModalNode, Scene

@@ -22,7 +22,15 @@ from flexmb.scene.schema import (
     Vector,
 )
 from flexmb.scene.tree import rest_frames
-from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at, stiffness_damping
+from flexmb.surrogate.chain import (
+    NodePlace,
+    beams_named,
+    in_pieces,
+    inboard_hinge,
+    outward,
+    piece_at,
+    stiffness_damping,
+)
 from flexmb.surrogate.lumping import beam_piece, quadrature, rigid_body, section_properties
 
 _X: Vector = (1.0, 0.0, 0.0)
@@ -69,7 +77,7 @@ def _segmented(scene: Scene, beam: BeamBody, n: int) -> Scene:
     places = {}
     for name, frame in rest_frames(beam).items():
         piece = piece_at(ends, frame.position[0])
-        places[name] = Place(piece, _segment_name(beam, piece), name)
+        places[name] = NodePlace(piece, _segment_name(beam, piece), name)
     root = places[inboard_hinge(scene, beam).child_node].piece
     joints = outward(_hinges(beam, cuts, ends, root), root)
     return in_pieces(scene, beam, _segments(beam, ends, places), joints, places)
@@ -95,7 +103,7 @@ def _cuts(beam: BeamBody, n: int) -> list[_Cut]:
     return sorted(cuts, key=lambda cut: cut.x)
 
 
-def _segments(beam: BeamBody, ends: list[float], places: dict[str, Place]) -> list[RigidBody]:
+def _segments(beam: BeamBody, ends: list[float], places: dict[str, NodePlace]) -> list[RigidBody]:
     """Rigid pieces between the cuts; each frame at its root end with the beam's axes."""
     frames = rest_frames(beam)
     segments = []

@@ -16,7 +16,15 @@ from flexmb.modal import flexible_model
 from flexmb.scene.check.beams import twisting_points
 from flexmb.scene.schema import BeamBody, BeamStation, Hinge, Level, Modes, Scene, Weld
 from flexmb.scene.tree import rest_frames
-from flexmb.surrogate.chain import Place, beams_named, in_pieces, inboard_hinge, outward, piece_at, stiffness_damping
+from flexmb.surrogate.chain import (
+    NodePlace,
+    beams_named,
+    in_pieces,
+    inboard_hinge,
+    outward,
+    piece_at,
+    stiffness_damping,
+)
 
 _NUMBERS = tuple(key for key in BeamStation.__struct_fields__ if key != "x_m")
 
@@ -55,7 +63,7 @@ def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: i
     for name, frame in rest_frames(beam).items():
         piece = piece_at(ends, frame.position[0])
         # Names stay: the beam's root is the root of the first piece, its tip the tip of the last one.
-        places[name] = Place(piece, _piece_name(beam, piece), name)
+        places[name] = NodePlace(piece, _piece_name(beam, piece), name)
     lag = stiffness_damping(beam)
     parts = [_piece(beam, i, ends, places, replace(beam.modes, count=eigenmodes), level, lag) for i in range(count)]
     root = places[inboard_hinge(scene, beam).child_node].piece
@@ -63,7 +71,7 @@ def _split(scene: Scene, beam: BeamBody, count: int, level: Level, eigenmodes: i
 
 
 def _piece(
-    beam: BeamBody, number: int, ends: list[float], places: dict[str, Place], modes: Modes, level: Level, lag: float
+    beam: BeamBody, number: int, ends: list[float], places: dict[str, NodePlace], modes: Modes, level: Level, lag: float
 ) -> BeamBody:
     """Piece `number` between two of the `ends` (m), `lag` (s) its damping over its stiffness."""
     start, end = ends[number], ends[number + 1]

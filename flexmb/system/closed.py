@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,7 +14,10 @@ from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.system import ClosedMotion, ClosureError, Closures
 from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
-from flexmb.system.system import Algorithm, Evaluation, System
+from flexmb.system import algorithms
+from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.observables import Evaluation
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result, pack
 from flexmb.tables.status import Status
@@ -55,9 +58,7 @@ class ClosedSystem(System):
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
-        _refuse_others(self.scene, algorithm)
-        motion = self.closures.composite_motion if algorithm == "composite" else self.closures.motion
-        found = motion(t, y)
+        found = self._on_chains(algorithm)(self.closures, t, y)
         self._trust(t, y, self.closures)
         return found
 
@@ -72,10 +73,10 @@ class ClosedSystem(System):
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""
-        motion, out = self._motion(t, y, algorithm), self._outputs()
-        out.loads[:] = motion.hinges
-        self._observe_motion(t, y, motion.accelerations, out)
-        found = self._evaluation(t, motion.drives, out)
+        motion, out = self._motion(t, y, algorithm), self._observation.out
+        out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
+        self._observe_motion(t, y, out)
+        found = self._observation.evaluation(t)
         closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
 
@@ -92,18 +93,32 @@ class ClosedSystem(System):
         """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""
         return self.closures.gaps(*self.layout.entering(state))
 
-    def route(self, algorithm: Algorithm, stabilise: float) -> tuple[Any, ...]:
-        """Fields of a `flexmb.run.propagate.Route`; ClosureError where there is no motion to run."""
-        _refuse_others(self.scene, algorithm)
+    def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
+        """The algorithm as runs see it; `stabilise`: see `flexmb.simulate`.
+
+        NotImplementedError for an algorithm that knows trees only, ClosureError where there is no motion to run.
+        """
+        self._on_chains(algorithm)
         if arguments.number("stabilise", stabilise) < 0.0:
             raise ValueError(f"stabilise is {stabilise:g}: give a positive rate (1/s), or 0 to project")
         self._refuse_locked()
 
         def tables() -> tuple[Closed, Closed]:
-            chain = self.closures.chain("composite" if algorithm == "composite" else "articulated", stabilise)
+            chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return tables, closed_dynamics.rhs, closed_dynamics.project
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project)
+
+    def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
+        """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
+        motion = algorithms.chosen(algorithm).closed_motion
+        if motion is None:
+            known = " or ".join(f'"{name}"' for name in algorithms.ON_CHAINS)
+            raise NotImplementedError(
+                f'scene "{self.scene.name}" has closures, which algorithm {algorithm!r} does not know: '
+                f"use algorithm={known}"
+            )
+        return motion
 
     def _refuse_locked(self) -> None:
         start = self.initial_state  # counts the independent rows
@@ -120,11 +135,3 @@ class ClosedSystem(System):
         if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)
-
-
-def _refuse_others(scene: s.Scene, algorithm: Algorithm) -> None:
-    if algorithm not in ("articulated", "composite"):
-        raise NotImplementedError(
-            f'scene "{scene.name}" has closures, which algorithm {algorithm!r} does not know: '
-            'use algorithm="articulated" or "composite"'
-        )

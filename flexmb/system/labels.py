@@ -2,15 +2,10 @@
 
 from __future__ import annotations
 
-from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical
-from flexmb.scene.schema import PointMass
-from flexmb.scene.tree import coordinates
-from flexmb.system.system import System
+from flexmb.hinges.catalogue import kind_of
+from flexmb.system.tree_system import System
 
 Names = tuple[tuple[str, str], ...]
-
-_QUATERNION = [(f"quaternion.{axis}", "1") for axis in "wxyz"]
-_ANGULAR_VELOCITY = [(f"angular_velocity.{axis}", "rad/s") for axis in "xyz"]
 
 
 def state_names(system: System) -> tuple[Names, Names]:
@@ -18,7 +13,7 @@ def state_names(system: System) -> tuple[Names, Names]:
     scene = system.scene
     q, u = [("", "")] * system.nq, [("", "")] * system.nu
     for item in (*scene.hinges, *scene.point_masses):
-        in_q, in_u = _hinge_names(item)
+        in_q, in_u = kind_of(item)[0].names(item)
         q[system.coordinate(item.name)] = [(f"{item.name}.{name}", unit) for name, unit in in_q]
         u[system.speed(item.name)] = [(f"{item.name}.{name}", unit) for name, unit in in_u]
     for body in scene.bodies:
@@ -30,14 +25,3 @@ def state_names(system: System) -> tuple[Names, Names]:
         q[system.coordinate(wheel.name)] = [(f"{wheel.name}.angle", "rad")]
         u[system.speed(wheel.name)] = [(f"{wheel.name}.speed", "rad/s")]
     return tuple(q), tuple(u)
-
-
-def _hinge_names(item: Hinge | PointMass) -> tuple[list[tuple[str, str]], list[tuple[str, str]]]:
-    match item:
-        case Spherical():
-            return _QUATERNION, _ANGULAR_VELOCITY
-        case Free():
-            position = [(f"position.{axis}", "m") for axis in "xyz"]
-            return position + _QUATERNION, _ANGULAR_VELOCITY + [(f"velocity.{axis}", "m/s") for axis in "xyz"]
-    units = [(name, "rad" if isinstance(c, AngularCoordinate) else "m") for name, c in coordinates(item)]
-    return units, [(f"{name}.rate", f"{unit}/s") for name, unit in units]

@@ -76,7 +76,6 @@ class Mechanics:
 
     def __init__(self) -> None:
         self._matrices: Matrices | None = None
-        self._joint: Joint | None = None
         self._held: tuple[Constants, Workspace] | None = None
 
     @property
@@ -171,20 +170,6 @@ class Mechanics:
         """What a failure's number stands for: a body."""
         return self.body_names[fault]
 
-    def _composite(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Accelerations (nu,) and drive loads (nu,) by composite bodies."""
-        self._check(composite.accelerations(t, y, self.constants, self._w, self._places()))
-        self._trust(t, y, self._w)
-        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
-
-    def _unsplit(self, t: float, y: Real) -> tuple[Real, Real]:
-        """Accelerations (nu,) and drive loads (nu,) by the unsplit recursion."""
-        if self._joint is None:
-            self._joint = unsplit.joint(self.constants)
-        self._check(unsplit.accelerations(t, y, self.constants, self._w, self._joint))
-        self._trust(t, y, self._w)
-        return self._w.speed["acceleration"].copy(), self._w.speed["drive"].copy()
-
     def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
@@ -196,6 +181,11 @@ class Mechanics:
         if self._matrices is None:
             self._matrices = matrices(self.constants)
         return self._matrices
+
+    @cached_property
+    def _joint(self) -> Joint:
+        """What the unsplit recursion writes besides the workspace."""
+        return unsplit.joint(self.constants)
 
     @cached_property
     def _is_modal(self) -> NDArray[np.bool_]:

@@ -7,6 +7,7 @@ booleans and None, is a TypeError; lengths that do not fit, NaN and infinity are
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from numbers import Integral, Real
 from typing import Any
 
@@ -75,6 +76,14 @@ def whole(name: str, value: Any) -> int:
     if not isinstance(value, Integral) or isinstance(value, bool):
         raise TypeError(f"{name} is {value!r}: give a whole number")
     return int(value)
+
+
+def one_of(name: str, value: Any, known: Iterable[str]) -> str:
+    """A name that there is; ValueError for another, with those that there are."""
+    names = tuple(known)
+    if not isinstance(value, str) or value not in names:
+        raise ValueError(f"{name} is {value!r}: use one of {', '.join(map(repr, names))}")
+    return value
 
 
 def _kind(values: Any, found: NDArray[Any]) -> str:

@@ -16,8 +16,8 @@ import numpy as np
 from flexmb.jit.bundle import bundle
 from flexmb.typing import Index, Real, Record
 
-RIGID, RUTHLESS, FULL, LINEAR, STIFFENED = range(5)
 EXPLICIT, WOODBURY, CONDENSED = range(3)
+ANGULAR_Z, LINEAR_Z, NO_AXIS = 2, 5, -1
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
 
@@ -30,8 +30,9 @@ def _record(*fields: tuple) -> np.dtype:
 
 BODY = _record(
     ("parent", _I),  # -1 for ground
-    ("level", _I),  # RIGID, RUTHLESS, FULL, LINEAR or STIFFENED
+    ("level", _I),  # numbers of flexmb.levels.body
     ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
+    ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
     ("u_index", _I),  # first hinge speed in u
@@ -136,7 +137,7 @@ class Constants:
     body: Record  # (N,) BODY
     mode: Record  # (N,m) MODE
     pair: Record  # (N,m,m) PAIR
-    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.integrals` has it
+    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.affine_integrals` has it
     slope: Record  # (bodies of level linear,m,m) SLOPE
     mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT

@@ -26,8 +26,8 @@ from crosscheck.library.find import shipped_cases
 from flexmb.advisor.advice import Advice, advise, prepare
 from flexmb.advisor.confirm import Confirmation
 from flexmb.advisor.ladder import STAGES, Step, highest_frequency
-from flexmb.advisor.methods import FINEST, Method, ladders, operations, simulated, steps_within
-from flexmb.advisor.models import LEVELS, Model, Rung, built, flexible_bodies, levels
+from flexmb.advisor.methods import FINEST, RunMethod, ladders, operations, simulated, steps_within
+from flexmb.advisor.models import LEVELS, BodyModel, Model, built, flexible_bodies, levels
 from flexmb.advisor.quantity import error, measured, scales
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
@@ -112,7 +112,7 @@ def true_error(scene: Scene, advice: Advice) -> float:
     assert advice.scene is not None and advice.method is not None
     model = finer(scene, advice)
     stiff = any(rung.pieces > 8 for _, rung in model)
-    tight = Method("radau5" if stiff else "dop853", max(FINEST, 1e-4 * advice.tolerance))
+    tight = RunMethod("radau5" if stiff else "dop853", max(FINEST, 1e-4 * advice.tolerance))
     fine = simulated(compile(built(scene, model)), times, tight)
     assert fine.finished, fine.message
     reference = measured(advice.quantities, fine)
@@ -130,9 +130,9 @@ def finer(scene: Scene, advice: Advice) -> Model:
     for body in bodies:
         level = levels(body)[-1]
         if isinstance(body, BeamBody) and body.name not in bent:
-            found.append((body.name, Rung("pieces", 0, level, pieces=pieces)))
+            found.append((body.name, BodyModel("pieces", 0, level, pieces=pieces)))
         elif isinstance(body, BeamBody):
-            found.append((body.name, Rung("modes", body.modes.count + 12, level, body.modes.static)))
+            found.append((body.name, BodyModel("modes", body.modes.count + 12, level, body.modes.static)))
     return tuple(found)
 
 
@@ -166,7 +166,7 @@ def cheapest_run(confirmation: Confirmation, model: Model, least: float) -> floa
     return least
 
 
-def capped(confirmation: Confirmation, model: Model, method: Method, most: float) -> tuple[float, bool]:
+def capped(confirmation: Confirmation, model: Model, method: RunMethod, most: float) -> tuple[float, bool]:
     """Operations of a run that ends where it has executed `most`, and whether it is within the tolerance."""
     bench, system = confirmation.bench, confirmation.bench.system(model)
     each = bench.operations(model, method.algorithm)
@@ -203,7 +203,7 @@ def choices(steps_of: dict[str, tuple[Step, ...]], chosen: Model) -> Iterator[Mo
     yield from seen
 
 
-def plain(rung: Rung) -> bool:
+def plain(rung: BodyModel) -> bool:
     """At the simplest level, with 0, 1, 2, 4, 8 modes."""
     return rung.level in ("rigid", LEVELS[0]) and rung.modes & (rung.modes - 1) == 0
 

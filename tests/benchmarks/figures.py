@@ -14,7 +14,7 @@ from matplotlib.axes import Axes
 
 import flexmb as fm
 from flexmb.frisch.errata import AS_PRINTED
-from flexmb.frisch.system import nested_system
+from flexmb.frisch.nested_system import nested_system
 from tests.benchmarks import cost_figures
 from tests.benchmarks.rivals import flexible_chain, interleaved, rigid_chain
 from tests.benchmarks.test_nested import nested, recursion

@@ -20,7 +20,7 @@ from msgspec.structs import replace
 import flexmb as fm
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from flexmb.integrate.settings import Method
+from flexmb.integrate.integrator import Method
 from flexmb.scene.schema import Level
 from flexmb.surrogate import finite_segments, substructured
 from tests.benchmarks.rivals import interleaved

@@ -9,7 +9,7 @@ import pytest
 import flexmb as fm
 from flexmb.entry import articulated
 from flexmb.frisch import evaluation
-from flexmb.frisch.system import NestedSystem, nested_system
+from flexmb.frisch.nested_system import NestedSystem, nested_system
 from tests.benchmarks.rivals import flexible_chain, interleaved, record, rigid_chain
 
 

@@ -19,7 +19,7 @@ from crosscheck.engines.contract import Run
 from crosscheck.engines.registry import engine
 from crosscheck.library.find import load_case
 from crosscheck.running.plan import variant_scene
-from flexmb.integrate.settings import Method
+from flexmb.integrate.integrator import Method
 from flexmb.linear.equilibrium import equilibrium
 from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene

@@ -20,7 +20,7 @@ import msgspec
 import numpy as np
 
 import flexmb as fm
-from flexmb.frisch.system import NestedSystem
+from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jain.operators import Operators
 from flexmb.scene import schema
 from flexmb.scene.shapes import beam_section
@@ -304,6 +304,8 @@ def calls() -> dict[str, Call]:
     add("State", fm.State, {"q": state.q.copy(), "u": state.u.copy(), "t": 0.5}, q=rows, u=rows, t=numbers)
     for name in ("coordinate", "speed"):
         add(f"System.{name}", getattr(tree, name), {"name": "elbow"}, name=names)
+    asked = {"algorithm": "articulated", "stabilise": 0.0}
+    add("System.route", lambda **given: tree.route(**given).rhs, asked, stabilise=wrong_only_number, **ALGORITHM)
     add(
         "System.nested",
         lambda algorithm: tree.nested(algorithm).reduced(0.0, W.y),

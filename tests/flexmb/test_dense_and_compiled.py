@@ -13,8 +13,8 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.dense.profiles import profile
+from flexmb.dense.body_frames import Motions, member_frames, point_frames
+from flexmb.dense.function_jets import profile
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma
 
@@ -55,8 +55,8 @@ def pair(request) -> Pair:
 
 def _inertia(dense: DenseSystem, state: flexmb.State, rates: np.ndarray) -> float:
     """sum over points of m (|J| |rates| + |bias acceleration|) times the arm they can have about any hinge."""
-    unit = Motion(state.q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
-    moving = Motion(state.q, state.u[None], np.zeros((1, dense.nu)))
+    unit = Motions(state.q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
+    moving = Motions(state.q, state.u[None], np.zeros((1, dense.nu)))
     velocities = point_frames(dense.tree, member_frames(dense.tree, unit), unit)
     bias = point_frames(dense.tree, member_frames(dense.tree, moving), moving).first.position
     linear = np.einsum("jpa,j->p", np.abs(np.broadcast_to(velocities.position.rate, (dense.nu, *bias.value.shape))),

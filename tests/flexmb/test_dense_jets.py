@@ -5,9 +5,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from flexmb.dense import DenseSystem
-from flexmb.dense.jets import Frame, Jet, rotation_exponential
-from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.dense.profiles import profile
+from flexmb.dense.body_frames import Motions, member_frames, point_frames
+from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import Jet, MovingFrame, rotation_exponential
 from flexmb.scene import schema as s
 from tests.bounds import UNIT_ROUNDOFF, observed_order
 from tests.trees import Recipe, random_scene
@@ -87,9 +87,9 @@ def test_every_inertia_point_of_a_random_tree(seed):
             place = slice(member.q_hinge.stop - 4, member.q_hinge.stop)
             q[place] /= np.linalg.norm(q[place])
 
-    def frames(h: float) -> Frame:
+    def frames(h: float) -> MovingFrame:
         later, speeds = advanced(system, q, u, rates, h)
-        motion = Motion(later, speeds[None], rates[None])
+        motion = Motions(later, speeds[None], rates[None])
         return point_frames(system.tree, member_frames(system.tree, motion), motion).first
 
     now = frames(0.0)

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.interruption import interruptible
 from flexmb.run.warm_up import pendulum
 from flexmb.tables.status import Status
@@ -25,7 +26,7 @@ pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX 
 PRESSED = """
 import os, signal, sys, threading, time
 import flexmb as fm
-import flexmb.run.simulate as simulation
+import flexmb.run.propagate as propagation
 from flexmb.run.warm_up import pendulum
 
 signal.signal(signal.SIGINT, signal.default_int_handler)  # who runs tests in the background ignores Ctrl-C
@@ -39,7 +40,7 @@ def watched(*given):
     threading.Timer(0.3, press).start()
     return whole(*given)
 
-whole, simulation.interruptible = simulation.interruptible, watched
+whole, propagation.interruptible = propagation.interruptible, watched
 """
 PROBE = """
 method, options = sys.argv[1], eval(sys.argv[2])
@@ -50,11 +51,7 @@ except KeyboardInterrupt as stopped:
     print(time.process_time() - pressed, run.status.name, run.stopped_at, len(run.t), run.t[-1], stopped)
 """
 METHODS = {
-    "rk4": {"step": 1e-6},
-    "dop853": {"rtol": 1e-12, "atol": 1e-14},
-    "radau5": {"rtol": 1e-12, "atol": 1e-14},
-    "exponential": {"rtol": 1e-12, "atol": 1e-14},
-    "generalised_alpha": {"step": 1e-6},
+    name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()
 }
 
 

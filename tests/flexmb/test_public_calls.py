@@ -60,9 +60,9 @@ def test_numbers_written_into_a_state_are_seen():
 
 @pytest.mark.parametrize("t", [0, 1])
 def test_an_integer_time_compiles_nothing(t):
-    from flexmb.entry import articulated
+    from flexmb.entry import observation
 
     W.tree.evaluate(0.0, W.state.q, W.state.u)
-    versions = len(articulated.observe.signatures)
+    versions = len(observation.observe.signatures)
     W.tree.evaluate(t, W.state.q, W.state.u)
-    assert len(articulated.observe.signatures) == versions
+    assert len(observation.observe.signatures) == versions

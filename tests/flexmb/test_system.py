@@ -88,7 +88,7 @@ def test_initial_state_holds_the_scenes_values():
 
 
 def test_an_unknown_algorithm_is_refused(system):
-    with pytest.raises(ValueError, match="frisch_as_printed, not 'magic'"):
+    with pytest.raises(ValueError, match="algorithm is 'magic': use one of 'articulated', 'unsplit'"):
         system.accelerations(system.initial_state, "magic")
 
 

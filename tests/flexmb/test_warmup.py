@@ -12,6 +12,7 @@ PROBE = """
 import gc, sys
 import flexmb as fm
 from flexmb.run.warm_up import main
+from flexmb.integrate.catalogue import INTEGRATORS
 from tests.flexmb.warmed import SCENES
 
 def compiled():
@@ -21,7 +22,7 @@ def compiled():
 scene, method, algorithm, *arguments = sys.argv[1:]
 main(arguments)
 before = compiled()
-step = 1e-2 if method in ("rk4", "generalised_alpha") else None
+step = 1e-2 if INTEGRATORS[method].fixed else None
 done = fm.simulate(SCENES[scene](), 0.05, method, samples=3, step=step, algorithm=algorithm)
 assert done.finished, done.message
 print(before, compiled() - before)

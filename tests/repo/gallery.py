@@ -26,9 +26,10 @@ Every picture with what it shows, the command that draws it, and what was found.
 
 ## Stability maps
 
-A map is one case, one quantity and two axes. Cells are refined where the class or the status changes; what failed or
-did not finish has colours of its own; the black line is a boundary known from elsewhere, and a map *agrees* where every
-cell lies within one of the finest cells of where that line has its class. All of them, with their verdicts:
+A map is one case, one quantity and two axes. Cells are refined where the class or the status changes, and cells that
+failed or did not finish have colours of their own. The black line is a boundary known from elsewhere. A map *agrees* if
+every cell is of the class that the line predicts, there or within one of the finest cells. This draws all maps and
+writes their verdicts:
 
 ```sh
 crosscheck stability all --pictures docs/pictures
@@ -37,7 +38,7 @@ crosscheck stability all --pictures docs/pictures
 
 
 class Picture(NamedTuple):
-    """A picture of another room."""
+    """A picture that is not a stability map."""
 
     file: str
     title: str
@@ -46,7 +47,7 @@ class Picture(NamedTuple):
 
 
 def other_pictures() -> list[Picture]:
-    """What docs/gallery.toml lists."""
+    """The pictures that docs/gallery.toml lists."""
     return [Picture(**entry) for entry in tomllib.loads(OTHERS.read_text(encoding="utf-8"))["picture"]]
 
 

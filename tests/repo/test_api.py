@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import inspect
+from typing import get_args, get_type_hints
 
 import pytest
 
@@ -38,7 +39,11 @@ LATER = ("simulate_batch",)
 
 
 def _parameters(function: object) -> set[str]:
-    return set(inspect.signature(function).parameters)  # type: ignore[arg-type]
+    """Names of its arguments, those of a TypedDict that it unpacks included."""
+    found = inspect.signature(function).parameters  # type: ignore[arg-type]
+    hints = get_type_hints(function, include_extras=True)
+    unpacked = [get_args(hints[name])[0] for name, each in found.items() if each.kind is inspect.Parameter.VAR_KEYWORD]
+    return {*found, *(key for each in unpacked for key in each.__annotations__)}
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)

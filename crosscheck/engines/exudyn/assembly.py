@@ -14,26 +14,15 @@ from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
-from flexmb.scene.hinges import (
-    AngularCoordinate,
-    Cylindrical,
-    Free,
-    Gimbal,
-    Hinge,
-    Planar,
-    Prismatic,
-    Revolute,
-    Spherical,
-    Universal,
-    Weld,
-)  # fmt: skip
+from crosscheck.engines.links import axes
+from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical, Weld
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, coordinates, node_frame, ordered
 from flexmb.surrogate.lumping import Inertia, inertia_of, rigid_equivalent
 from flexmb.typing import Real
 
-X, Y, Z = np.eye(3)
+_, Y, Z = np.eye(3)
 CROSS_ARM = 0.01
 """Arm (m) of the massless crosses: displacements are linear in it, so its length does not matter."""
 
@@ -194,16 +183,7 @@ def _attach(
 
 def _steps(hinge: Hinge) -> list[tuple[Real, joints.Coordinate]]:
     """(axis in the carried hinge frame, coordinate) of every freedom, from the inboard side."""
-    match hinge:
-        case Revolute() | Prismatic() | Cylindrical():
-            axes = [_unit(hinge.axis)] * 2
-        case Universal():
-            axes = [X, Y]
-        case Gimbal():
-            axes = [{"x": X, "y": Y, "z": Z}[letter] for letter in hinge.sequence]
-        case Planar():
-            axes = [X, Y, Z]
-    return [(axis, each.coordinate) for axis, each in zip(axes, coordinates(hinge), strict=False)]
+    return [(_unit(axis), each.coordinate) for axis, each in zip(axes(hinge), coordinates(hinge), strict=True)]
 
 
 def _place(

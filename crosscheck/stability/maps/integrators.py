@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
 from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
-from flexmb.integrate.settings import Method as MethodName
+from flexmb.integrate.integrator import Method as MethodName
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import InertiaPoint, ModalNode, Scene

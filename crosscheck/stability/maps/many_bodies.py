@@ -7,7 +7,8 @@ import numpy as np
 from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.system.system import Algorithm, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.system import compile
 from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")

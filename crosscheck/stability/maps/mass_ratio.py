@@ -11,7 +11,8 @@ import numpy as np
 from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
-from flexmb.system.system import Algorithm, compile
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.system import compile
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 

@@ -15,7 +15,7 @@ from flexmb.frisch.parameters import ModeParameters, mode_parameters
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real

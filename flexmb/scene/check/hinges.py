@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.scene.bodies import _Strict
+from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
-from flexmb.scene.hinges import Z_AXIS, AngularCoordinate, Gimbal
+from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
 from flexmb.scene.problems import Place, Problem
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
@@ -31,7 +31,7 @@ def hinges(scene: Scene) -> Iterator[Problem]:
 def closures(scene: Scene) -> Iterator[Problem]:
     """A closure of a kind without an axis must not be given one."""
     for place, closure in sound(scene, "closures"):
-        if closure.axis != Z_AXIS and closure.type not in ("revolute", "prismatic", "cylindrical"):
+        if closure.axis != Z_AXIS and closure.type not in WITH_AXIS:
             what = f"a {closure.type} closure has no axis of its own"
             yield Problem(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
 
@@ -66,7 +66,7 @@ def point_masses(scene: Scene) -> Iterator[Problem]:
         yield from _coordinates(place, item)
 
 
-def _springs(place: Place, item: _Strict) -> Iterator[Problem]:
+def _springs(place: Place, item: SceneStruct) -> Iterator[Problem]:
     for key in NOT_NEGATIVE:
         value = getattr(item, key, 0.0)
         if value < 0.0:
@@ -87,7 +87,7 @@ def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
     return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
 
 
-def _drive(place: Place, item: _Strict, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
+def _drive(place: Place, item: SceneStruct, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
     profile = getattr(item, motion)
     if profile is None:
         return

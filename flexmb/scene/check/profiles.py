@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from math import cos, sin
 
-from flexmb.scene.bodies import _Strict
+from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check.walk import non_finite, values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
@@ -52,7 +52,7 @@ def start_of(function: Function) -> tuple[float, float] | None:
     return None
 
 
-def initial_motion(place: Place, item: _Strict, keys: tuple[str, str], function: Function) -> Iterator[Problem]:
+def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], function: Function) -> Iterator[Problem]:
     """A prescribed coordinate starts where its profile does: initial values are left out, or agree with it.
 
     `keys` are the schema keys of the initial value and rate of `item`.

@@ -11,26 +11,14 @@ from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.randomise import randomise
 from flexmb.scene.build import SceneBuilder, angular, linear, make
 from flexmb.scene.functions import Constant, Sine
-from flexmb.scene.schema import (
-    AngularCoordinate,
-    Cylindrical,
-    Free,
-    Gimbal,
-    Hinge,
-    LinearCoordinate,
-    Node,
-    Planar,
-    Prismatic,
-    Revolute,
-    Scene,
-    Spherical,
-    Universal,
-    Weld,
-)
+from flexmb.scene.hinges import WITH_AXIS
+from flexmb.scene.schema import AngularCoordinate, Gimbal, Hinge, LinearCoordinate, Node, Scene, Spherical
+from tests.trees import STRUCTS, scalar_coordinates
 
-KINDS = (
+_DRAWN = (  # in an order that keeps the random scenes of a seed what they are
     "weld", "revolute", "prismatic", "cylindrical", "universal", "gimbal2", "gimbal3", "spherical", "planar", "free",
 )  # fmt: skip
+KINDS = (*_DRAWN, *(kind for kind in STRUCTS if kind not in (*_DRAWN, "gimbal")))
 
 
 def unit(rng: Generator) -> np.ndarray:
@@ -93,27 +81,16 @@ def _hinge(
         return linear(**_coordinate(rng, "force", drives))
 
     match kind:
-        case "weld":
-            return make(Weld, **values)
-        case "revolute":
-            return make(Revolute, axis=unit(rng), rotation=turn(driven), **values)
-        case "prismatic":
-            return make(Prismatic, axis=unit(rng), translation=shift(driven), **values)
-        case "cylindrical":
-            return make(Cylindrical, axis=unit(rng), rotation=turn(driven), translation=shift(), **values)
-        case "universal":
-            return make(Universal, first=turn(driven), second=turn(), **values)
         case "gimbal2":
             return make(Gimbal, sequence="zx", rotations=(turn(driven), turn()), **values)
         case "gimbal3":
             return make(Gimbal, sequence="zyx", rotations=(turn(driven), turn(), turn()), **values)
         case "spherical":
             return make(Spherical, stiffness=rng.uniform(1.0, 5.0), damping=rng.uniform(0.1, 0.5), **values)
-        case "planar":
-            return make(Planar, x=shift(driven), y=shift(), rotation=turn(), **values)
-        case "free":
-            return make(Free, **values)
-    raise ValueError(kind)
+    axis = {"axis": unit(rng)} if kind in WITH_AXIS else {}
+    drawn = {AngularCoordinate: turn, LinearCoordinate: shift}
+    own = {key: drawn[type(c)](driven and i == 0) for i, (key, c) in enumerate(scalar_coordinates(STRUCTS[kind]))}
+    return make(STRUCTS[kind], **axis, **own, **values)
 
 
 def _coordinate(rng: Generator, motor: str, driven: bool) -> dict:

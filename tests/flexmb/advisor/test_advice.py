@@ -12,8 +12,8 @@ import flexmb as fm
 from flexmb.advisor import advice as advice_module
 from flexmb.advisor.advice import Advice, advise
 from flexmb.advisor.bench import Bench
-from flexmb.advisor.methods import Method
-from flexmb.advisor.models import Rung, built
+from flexmb.advisor.methods import RunMethod
+from flexmb.advisor.models import BodyModel, built
 from flexmb.advisor.quantity import error, measured, quantities, scales
 from flexmb.surrogate import modal_points, substructured
 from tests.flexmb.advisor.scenes import spun, stiff_and_soft, turned
@@ -31,7 +31,7 @@ def true_error(advice: Advice, scene: fm.Scene) -> float:
     return error(measured(wanted, run), reference, scales(wanted, reference))
 
 
-def rung(advice: Advice) -> Rung:
+def rung(advice: Advice) -> BodyModel:
     assert advice.accepted, advice.refusal
     return advice.bodies[0].rung
 
@@ -45,14 +45,14 @@ def gentle() -> tuple[fm.Scene, Advice]:
 def test_rigid_is_enough_for_an_arm_that_hardly_bends() -> None:
     scene = turned(0.5, 4.0)
     advice = advise(scene, 1e-2, t_end=5.0)
-    assert rung(advice) == Rung("rigid")
+    assert rung(advice) == BodyModel("rigid")
     assert true_error(advice, scene) <= advice.tolerance
 
 
 def test_rigid_is_not_enough_for_an_arm_that_bends(gentle: tuple[fm.Scene, Advice]) -> None:
     scene, advice = gentle
-    assert rung(advice) != Rung("rigid")
-    rigid = next(trial for trial in advice.trials if trial.model == (("arm", Rung("rigid")),))
+    assert rung(advice) != BodyModel("rigid")
+    rigid = next(trial for trial in advice.trials if trial.model == (("arm", BodyModel("rigid")),))
     assert rigid.measured > advice.tolerance and not rigid.adequate
     assert true_error(advice, scene) <= advice.tolerance
 
@@ -68,9 +68,9 @@ def test_near_the_critical_speed_only_what_stiffens_is_right() -> None:
     scene = spun(22.0, 1.0)  # first frequency 23.4 rad/s
     advice = advise(scene, 2e-3, "marker:tip.position@0.5", 1.2)
     bench = Bench(scene, 1.2, quantities("marker:tip.position@0.5", scene))
-    fine = bench.run((("arm", Rung("pieces", 0, "stiffened", pieces=4)),), Method("dop853", 1e-8)).signals
+    fine = bench.run((("arm", BodyModel("pieces", 0, "stiffened", pieces=4)),), RunMethod("dop853", 1e-8)).signals
     for level, right in (("full", False), ("stiffened", True)):
-        run = bench.run((("arm", Rung("modes", 2, level)),), Method("dop853", 1e-8))
+        run = bench.run((("arm", BodyModel("modes", 2, level)),), RunMethod("dop853", 1e-8))
         assert (error(run.signals, fine, {"marker:tip.position": 0.5}) <= advice.tolerance) is right, level
     assert rung(advice).level != "full"
     assert true_error(advice, scene) <= advice.tolerance
@@ -101,7 +101,7 @@ def test_indicators_that_lie_are_found_out(monkeypatch: pytest.MonkeyPatch, lie:
     scene = turned(1.0, 0.6)
     monkeypatch.setattr(advice_module, "predicted", lambda rung, body: lie)
     advice = advise(scene, 5e-3, t_end=T_END)
-    assert rung(advice) != Rung("rigid")
+    assert rung(advice) != BodyModel("rigid")
     assert advice.measured <= advice.tolerance
     assert true_error(advice, scene) <= advice.tolerance
 
@@ -167,6 +167,6 @@ def test_bodies_are_chosen_one_by_one() -> None:
     scene = stiff_and_soft(1.0, 0.8)
     advice = advise(scene, 5e-3, t_end=1.0)
     chosen = {each.body: each.rung for each in advice.bodies}
-    assert chosen["arm"] == Rung("rigid")
-    assert chosen["whip"] != Rung("rigid")
+    assert chosen["arm"] == BodyModel("rigid")
+    assert chosen["whip"] != BodyModel("rigid")
     assert advice.measured <= advice.tolerance

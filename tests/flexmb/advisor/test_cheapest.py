@@ -10,9 +10,9 @@ from msgspec.structs import replace
 
 import flexmb as fm
 from flexmb.advisor.advice import Advice, advise, prepare
-from flexmb.advisor.models import Rung, built
+from flexmb.advisor.modal_response import rigid_run
+from flexmb.advisor.models import BodyModel, built
 from flexmb.advisor.quantity import Quantity, error, measured, scales
-from flexmb.advisor.response import rigid_run
 from flexmb.entry.articulated import accelerations
 from flexmb.jit.counting import count
 from flexmb.scene import schema as s
@@ -22,9 +22,9 @@ from tests.flexmb.closure import mechanisms
 
 WANTED = (Quantity("marker:tip.position"),)
 RUNGS = (
-    Rung("rigid"), Rung("sprung"),
-    *(Rung("modes", n, level) for n in (1, 2, 4) for level in ("ruthless", "full", "stiffened")),
-    Rung("segments", pieces=2), Rung("segments", pieces=4), Rung("pieces", 0, "stiffened", pieces=2),
+    BodyModel("rigid"), BodyModel("sprung"),
+    *(BodyModel("modes", n, level) for n in (1, 2, 4) for level in ("ruthless", "full", "stiffened")),
+    BodyModel("segments", pieces=2), BodyModel("segments", pieces=4), BodyModel("pieces", 0, "stiffened", pieces=2),
 )  # fmt: skip
 METHODS = (
     [{"method": "dop853", "rtol": rtol, "atol": 1e-2 * rtol} for rtol in (1e-2, 1e-3, 1e-4)],
@@ -35,7 +35,8 @@ METHODS = (
 def brute_force(scene: fm.Scene, t_end: float, tolerance: float) -> float:
     """Operations of the cheapest run within the tolerance, of every rung above by every method, where the next tighter
     method keeps it too; against four pieces with an eigenmode each."""
-    fine = fm.simulate(built(scene, (("arm", Rung("pieces", 1, "stiffened", pieces=4)),)), t_end, rtol=1e-8, atol=1e-10)
+    finest = (("arm", BodyModel("pieces", 1, "stiffened", pieces=4)),)
+    fine = fm.simulate(built(scene, finest), t_end, rtol=1e-8, atol=1e-10)
     reference = measured(WANTED, fine)
     scale, least = scales(WANTED, reference), np.inf
     for rung in RUNGS:
@@ -62,7 +63,7 @@ def test_nothing_costs_less_than_half_of_what_is_advised(tolerance: float) -> No
     assert dearest > 2.0 * cheapest  # not everything is as cheap as that
 
 
-def answer(advice: Advice) -> tuple[dict[str, Rung], object, int]:
+def answer(advice: Advice) -> tuple[dict[str, BodyModel], object, int]:
     return {each.body: each.rung for each in advice.bodies}, advice.method, advice.evaluations
 
 

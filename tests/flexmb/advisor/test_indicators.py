@@ -8,8 +8,8 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.indicators import indicators, predicted
-from flexmb.advisor.models import Rung
-from flexmb.advisor.response import _oscillators, modal_response, rigid_run
+from flexmb.advisor.modal_response import _oscillators, modal_response, rigid_run
+from flexmb.advisor.models import BodyModel
 from tests.flexmb.advisor.scenes import LENGTH, loaded, spun, turned
 
 EI = 12.0
@@ -42,8 +42,9 @@ def test_a_slow_tip_force_deflects_as_statics_says() -> None:
     assert body.flexibility == pytest.approx(tip, rel=1e-3)
     assert body.static[0] == pytest.approx(12.0 / 1.875104069**4 * tip, rel=1e-3)
     assert body.dynamic[0] < 0.01 * body.static[0]
-    assert predicted(Rung("rigid"), body) == body.flexibility
-    assert predicted(Rung("modes", 1, "full"), body) == pytest.approx(body.static[1:].sum() + body.shortening, rel=1e-3)
+    assert predicted(BodyModel("rigid"), body) == body.flexibility
+    left = body.static[1:].sum() + body.shortening
+    assert predicted(BodyModel("modes", 1, "full"), body) == pytest.approx(left, rel=1e-3)
 
 
 def test_compression_is_measured_in_buckling_loads() -> None:
@@ -67,8 +68,8 @@ def test_past_the_critical_speed_what_does_not_stiffen_is_predicted_to_fail() ->
     _, body = seen(spun(30.0, 2.0), 2.2)
     assert body.spin > 1.0
     for level in ("linear", "full"):
-        assert predicted(Rung("modes", 3, level), body) == np.inf
-    assert predicted(Rung("modes", 3, "stiffened"), body) < 1.0
+        assert predicted(BodyModel("modes", 3, level), body) == np.inf
+    assert predicted(BodyModel("modes", 3, "stiffened"), body) < 1.0
 
 
 def test_a_family_that_is_left_out_counts_with_all_its_modes() -> None:
@@ -76,6 +77,6 @@ def test_a_family_that_is_left_out_counts_with_all_its_modes() -> None:
     run = rigid_run(scene, np.linspace(0.0, 1.0, 201))
     body = indicators(run, scene, modal_response(run, scene, scene.bodies[0]), SCALE)
     families = (), ("bending_y",), ("bending_z",)
-    both, bent, idle = (predicted(Rung("modes", 2, "full", False, some), body) for some in families)
+    both, bent, idle = (predicted(BodyModel("modes", 2, "full", False, some), body) for some in families)
     assert bent < both < idle
-    assert idle == pytest.approx(predicted(Rung("modes", 0, "full", False, ("bending_z",)), body))
+    assert idle == pytest.approx(predicted(BodyModel("modes", 0, "full", False, ("bending_z",)), body))

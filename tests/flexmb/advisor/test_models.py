@@ -9,7 +9,7 @@ from numpy.testing import assert_allclose
 
 import flexmb as fm
 from flexmb.advisor.ladder import highest_frequency, references, rungs
-from flexmb.advisor.models import LEVELS, Rung, built, levels
+from flexmb.advisor.models import LEVELS, BodyModel, built, levels
 from flexmb.advisor.sprung import fitted_hinge, spring_hinged
 from flexmb.modal import flexible_model
 from flexmb.surrogate import modal_points
@@ -39,19 +39,19 @@ def test_other_modes_keep_what_they_can_of_the_initial_state() -> None:
     bent = (0.01, -0.02, 0.005)
     base = beam(fm.SceneBuilder("bent")).revolute("pin", "ground", "arm").marker("tip", "arm", node="tip").scene()
     scene = replace(base, modal_states=(fm.ModalState(body="arm", coordinates=bent, rates=(0.3, 0.0, -0.1)),))
-    more = built(scene, (("arm", Rung("modes", 5, "full")),)).modal_states[0]
+    more = built(scene, (("arm", BodyModel("modes", 5, "full")),)).modal_states[0]
     assert_allclose(more.coordinates, (*bent, 0.0, 0.0), atol=1e-12)
     assert_allclose(more.rates, (0.3, 0.0, -0.1, 0.0, 0.0), atol=1e-12)
-    fewer = built(scene, (("arm", Rung("modes", 2, "linear")),)).modal_states[0]
+    fewer = built(scene, (("arm", BodyModel("modes", 2, "linear")),)).modal_states[0]
     assert_allclose(fewer.coordinates, bent[:2], atol=1e-12)
-    assert built(scene, (("arm", Rung("rigid")),)).modal_states == ()
+    assert built(scene, (("arm", BodyModel("rigid")),)).modal_states == ()
 
 
 def test_damping_listed_by_mode_is_cut_or_continued() -> None:
     scene = turned(1.0, 0.5)
     body = replace(scene.bodies[0], modes=replace(scene.bodies[0].modes, damping_ratio=(0.01, 0.02, 0.03)))
     scene = replace(scene, bodies=(body,))
-    ratios = [built(scene, (("arm", Rung("modes", n, "full")),)).bodies[0].modes.damping_ratio for n in (2, 5)]
+    ratios = [built(scene, (("arm", BodyModel("modes", n, "full")),)).bodies[0].modes.damping_ratio for n in (2, 5)]
     assert ratios == [(0.01, 0.02), (0.01, 0.02, 0.03, 0.03, 0.03)]
 
 
@@ -77,10 +77,10 @@ def test_raw_modes_are_cut_to_the_lowest_eigenmodes_they_span() -> None:
     raw = replace(raw, damping=tuple((0.0,) * 3 for _ in range(3)))
     mixed_scene = replace(scene, bodies=(raw,))
     for n in (1, 2, 3):
-        cut = highest_frequency(mixed_scene, (("arm", Rung("modes", n, "full")),))
+        cut = highest_frequency(mixed_scene, (("arm", BodyModel("modes", n, "full")),))
         known = np.sqrt(np.array(body.stiffness)[n - 1, n - 1])
         assert cut == pytest.approx(known, rel=1e-9)
-    fm.compile(built(mixed_scene, (("arm", Rung("modes", 2, "full")),)))
+    fm.compile(built(mixed_scene, (("arm", BodyModel("modes", 2, "full")),)))
 
 
 def test_raw_modes_take_their_second_order_field_along() -> None:
@@ -90,7 +90,7 @@ def test_raw_modes_take_their_second_order_field_along() -> None:
     raw = modal_points(stiff)
     assert levels(raw.bodies[0]) == LEVELS
     assert levels(modal_points(scene).bodies[0]) == LEVELS[:-1]
-    rung = (("arm", Rung("modes", 2, "stiffened")),)
+    rung = (("arm", BodyModel("modes", 2, "stiffened")),)
     one, two = (fm.compile(built(each, rung)) for each in (stiff, raw))
     q, u = one.initial_state.q.copy(), one.initial_state.u.copy()
     q[one.coordinate("arm.modes")], u[one.speed("arm.modes")] = (0.05, -0.01), (0.3, 0.2)

@@ -11,17 +11,18 @@ from scipy.spatial.transform import Rotation
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.jets import Frame
-from flexmb.dense.kinematics import Motion, member_frames, seat_frame
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Seat
-from flexmb.modal.model import ModalNode
+from flexmb.dense.body_frames import Motions, member_frames, seat_frame
+from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import MovingFrame
+from flexmb.dense.members import Seat
+from flexmb.modal.flexible_model import FlexibleNode
 from flexmb.scene import schema as s
+from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.tree import rest_frames
 from tests import trees
 
 Array = np.ndarray
-NOWHERE = ModalNode(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.zeros((3, 0)))
+NOWHERE = FlexibleNode(np.zeros(3), np.eye(3), np.zeros((3, 0)), np.zeros((3, 0)))
 
 
 def seat(dense: DenseSystem, body: str, node: str, position: Array, quaternion: Array) -> tuple[int, Seat]:
@@ -31,7 +32,7 @@ def seat(dense: DenseSystem, body: str, node: str, position: Array, quaternion: 
     return k, Seat(at, np.array(position, float), Rotation.from_quat(quaternion, scalar_first=True).as_matrix())
 
 
-def relative_frame(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Frame:
+def relative_frame(dense: DenseSystem, closure: s.Closure, motion: Motions) -> MovingFrame:
     """Frame B seen from frame A, as jets (B,1,...)."""
     frames = member_frames(dense.tree, motion)
     a = seat(dense, closure.body_a, closure.node_a, closure.position_a_m, closure.quaternion_a)
@@ -55,7 +56,7 @@ def suppressed(closure: s.Closure) -> tuple[list[tuple[Array, Array]], list[Arra
     return turns, {"prismatic": [x, y], "cylindrical": [x, y], "planar": [ez]}.get(closure.type, [ex, ey, ez])
 
 
-def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
+def rows(dense: DenseSystem, closure: s.Closure, motion: Motions) -> Array:
     """(3,B,G) values, rates, accelerations of what a closure keeps zero: products of axes, components of position."""
     B = relative_frame(dense, closure, motion)
     turns, steps = suppressed(closure)
@@ -73,7 +74,7 @@ def rows(dense: DenseSystem, closure: s.Closure, motion: Motion) -> Array:
 def wrenches(scene: s.Scene, q: Array) -> dict[str, Array]:
     """(6,G) by closure: [torque about B; force] on its body_b, World axes, of unit loads of all rows."""
     dense = DenseSystem(scene)
-    still = Motion(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
+    still = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
     frames = member_frames(dense.tree, still)
     found, start = {}, 0
     count = sum(sum(map(len, suppressed(closure))) for closure in scene.closures)
@@ -119,8 +120,8 @@ def constrained(scene: s.Scene, q: Array, u: Array, t: float = 0.0) -> Constrain
     """The closed chain at a state, densely."""
     dense = DenseSystem(scene)
     q, u = dense.on_profile(q, u, t)
-    unit = Motion(q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
-    moving = Motion(q, u[None], np.zeros((1, dense.nu)))
+    unit = Motions(q, np.eye(dense.nu), np.zeros((dense.nu, dense.nu)))
+    moving = Motions(q, u[None], np.zeros((1, dense.nu)))
     J = np.concatenate([rows(dense, closure, unit)[1] for closure in scene.closures], axis=1).T
     value, rate, gamma = np.concatenate([rows(dense, c, moving)[:, 0] for c in scene.closures], axis=1)
     free = np.ones(dense.nu, dtype=bool)
@@ -163,7 +164,7 @@ def random_closure(
     """A closure between random nodes of two bodies, closed at the scene's initial coordinates."""
     bodies = {body.name: list(rest_frames(body)) for body in scene.bodies} | {"ground": ["origin"]}
     node = {body: str(rng.choice(bodies[body])) for body in (body_a, body_b)}
-    axis = trees.direction(rng) if kind in ("revolute", "prismatic", "cylindrical") else (0.0, 0.0, 1.0)
+    axis = trees.direction(rng) if kind in WITH_AXIS else (0.0, 0.0, 1.0)
     guess = s.Closure(
         name=name, type=kind, body_a=body_a, node_a=node[body_a], body_b=body_b, node_b=node[body_b],
         position_a_m=tuple(trees.vector(rng, 0.3)), quaternion_a=tuple(trees.quaternion(rng)), axis=tuple(axis),
@@ -174,7 +175,7 @@ def random_closure(
 def closed(scene: s.Scene, dense: DenseSystem, guess: s.Closure, R_hinge: Array, p_hinge: Array) -> s.Closure:
     """The closure with its frame B where its hinge puts it: R R_b = R_hinge, p + R p_b = p_hinge."""
     state = flexmb.System(scene).initial_state
-    B = relative_frame(dense, guess, Motion(state.q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu))))
+    B = relative_frame(dense, guess, Motions(state.q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu))))
     R, p = B.rotation.value[0, 0], B.position.value[0, 0]
     turn = Rotation.from_matrix(R.T @ R_hinge).as_quat(scalar_first=True)
     return msgspec.structs.replace(
@@ -210,8 +211,8 @@ def on_hinges(scene: s.Scene, q: Array, u: Array, rates: Array, closures: dict[s
     """
     dense = DenseSystem(scene)
     found = dense.hinge_loads(0.0, q, u, rates)
-    still = Motion(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
-    at_rest = Motion(dense._undeformed(q), still.u, still.rates)
+    still = Motions(q, np.zeros((1, dense.nu)), np.zeros((1, dense.nu)))
+    at_rest = Motions(dense._undeformed(q), still.u, still.rates)
     frames, rest = member_frames(dense.tree, still), member_frames(dense.tree, at_rest)
     for closure in scene.closures:
         side = seat(dense, closure.body_b, closure.node_b, closure.position_b_m, closure.quaternion_b)

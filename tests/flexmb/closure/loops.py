@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from typing import get_args, get_type_hints
 
 import msgspec
 import numpy as np
@@ -13,10 +14,11 @@ from numpy.random import Generator
 from flexmb.dense import DenseSystem
 from flexmb.scene import schema as s
 from flexmb.scene.build import angular, linear
+from flexmb.scene.hinges import WITH_AXIS
 from tests import trees
 from tests.flexmb.closure import chains
 
-KINDS = ("weld", "revolute", "prismatic", "cylindrical", "universal", "spherical", "planar")
+KINDS = get_args(get_type_hints(s.Closure)["type"])
 SUPERFLUOUS = ("null", "doubled", "parallel", "driven")
 SITUATIONS = (*SUPERFLUOUS, "loop")
 _HINGES = (*trees.KINDS, "weld", "weld")
@@ -124,5 +126,5 @@ def parallel(name: str, kind: str, hinge: s.Hinge, scene: s.Scene) -> s.Closure:
         name=name, type=kind, body_a=hinge.parent, node_a=hinge.parent_node, position_a_m=hinge.parent_position_m,
         quaternion_a=hinge.parent_quaternion, body_b=hinge.child, node_b=hinge.child_node,
         position_b_m=hinge.child_position_m, quaternion_b=hinge.child_quaternion,
-        axis=getattr(hinge, "axis", z) if kind in ("revolute", "prismatic", "cylindrical") else z,
+        axis=getattr(hinge, "axis", z) if kind in WITH_AXIS else z,
     )  # fmt: skip

@@ -18,6 +18,7 @@ import flexmb
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.tree import GROUND, node_frame, ordered
+from flexmb.system.observables import MarkerMotion
 from tests.bounds import UNIT_ROUNDOFF, algebra, gamma, observed_order, relative
 from tests.flexmb.closure import mechanisms as m
 
@@ -63,7 +64,7 @@ class Loop:
     prescribed: tuple = ()
 
 
-def in_exudyn(scene: s.Scene, markers: dict[str, flexmb.system.system.MarkerMotion], *, closed: bool = True) -> Loop:
+def in_exudyn(scene: s.Scene, markers: dict[str, MarkerMotion], *, closed: bool = True) -> Loop:
     """The scene of rigid bodies, revolute and ball joints at the state of its markers; `closed` with its closures."""
     from crosscheck.engines.exudyn.carriers import Workshop
     from crosscheck.engines.exudyn.motion import Motion
@@ -98,7 +99,7 @@ def in_exudyn(scene: s.Scene, markers: dict[str, flexmb.system.system.MarkerMoti
 
 def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]], axis: tuple | None) -> None:
     """A joint whose markers' z is the axis, which has the same components on both sides."""
-    from crosscheck.engines.exudyn.joints import Link
+    from crosscheck.engines.exudyn.joints import Connection
 
     shop = loop.shop
     turn = np.eye(3) if ball else Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])[0].as_matrix()
@@ -107,7 +108,7 @@ def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]]
     ]
     kind = shop.items.SphericalJoint if ball else shop.items.RevoluteJointZ
     joint = shop.mbs.AddObject(kind(markerNumbers=markers))
-    loop.links[name] = Link(name, (), ((joint, True),), markers[1])
+    loop.links[name] = Connection(name, (), ((joint, True),), markers[1])
 
 
 def solved(loop: Loop) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
@@ -122,7 +123,7 @@ def solved(loop: Loop) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
     return rates, {name: load[0] for name, load in link_wrenches(loop, states, {}).items()}
 
 
-def bound(scene: s.Scene, markers: dict[str, flexmb.system.system.MarkerMotion]) -> float:
+def bound(scene: s.Scene, markers: dict[str, MarkerMotion]) -> float:
     """Relative difference that Exudyn's side may have.
 
     Its equations (7 coordinates and at most 6 rows for each of the bodies, and the closure's) are solved with a

@@ -10,14 +10,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.dense.jets import Frame, Jet, constant
-from flexmb.dense.kinematics import Motion, member_frames, on_body, point_frames
-from flexmb.dense.tree import Member, Tree
+from flexmb.dense.body_frames import Motions, member_frames, on_body, point_frames
+from flexmb.dense.jets import Jet, MovingFrame, constant
+from flexmb.dense.members import DenseTree, Member
 
-WORLD = Frame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
+WORLD = MovingFrame(constant(np.zeros((1, 1, 3))), constant(np.eye(3)[None, None]))
 
 
-def hinge_point(member: Member) -> Frame:
+def hinge_point(member: Member) -> MovingFrame:
     """The hinge point seen from the frame of the body's data, (1,1,...)."""
     node = member.outboard.node
     if np.any(node.translation) or np.any(node.rotation_modes):
@@ -25,7 +25,7 @@ def hinge_point(member: Member) -> Frame:
     return on_body(member.outboard, constant(np.zeros((1, 1, len(member.model.stiffness)))))
 
 
-def hinge_frames(tree: Tree, motion: Motion) -> list[Frame]:
+def hinge_frames(tree: DenseTree, motion: Motions) -> list[MovingFrame]:
     """Frames of all bodies at their hinge points, in World, base to tip."""
     found = member_frames(tree, motion)
     return [frame.carry(hinge_point(member)) for frame, member in zip(found, tree.members, strict=True)]
@@ -42,7 +42,7 @@ class Seen(NamedTuple):
     angular_acceleration: np.ndarray
 
 
-def seen_from(frame: Frame, inner: Frame, motions: int) -> Seen:
+def seen_from(frame: MovingFrame, inner: MovingFrame, motions: int) -> Seen:
     """`inner` seen from `frame`, both given in World."""
     relative = frame.inverse().carry(inner)
     R = frame.rotation.value[0, 0]
@@ -68,7 +68,7 @@ class Expanded(NamedTuple):
     rates: np.ndarray
 
 
-def expanded(tree: Tree, motion: Motion) -> Expanded:
+def expanded(tree: DenseTree, motion: Motions) -> Expanded:
     """All contiguous bodies and wheels, from second-order jets of their frames."""
     count = len(motion.u)
     frames = hinge_frames(tree, motion)
@@ -88,11 +88,11 @@ def expanded(tree: Tree, motion: Motion) -> Expanded:
     return Expanded(np.array([x.position for x in bodies]), np.hstack(velocities), np.hstack(rates))
 
 
-def _wheel_frames(tree: Tree, motion: Motion) -> list[Frame]:
+def _wheel_frames(tree: DenseTree, motion: Motions) -> list[MovingFrame]:
     """Frames of all wheels in World: the last of the inertia points."""
     points, first = point_frames(tree, member_frames(tree, motion), motion), -len(tree.rotors)
 
     def one(jet: Jet, i: int) -> Jet:
         return jet.map(lambda x: x[:, [first + i]])
 
-    return [Frame(one(points.position, i), one(points.rotation, i)) for i in range(len(tree.rotors))]
+    return [MovingFrame(one(points.position, i), one(points.rotation, i)) for i in range(len(tree.rotors))]

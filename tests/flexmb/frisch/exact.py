@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from tests.bounds import gamma
 
 RADIUS = 0.1
@@ -35,7 +35,7 @@ def random_body(seed: int, points: int = 6, modes: int = 3, *, particles: bool =
         rotation=rng.normal(size=(points, 3, modes)),
         stiffness=stiffness @ stiffness.T,
         damping=damping @ damping.T,
-        nodes={"origin": ModalNode(np.zeros(3), np.eye(3), still, still)},
+        nodes={"origin": FlexibleNode(np.zeros(3), np.eye(3), still, still)},
         clamped=clamped,
     )
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from flexmb.dense import DenseSystem
-from flexmb.dense.jets import Frame, Jet, skew
-from flexmb.dense.kinematics import Motion, member_frames, on_body
-from flexmb.dense.profiles import profile
-from flexmb.dense.tree import Member, Rotor, Seat
+from flexmb.dense.body_frames import Motions, member_frames, on_body
+from flexmb.dense.function_jets import profile
+from flexmb.dense.jets import Jet, MovingFrame, skew
+from flexmb.dense.members import Member, Rotor, Seat
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene import schema as s
 from tests.flexmb.frisch.contiguous import WORLD, hinge_point, seen_from
 
@@ -70,13 +70,13 @@ class Body:
 
 def at(dense: DenseSystem, q: np.ndarray, u: np.ndarray, t: float) -> tuple[list[Body], list[Wheel]]:
     """All bodies and wheels at a state that is on its profiles."""
-    motion = Motion(q, u[None], np.zeros((1, dense.nu)))
+    motion = Motions(q, u[None], np.zeros((1, dense.nu)))
     frames = member_frames(dense.tree, motion)
     bodies = [_body(dense, k, frames, motion, t) for k in range(len(frames))]
     return bodies, [_wheel(dense, rotor, frames, motion) for rotor in dense.tree.rotors]
 
 
-def _body(dense: DenseSystem, k: int, frames: list[Frame], motion: Motion, t: float) -> Body:
+def _body(dense: DenseSystem, k: int, frames: list[MovingFrame], motion: Motions, t: float) -> Body:
     member = dense.tree.members[k]
     R, a, adot = frames[k].rotation.value[0, 0], motion.q[member.q_modes], motion.u[0, member.u_modes]
     p = turned(parameters(dense, k), R)
@@ -164,7 +164,7 @@ def _translates(hinge: s.Hinge | s.PointMass) -> bool:
 
 
 def _external(
-    dense: DenseSystem, k: int, frames: list[Frame], motion: Motion, t: float, centre: np.ndarray
+    dense: DenseSystem, k: int, frames: list[MovingFrame], motion: Motions, t: float, centre: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Loads at the nodes of body k: torque about the point `centre` from its frame, force, work per rate of modes."""
     member, R = dense.tree.members[k], frames[k].rotation.value[0, 0]
@@ -196,7 +196,7 @@ class Shapes:
     phiR: np.ndarray
 
 
-def shapes(member: Member, seat: Seat, motion: Motion) -> Shapes:
+def shapes(member: Member, seat: Seat, motion: Motions) -> Shapes:
     a = motion.q[member.q_modes]
     unit = np.eye(len(a))[:, None] if len(a) else np.zeros((0, 1, 0))
     frame = on_body(seat, Jet(a[None, None], unit, np.zeros_like(unit)))
@@ -206,7 +206,7 @@ def shapes(member: Member, seat: Seat, motion: Motion) -> Shapes:
     return Shapes(frame.position.value[0, 0], frame.rotation.value[0, 0], phiT, phiR)
 
 
-def _wheel(dense: DenseSystem, rotor: Rotor, frames: list[Frame], motion: Motion) -> Wheel:
+def _wheel(dense: DenseSystem, rotor: Rotor, frames: list[MovingFrame], motion: Motions) -> Wheel:
     member, R = dense.tree.members[rotor.member], frames[rotor.member].rotation.value[0, 0]
     seat = shapes(member, rotor.seat, motion)
     node_rate = R @ (motion.u[0, member.u_modes] @ seat.phiR)

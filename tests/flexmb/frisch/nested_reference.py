@@ -188,7 +188,7 @@ class Expansion:
 
 @dataclass(frozen=True)
 class Blocks:
-    """The partitions of (111), rows as in `flexmb.frisch.system.Partitions`."""
+    """The partitions of (111), rows as in `flexmb.frisch.nested_system.Partitions`."""
 
     X: np.ndarray
     I_c: np.ndarray

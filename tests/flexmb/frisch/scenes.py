@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 
 import flexmb
-from flexmb.frisch.system import NestedSystem, Partitions
+from flexmb.frisch.nested_system import NestedSystem, Partitions
 from flexmb.scene import schema as s
 from tests import trees
 

@@ -15,7 +15,7 @@ from numpy.random import Generator
 
 import flexmb
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED, Erratum
-from flexmb.frisch.system import nested_system
+from flexmb.frisch.nested_system import nested_system
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.modal_data import inertia_points

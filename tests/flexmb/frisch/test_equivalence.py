@@ -9,8 +9,8 @@ import pytest
 from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
-from flexmb.frisch.equivalence.advice import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
 from flexmb.frisch.equivalence.appendage import Appendage, appendage
+from flexmb.frisch.equivalence.comparison import AT_CLAMP, BEST, GIVEN, coupling_error, equivalence
 from flexmb.frisch.equivalence.mode_count import directions
 from flexmb.frisch.equivalence.relations import (
     acceleration_relations,
@@ -22,7 +22,7 @@ from flexmb.frisch.equivalence.relations import (
     turning_axis,
 )
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import FlexibleModel, ModalNode
+from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene.bodies import TipMass
 from tests.bounds import gamma, observed_order, relative
 from tests.flexmb.modal.beam_references import beam, clamped_free_roots
@@ -60,7 +60,7 @@ def hinged(seed: int) -> tuple[FlexibleModel, np.ndarray, np.ndarray, float]:
             inertia=np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second,
             translation=np.cross(axis, position - point)[:, :, None], rotation=np.tile(axis, (7, 1))[:, :, None],
             stiffness=np.array([[stiffness]]), damping=np.zeros((1, 1)),
-            nodes={"origin": ModalNode(np.zeros(3), np.eye(3), still, still)}, clamped=True,
+            nodes={"origin": FlexibleNode(np.zeros(3), np.eye(3), still, still)}, clamped=True,
         ), axis, point, stiffness,
     )  # fmt: skip
 
@@ -135,7 +135,7 @@ def test_point_mass_on_a_boom_turns_about_the_clamp():
         mass=np.array([2.0]), position=np.array([[4.0, 0.0, 0.0]]), com_offset=np.zeros((1, 3)),
         inertia=np.zeros((1, 3, 3)), translation=shape.reshape(1, 3, 1), rotation=np.zeros((1, 3, 1)),
         stiffness=np.array([[3.0]]), damping=np.zeros((1, 1)),
-        nodes={"origin": ModalNode(np.zeros(3), np.eye(3), still, still)}, clamped=True,
+        nodes={"origin": FlexibleNode(np.zeros(3), np.eye(3), still, still)}, clamped=True,
     )  # fmt: skip
     fit = best_hinge(appendage(boom))
     assert np.array_equal(fit.hinge.point, np.zeros(3))

@@ -13,7 +13,7 @@ import pytest
 
 import flexmb
 from flexmb.frisch.errata import AS_PRINTED, Erratum
-from flexmb.frisch.system import NestedSystem, nested_system
+from flexmb.frisch.nested_system import NestedSystem, nested_system
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from flexmb.frisch.parameters import mode_parameters
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from tests.bounds import gamma
 from tests.flexmb.frisch import exact
 

@@ -10,7 +10,7 @@ import pytest
 from flexmb.frisch.normalisation import check_boundary, normalised
 from flexmb.frisch.parameters import mode_parameters
 from flexmb.modal.flexible import flexible_model
-from flexmb.modal.model import ModalNode
+from flexmb.modal.flexible_model import FlexibleNode
 from tests.bounds import gamma, relative
 from tests.flexmb.frisch import exact
 from tests.flexmb.modal.beam_references import beam
@@ -39,7 +39,7 @@ def test_modal_mass_is_the_mass_of_the_body():
 
 def test_the_body_is_the_same_in_other_coordinates():
     """(43), (44): nodes, damping and every parameter are those of a_old = X a_new."""
-    nodes = {"tip": ModalNode(np.ones(3), np.eye(3), BODY.translation[0], BODY.rotation[0])}
+    nodes = {"tip": FlexibleNode(np.ones(3), np.eye(3), BODY.translation[0], BODY.rotation[0])}
     body = replace(BODY, nodes=nodes)
     new = normalised(body)
     X = old_from_new(body, new)
@@ -85,7 +85,7 @@ def test_clamped_modes_that_move_the_origin_are_refused(shape):
     moved[2, 1] = 1e-3
     still = np.zeros((3, 3))
     clamp = (moved, still) if shape == "translation" else (still, moved)
-    body = replace(BODY, nodes={"origin": ModalNode(np.zeros(3), np.eye(3), *clamp)})
+    body = replace(BODY, nodes={"origin": FlexibleNode(np.zeros(3), np.eye(3), *clamp)})
     with pytest.raises(ValueError, match='boom: mode 1 moves the body origin, seen at node "origin"'):
         normalised(body, "boom")
     with pytest.raises(ValueError, match="boom: mode 1 moves the body origin"):

@@ -12,7 +12,7 @@ import pytest
 
 from flexmb.frisch.parameters import ModeParameters, mode_parameters
 from flexmb.modal.first_order import first_order
-from flexmb.modal.model import FlexibleModel
+from flexmb.modal.flexible_model import FlexibleModel
 from tests.bounds import gamma, observed_order, relative
 from tests.flexmb.frisch import exact
 

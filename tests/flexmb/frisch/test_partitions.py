@@ -14,9 +14,9 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.first_order import first_order_body
-from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.frisch.system import Partitions
+from flexmb.dense.body_frames import Motions, member_frames, point_frames
+from flexmb.dense.first_order_bodies import first_order_body
+from flexmb.frisch.nested_system import Partitions
 from tests.bounds import algebra, relative
 from tests.flexmb.frisch import contiguous, labels
 from tests.flexmb.frisch.nested_reference import Blocks, Expansion, Nests, partitions
@@ -161,7 +161,7 @@ def expansion(case: Case, rates: np.ndarray) -> Expansion:
 def rates_of_momentum(case: Case, rates: np.ndarray) -> np.ndarray:
     """m gamma'' (N,3) of all bodies with their wheels, World axes: by points, or to first order in the deformation."""
     tree, points = case.dense.tree, case.dense.points
-    motion = Motion(case.state.q, case.state.u[None], rates[None])
+    motion = Motions(case.state.q, case.state.u[None], rates[None])
     frames = member_frames(tree, motion)
     acceleration = point_frames(tree, frames, motion).first.position.acceleration
     found = np.array([points.mass * (points.member == k) @ acceleration for k in case.nests.labels])
@@ -176,7 +176,7 @@ def test_accelerations_of_mass_centres(case):
     rates = np.random.default_rng(0).uniform(-5.0, 5.0, case.dense.nu)
     exact, x = rates_of_momentum(case, rates), expansion(case, rates)
     found = [body.m * case.nests.acceleration(lam, x) for lam, body in enumerate(case.nests.bodies)]
-    frames = contiguous.hinge_frames(case.dense.tree, Motion(case.state.q, case.state.u[None], rates[None]))
+    frames = contiguous.hinge_frames(case.dense.tree, Motions(case.state.q, case.state.u[None], rates[None]))
     fastest = max(np.max(np.abs(f.position.acceleration)) for f in frames) + np.max(np.abs(exact))
     assert relative(found, exact, fastest) <= case.bound
 

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.entry import articulated
-from flexmb.frisch.system import Motion, NestedSystem
+from flexmb.entry import observation
+from flexmb.frisch.nested_system import NestedMotion, NestedSystem
 from tests import trees
 from tests.bounds import algebra, backward_error
 from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
@@ -35,7 +35,7 @@ class Pair:
     system: flexmb.System
     nested: NestedSystem
     state: flexmb.State
-    motion: Motion
+    motion: NestedMotion
     M: np.ndarray
     right: np.ndarray  # applied less bias, by the recursion
     size: float  # of the generalised forces before they cancel
@@ -81,13 +81,12 @@ def test_hinge_loads(pair):
 
 def test_wheel_torques(pair):
     """(82), (94), (102), (113): the whole torque on a wheel, bearing and motor, from the wheel's own momentum."""
-    system, wheels = pair.system, np.zeros((len(pair.system.constants.wheel), 6))
-    y, none = packed(pair.state), np.zeros(0, np.int64)
-    articulated.observe_motion(
-        0.0, y, pair.motion.accelerations, none, none, system.constants, system.workspace(), np.zeros((0, 24)), wheels,
-        np.zeros(4), np.zeros(6),
-    )  # fmt: skip
-    assert np.max(np.abs(pair.motion.wheel_torques - wheels[:, :3]), initial=0.0) <= pair.bound * pair.size
+    system, none = pair.system, np.zeros(0, np.int64)
+    c = system.constants
+    out = observation.outputs(observation.shapes(system.nu, 0, len(c.body), len(c.wheel)), none, none)
+    out.rates[:] = pair.motion.accelerations
+    observation.observe_motion(0.0, packed(pair.state), c, system.workspace(), out)
+    assert np.max(np.abs(pair.motion.wheel_torques - out.wheel_loads[:, :3]), initial=0.0) <= pair.bound * pair.size
 
 
 def test_drives(pair):

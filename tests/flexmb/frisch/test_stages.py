@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.frisch.system import nested_system
+from flexmb.frisch.nested_system import nested_system
 from flexmb.scene import schema as s
 from tests import trees
 from tests.bounds import algebra

@@ -15,9 +15,9 @@ import pytest
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.first_order import first_order_body
-from flexmb.dense.kinematics import Motion, member_frames, point_frames
-from flexmb.frisch.system import RelativeMotion
+from flexmb.dense.body_frames import Motions, member_frames, point_frames
+from flexmb.dense.first_order_bodies import first_order_body
+from flexmb.frisch.nested_system import RelativeMotion
 from flexmb.scene.schema import PointMass
 from tests.bounds import algebra, relative
 from tests.flexmb.frisch import contiguous
@@ -82,14 +82,14 @@ def build(number: int) -> Case:
     rates = np.random.default_rng(seed).uniform(-5.0, 5.0, dense.nu)
     none, one = np.zeros_like(u)[None], np.eye(dense.nu)
     unit, still, moving = (
-        contiguous.expanded(dense.tree, Motion(q, *motion))
+        contiguous.expanded(dense.tree, Motions(q, *motion))
         for motion in ((one, np.zeros_like(one)), (u[None], none), (u[None], rates[None]))
     )
     bound = algebra(dense.nu, len(dense.tree.members))
-    return Case(dense, found, q, u, rates, unit, still, moving, bound, _size(dense, Motion(q, u[None], rates[None])))
+    return Case(dense, found, q, u, rates, unit, still, moving, bound, _size(dense, Motions(q, u[None], rates[None])))
 
 
-def _size(dense: DenseSystem, motion: Motion) -> float:
+def _size(dense: DenseSystem, motion: Motions) -> float:
     """Centripetal terms of the frames in World, which cancel in relative motion: w^2 times distance, w^2 of wheels."""
     frames = contiguous.hinge_frames(dense.tree, motion)
     points = point_frames(dense.tree, member_frames(dense.tree, motion), motion)
@@ -196,8 +196,8 @@ def test_a_dropped_term_is_seen(case):
     assert not agree_in_acceleration(0.5 * half, case.translations(case.still.rates[0]), case)
 
 
-def _along(case: Case, rates: np.ndarray) -> Motion:
-    return Motion(case.q, case.u[None], rates[None])
+def _along(case: Case, rates: np.ndarray) -> Motions:
+    return Motions(case.q, case.u[None], rates[None])
 
 
 def paths(case: Case) -> list[list[int]]:

@@ -11,10 +11,10 @@ from typing import NamedTuple
 import numpy as np
 from scipy.special import ellipj
 
-from flexmb.integrate.control import ACCEPTED, COUNTS, copy, derivative
-from flexmb.integrate.dop853 import dop853, interpolant, interpolate, stages
+from flexmb.integrate.control import ACCEPTED, COUNTS, Interval, copy, derivative
+from flexmb.integrate.dop853 import ExplicitStages, dop853, interpolant, interpolate, stages
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
-from flexmb.integrate.problem import Problem, problem
+from flexmb.integrate.problem import Accuracy, Clock, Problem, problem
 from flexmb.integrate.rk4 import rk4
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
@@ -100,18 +100,18 @@ def run_dop853_fixed(problem, y, t0, h, steps, x, ends, dense, counts):
     ends (steps, n): the state after each; dense (steps, n): the interpolant at the fraction x of each.
     """
     n = y.shape[0]
-    k, f, y_new, trial = np.empty((STAGES_DENSE, n)), np.empty((7, n)), np.empty(n), np.empty(n)
-    derivative(problem, t0, y, k[0], counts)
+    s, trial = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty(n), np.empty((7, n))), np.empty(n)
+    derivative(problem, t0, y, s.k[0], counts)
     for j in range(steps):
         t = t0 + j * h
-        stages(problem, t, math.inf, y, h, k, y_new, counts)
-        problem.project(t + h, y_new, problem.constants)
-        derivative(problem, t + h, y_new, k[STAGES], counts)
-        interpolant(problem, t, math.inf, y, y_new, h, k, f, trial, counts)
-        interpolate(y, f, x, dense[j])
-        copy(y_new, y)
-        copy(y_new, ends[j])
-        copy(k[STAGES], k[0])
+        stages(problem, t, math.inf, y, h, s.k, s.y_new, counts)
+        problem.project(t + h, s.y_new, problem.constants)
+        derivative(problem, t + h, s.y_new, s.k[STAGES], counts)
+        interpolant(problem, Interval(t, t + h, math.inf), y, s, trial, counts)
+        interpolate(y, s.f, x, dense[j])
+        copy(s.y_new, y)
+        copy(s.y_new, ends[j])
+        copy(s.k[STAGES], s.k[0])
         counts[ACCEPTED] += 1
 
 
@@ -143,10 +143,8 @@ def solve(kind: int, times, *, rtol=None, step=None, ends=None, controlled=None,
     times, y = np.asarray(times, float), exact(kind, times[0])
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
-    if step is None:
-        status, t = dop853(of_kind, y, times, ends, rtol, rtol, controlled or len(y), max_steps, out, counts)
-    else:
-        status, t = rk4(of_kind, y, times, ends, step, max_steps, out, counts)
+    accuracy = Accuracy(rtol or 0.0, rtol or 0.0, controlled or len(y), max_steps, step or 0.0)
+    status, t = (dop853 if step is None else rk4)(of_kind, y, Clock(times, ends), accuracy, out, counts)
     return Result(status, t, y, out[: counts[3]], *map(int, counts[:3]), int(workspace.fault[0]))
 
 

@@ -10,8 +10,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.integrate.jacobians import COUNTS
-from flexmb.integrate.problem import stiff_problem
+from flexmb.integrate.control import COUNTS
+from flexmb.integrate.problem import Accuracy, Clock, stiff_problem
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import kernel
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -150,14 +150,15 @@ class Result(NamedTuple):
     fault: int
 
 
-def solve(integrator, problem, y, times, *settings, ends=None, max_steps=100_000) -> Result:
-    """Integrate `problem` = (constants, workspace) from y with an integrator and its settings."""
+def solve(integrator, problem, y, times, rtol, atol, controlled, *, ends=None, max_steps=100_000, **more) -> Result:
+    """Integrate `problem` = (constants, workspace) from y with an integrator; `more`: fields of `Accuracy`."""
     constants, workspace = problem
     equations = stiff_problem(rhs, project, constants, workspace, jacobian, move, constants, workspace)
     times, y = np.asarray(times, float), np.array(y, float)
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
-    status, t = integrator(equations, y, times, ends, *settings, max_steps, out, counts)
+    accuracy = Accuracy(rtol, atol, controlled, max_steps, **more)
+    status, t = integrator(equations, y, Clock(times, ends), accuracy, out, counts)
     evaluations, accepted, rejected, samples, _, jacobians, factorisations = map(int, counts)
     return Result(
         status, t, y, out[:samples], evaluations, accepted, rejected, jacobians, factorisations, int(workspace.fault[0])

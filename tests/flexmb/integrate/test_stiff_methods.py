@@ -40,7 +40,8 @@ ADAPTIVE = pytest.mark.parametrize("run", [radau5, exponential], ids=["radau5", 
 
 def alpha(problem, y, times, step, radius, nq, controlled, **options):
     """Generalised-alpha, whose Newton iterations leave next to nothing."""
-    return solve(generalised_alpha, problem, y, times, step, radius, nq, controlled, 1e-12, 1e-14, **options)
+    settings = {"step": step, "radius": radius, "coordinates": nq}
+    return solve(generalised_alpha, problem, y, times, 1e-12, 1e-14, controlled, **settings, **options)
 
 
 def as_functions(problem):

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 
 import flexmb
 from flexmb.dense import DenseSystem
-from flexmb.dense.system import Snapshot
+from flexmb.dense.dense_system import Instant
 from flexmb.jain.elements import undeformed
 from flexmb.jain.operators import Operators
 from flexmb.scene.modal_data import inertia_points
@@ -246,7 +246,7 @@ def test_velocities_and_accelerations_are_those_of_the_frames(found):
     """(20), (24)-(26): of every body frame, by Taylor series of its motion."""
     o, tree = found.operators, DenseSystem(found.system.scene).tree
     chi_dot = np.random.default_rng(3).normal(size=len(o.chi))
-    now = Snapshot(tree, *undeformed(tree, found.state.q, found.state.u), chi_dot)
+    now = Instant(tree, *undeformed(tree, found.state.q, found.state.u), chi_dot)
     velocities, accelerations = [], []
     for member, frame in zip(tree.members, now._frames, strict=True):
         velocities += [o.chi[member.u_modes], frame.angular_velocity()[0, 0], frame.position.rate[0, 0]]

@@ -10,8 +10,8 @@ import pytest
 
 from flexmb.modal.cross import cross_matrix
 from flexmb.modal.first_order import FirstOrder, first_order, inertia_slope
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.modal.model import FlexibleModel
 from tests.bounds import gamma
 from tests.flexmb.modal.test_modal_integrals import random_model
 

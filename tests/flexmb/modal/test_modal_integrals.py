@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import ModalIntegrals, TurningPoints, modal_integrals
-from flexmb.modal.model import FlexibleModel
 from tests.flexmb.modal.beam_references import EPS
 
 

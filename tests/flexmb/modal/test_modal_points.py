@@ -8,7 +8,7 @@ import pytest
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.integrals import modal_integrals
-from flexmb.modal.interpolation import BendingField, LineField, Mesh
+from flexmb.modal.interpolation import BendingField, ElementMesh, LineField
 from flexmb.modal.stations import inertia_stations
 from flexmb.scene.bodies import BeamStation, TipMass
 from tests.flexmb.modal.beam_references import EPS, UNIT, beam
@@ -40,7 +40,7 @@ def test_uniform_element_mass_and_stiffness_are_the_textbook_matrices():
 
 @pytest.mark.parametrize("shear", [False, True])
 def test_bending_rows_are_derivatives_of_one_another(shear):
-    field = BendingField(Mesh(np.linspace(0.0, 1.0, 4)), shear)
+    field = BendingField(ElementMesh(np.linspace(0.0, 1.0, 4)), shear)
     x, h = np.linspace(0.05, 0.95, 7), 1e-5
     middle, before, after = field.at(x), field.at(x - h), field.at(x + h)
     # Central differences of polynomials of degree 5 with coefficients up to 60/l^2: h^2 * 1e4.
@@ -49,7 +49,7 @@ def test_bending_rows_are_derivatives_of_one_another(shear):
 
 
 def test_fields_are_continuous_and_reproduce_rigid_motion():
-    mesh = Mesh(np.linspace(0.0, 2.0, 5))
+    mesh = ElementMesh(np.linspace(0.0, 2.0, 5))
     before = np.nextafter(mesh.nodes[1:-1], 0.0)
     for field in (BendingField(mesh, True), BendingField(mesh, False)):
         here, there = field.at(mesh.nodes[1:-1]), field.at(before)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from flexmb.modal.flexible import flexible_model
+from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
-from flexmb.modal.model import FlexibleModel
 from flexmb.scene.bodies import ModalBody, ModalNode
 from flexmb.scene.modal_data import inertia_points
 from tests.flexmb.modal.beam_references import EPS, beam

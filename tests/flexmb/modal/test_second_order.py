@@ -13,7 +13,7 @@ from flexmb.dense.jets import skew
 from flexmb.modal import flexible_model
 from flexmb.modal.beam import beam_elements
 from flexmb.modal.flexible import beam_model
-from flexmb.modal.model import SecondOrder
+from flexmb.modal.flexible_model import SecondOrder
 from flexmb.modal.reduce import beam_modes
 from flexmb.modal.stations import inertia_stations, lumps
 from flexmb.scene import schema as s

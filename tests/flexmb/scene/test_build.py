@@ -2,6 +2,7 @@
 
 import doctest
 import inspect
+from typing import Unpack, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
@@ -59,9 +60,12 @@ def test_every_kind_has_a_method():
 
 @pytest.mark.parametrize("method", METHODS)
 def test_every_key_of_the_schema_is_an_argument(method):
-    """By name and without unit; the placement of a hinge is typed by `Placement`."""
-    arguments = set(inspect.signature(getattr(SceneBuilder, method)).parameters)
-    arguments |= set(build.Placement.__annotations__) if "placement" in arguments else set()
+    """By name and without unit; what is gathered is typed by a dictionary of `flexmb.scene.options`."""
+    function = getattr(SceneBuilder, method)
+    arguments = set(inspect.signature(function).parameters)
+    for hint in get_type_hints(function).values():
+        if get_origin(hint) is Unpack:
+            arguments |= set(get_args(hint)[0].__annotations__)
     keys = {split_unit(key)[0] for key in METHODS[method].__struct_fields__}
     assert keys - arguments == REPLACED.get(method, set())
 
@@ -85,6 +89,14 @@ def test_wrong_arguments_are_named():
         SceneBuilder("x").weld("h", "ground", "a", parent_nod="tip")
     with pytest.raises(TypeError, match='did you mean "stiffness"'):
         angular(stifness=1.0)
+    with pytest.raises(TypeError, match='a Revolute has no "stifness": did you mean "stiffness"'):
+        SceneBuilder("x").revolute("h", "ground", "a", stifness=1.0)
+    with pytest.raises(TypeError, match='a Prismatic has no "torque": '):
+        SceneBuilder("x").prismatic("h", "ground", "a", torque=s.Constant(value=1.0))
+    with pytest.raises(TypeError, match='a Closure has no "node_c"'):
+        SceneBuilder("x").closure("c", "weld", "a", "b", node_c="tip")
+    with pytest.raises(TypeError, match='a beam section has no "shear_facto": did you mean "shear_factor"'):
+        beam_section(E=1.0, G=1.0, A=1.0, Iy=1.0, Iz=1.0, rho=1.0, shear_facto=0.9)
     with pytest.raises(SceneError, match=r'\$\.bodies\[0\]\.mass_kg \(body "a"\): Expected `float`, got `str`'):
         SceneBuilder("x").rigid_body("a", mass="1", inertia=UNIT)
 

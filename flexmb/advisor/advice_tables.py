@@ -1,0 +1,83 @@
+"""Advice in a terminal: what to simulate, why, and what else was tried; or why no model is known to be adequate."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from rich.console import Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from flexmb.advisor.advice import Advice, Trial
+
+_SHOWN = 20
+
+
+def advice_tables(advice: Advice, trials: bool = True) -> RenderableType:
+    """Tables and lines of one advice; `trials`: also every model that was run, cheapest first."""
+    parts: list[RenderableType] = [_asked(advice)]
+    if advice.accepted:
+        parts += [_bodies(advice)] if advice.bodies else []
+        parts += [_run(advice)]
+    else:
+        parts += [Text("refused: ", style="bold red") + Text(advice.refusal)]
+    if trials and len(advice.trials) > 1:
+        parts.append(_trials(advice))
+    parts += [Text(f"note: {note}", style="yellow") for note in advice.notes]
+    return Group(*parts)
+
+
+def _asked(advice: Advice) -> Text:
+    wanted = ", ".join(str(each) for each in advice.quantities)
+    return Text(f"{advice.name}: {wanted} to {advice.tolerance:g} of its scale, 0 to {advice.t_end:g} s")
+
+
+def _bodies(advice: Advice) -> Table:
+    table = Table(title="\nModel of each flexible body", title_justify="left", title_style="bold")
+    for name in ("body", "model", "error by itself, predicted", "because"):
+        table.add_column(name, justify="right" if "error" in name else "left")
+    for each in advice.bodies:
+        table.add_row(each.body, str(each.rung), _number(each.predicted), each.reason)
+    return table
+
+
+def _run(advice: Advice) -> Table:
+    table = Table(title="\nThe whole run", title_justify="left", title_style="bold")
+    for name in ("", "predicted", "measured"):
+        table.add_column(name, justify="right" if name else "left")
+    table.add_row("error, of the scale", _number(advice.predicted), _number(advice.measured))
+    table.add_row("of that, uncertainty of the reference", "", _number(advice.uncertainty))
+    table.add_row("operations", _number(advice.predicted_operations), _number(advice.operations))
+    table.add_row("evaluations", "", str(advice.evaluations))
+    table.add_row("seconds here (nothing depends on it)", "", f"{advice.seconds:.2g}")
+    table.add_row("method", "", str(advice.method))
+    if advice.reference:
+        table.caption = f"Measured against: {advice.reference}"
+        table.caption_justify = "left"
+    return table
+
+
+def _trials(advice: Advice) -> Table:
+    title = "\nModels that were run" + (f" (the {_SHOWN} cheapest)" if len(advice.trials) > _SHOWN else "")
+    table = Table(title=title, title_justify="left", title_style="bold")
+    for name in ("model", "predicted error", "measured error", "operations, finely integrated", ""):
+        table.add_column(name, justify="right" if "err" in name or "op" in name else "left")
+    for trial in sorted(advice.trials, key=lambda each: each.operations)[:_SHOWN]:
+        fits = Text("adequate", style="green") if trial.adequate else Text("no", style="red")
+        table.add_row(
+            "\n".join(_model(trial)), _number(trial.predicted), _number(trial.measured), _number(trial.operations), fits
+        )
+    return table
+
+
+def _model(trial: Trial) -> Iterator[str]:
+    several = len(trial.model) > 1
+    for name, rung in trial.model:
+        yield f"{name}: {rung}" if several else str(rung)
+
+
+def _number(value: float) -> str:
+    if np.isnan(value):
+        return "-"
+    return "does not run" if np.isinf(value) else f"{value:.2g}"

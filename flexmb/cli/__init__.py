@@ -1,0 +1,33 @@
+"""The command `flexmb`: thin, it only reads words and shows results."""
+
+from __future__ import annotations
+
+import typer
+
+from flexmb.cli.advising import advise
+from flexmb.cli.appendages import equivalence
+from flexmb.cli.linearising import campbell, linearize
+from flexmb.cli.running import simulate
+from flexmb.cli.scenes import check, schema
+
+app = typer.Typer(
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode="markdown",
+    help="""
+Simulate trees of rigid and flexible bodies, wheels and point masses.
+
+A scene is a TOML file: see `docs/scene-reference.md`, or `flexmb schema` for the JSON Schema your editor understands.
+
+Find every defect of a scene: `flexmb check scene.toml`
+
+Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out results`
+""",
+)
+for command in (simulate, check, equivalence, advise, linearize, campbell, schema):
+    app.command()(command)
+
+
+def main() -> None:
+    """Entry point of the command `flexmb`."""
+    app()

@@ -1,0 +1,61 @@
+"""`flexmb advise`: which models and which method are good enough."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, no_traceback
+from flexmb.output.writing import check_folder, folder, writing
+from flexmb.scene.files import load_scene, save_scene
+
+
+def advise(
+    scene: SceneFile,
+    tol: Annotated[float, typer.Option("--tol", help="Error allowed, a part of the quantity's scale.")] = 1e-2,
+    quantity: Annotated[
+        list[str] | None,
+        typer.Option("--quantity", "-q", help="What matters; give it several times. Default: all markers' positions."),
+    ] = None,
+    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.")] = 10.0,
+    out: Annotated[Path, typer.Option("--out", "-o", help="File of the reduced scene.")] = Path("out/advised.toml"),
+    trials: Annotated[bool, typer.Option("--trials/--no-trials", help="Show every model that was run.")] = True,
+) -> None:
+    """
+    Which model of each flexible body, and which method, are good enough? Run the candidates; print why.
+
+    Rigid, rigid on a spring hinge, so many modes at some level, pieces: the cheapest that gives the quantity to the
+    tolerance, measured against the finest models that can be run, up to the same end. Writes the reduced scene.
+
+    **Examples**
+
+        flexmb advise gyrostat.toml --tol 1e-3 --t-end 10
+        flexmb advise gyrostat.toml --tol 1e-2 --quantity marker:tip.position --quantity load:mount.torque
+        flexmb advise gyrostat.toml --tol 1e-2 --quantity marker:tip.position@0.05 --out small.toml
+
+    **Quantities** are `marker:NAME.position`, `.orientation`, `.velocity`, `.angular_velocity`, `load:HINGE.torque`,
+    `.force`, `wheel_load:WHEEL.torque`, `drive:NAME`, `energy.total`, `momentum.angular`, patterns such as
+    `marker:*.position`, and beginnings such as `energy`. Errors are relative to the range of the signal, or to the size
+    after @, in SI units.
+
+    **Exit code**: 0 advised, 1 no model known to be adequate, 2 the scene or an option is wrong.
+    """
+    with no_traceback():
+        from flexmb.advisor.advice import advise as search
+        from flexmb.advisor.advice_tables import advice_tables
+
+        loaded = load_scene(scene)
+        check_folder(out.parent)
+        with console.status(Text(f"trying models of {scene} (the first run after an update compiles)")):
+            advice = search(loaded, tol, quantity, t_end)
+        console.print(advice_tables(advice, trials))
+        if advice.scene is None or advice.method is None:
+            raise typer.Exit(EXIT_STOPPED)
+        folder(out.parent)
+        with writing(out):
+            save_scene(advice.scene, out)
+    console.print("wrote", str(out), soft_wrap=True)
+    console.print(f"flexmb simulate {out} --t-end {t_end:g} {advice.method.words()}", soft_wrap=True)

@@ -1,0 +1,119 @@
+"""`flexmb linearize` and `flexmb campbell`: linear models, and frequencies against a spin rate."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.text import Text
+
+from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, errors, no_traceback, range_of
+from flexmb.output.printable import printable
+from flexmb.output.writing import check_folder, writing
+from flexmb.scene.files import load_scene
+
+
+def linearize(
+    scene: SceneFile,
+    at: Annotated[str, typer.Option(help="`equilibrium` found from the initial state, or the `initial` state.")] = (
+        "equilibrium"
+    ),
+    spin: Annotated[
+        str | None, typer.Option(help="Hinge or wheel that spins steadily instead, at `--rate`.", show_default=False)
+    ] = None,
+    rate: Annotated[float, typer.Option(help="Its rate in rad/s.")] = 0.0,
+    export: Annotated[
+        Path | None, typer.Option(help="File of matrices, names and eigenvalues: .npz or .mat.", show_default=False)
+    ] = None,
+) -> None:
+    """
+    Linearise a scene by exact derivatives; print frequency, damping and dominant coordinates of every mode.
+
+    At `equilibrium` and for a spin, functions of time stand still at their values at t = 0; at the `initial` state
+    prescribed motions go on as their functions have them.
+
+    **Examples**
+
+        flexmb linearize arm.toml
+        flexmb linearize gyrostat.toml --at initial --export gyrostat.npz
+        flexmb linearize rotor.toml --spin shaft --rate 30
+
+    **Exported** are A, B, C, D of x' = A x + B f, y = C x + D f with x = [displacements; speeds], their names and
+    units, the mass matrix and the eigenvalues.
+
+    **Exit code**: 0 linearised, 1 no equilibrium was found, 2 the scene or an option is wrong.
+    """
+    with no_traceback():
+        from flexmb.linear.equilibrium import EquilibriumError, equilibrium
+        from flexmb.linear.linear_tables import modes_table
+        from flexmb.linear.linearize import linearize as linearized
+        from flexmb.linear.spin import steady_spin
+        from flexmb.system.system import compile
+
+        if at not in ("equilibrium", "initial"):
+            raise ValueError(f"--at is equilibrium or initial, not {at!r}")
+        loaded = load_scene(scene)
+        try:
+            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+                system = compile(loaded)
+                if spin is not None:
+                    model = steady_spin(system, spin, rate).linearize()
+                elif at == "equilibrium":
+                    model = linearized(system, equilibrium(system), held=True)
+                else:
+                    model = linearized(system)
+        except EquilibriumError as error:
+            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
+            raise typer.Exit(EXIT_STOPPED) from None
+        console.print(modes_table(model))
+        if export is not None:
+            with writing(export):
+                console.print("wrote", str(model.save(export)), soft_wrap=True)
+
+
+def campbell(
+    scene: SceneFile,
+    hinge: Annotated[str, typer.Argument(help="Revolute hinge or wheel that spins.", metavar="HINGE")],
+    rates: Annotated[str, typer.Option(help="Rates in rad/s: `from:to:count`.", show_default=False)],
+    modes: Annotated[
+        int | None, typer.Option(help="How many of the lowest modes to draw; default all.", show_default=False)
+    ] = None,
+    picture: Annotated[Path, typer.Option("--picture", "-o", help="Picture file.")] = Path("out/campbell.png"),
+    csv: Annotated[Path | None, typer.Option(help="File for the numbers.", show_default=False)] = None,
+) -> None:
+    """
+    Frequencies and growth rates against a spin rate: a table and a picture.
+
+    At each rate the deformation is found in which nothing accelerates, and the scene linearised about it by exact
+    derivatives. Modes are seen from the turning bodies and followed by their shapes.
+
+    **Examples**
+
+        flexmb campbell blade.toml shaft --rates 0:40:41
+        flexmb campbell blade.toml shaft --rates 0:40:41 --modes 6 --picture blade.png --csv blade.csv
+
+    **Exit code**: 0 drawn, 1 a rate has no steady state, 2 the scene or an option is wrong.
+    """
+    with no_traceback():
+        from flexmb.linear.campbell import campbell as diagram
+        from flexmb.linear.campbell_picture import write_campbell_plot
+        from flexmb.linear.equilibrium import EquilibriumError
+        from flexmb.linear.linear_tables import campbell_table
+
+        loaded, values = load_scene(scene), range_of("rates", rates)
+        for file in (picture, *([] if csv is None else [csv])):
+            check_folder(file.parent)
+        try:
+            with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
+                result = diagram(loaded, hinge, values)
+        except EquilibriumError as error:
+            errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
+            raise typer.Exit(EXIT_STOPPED) from None
+        console.print(campbell_table(result))
+        with writing(picture):
+            written = [write_campbell_plot(result, picture, modes)]
+        if csv is not None:
+            with writing(csv):
+                written.append(result.to_csv(csv))
+    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)

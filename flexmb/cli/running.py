@@ -1,0 +1,91 @@
+"""`flexmb simulate`: run a scene."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, get_args
+
+import typer
+from rich.text import Text
+
+from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, console, no_traceback
+from flexmb.integrate.integrator import Method
+from flexmb.output.writing import check_folder, folder, writing
+from flexmb.scene.files import load_scene
+
+METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
+
+
+def simulate(
+    scene: SceneFile,
+    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
+    method: Annotated[
+        str,
+        typer.Option(
+            help=f"{METHODS}: see docs/integrators.md. Methods of equal steps need `--step`."
+        ),
+    ] = "dop853",
+    rtol: Annotated[float, typer.Option(help="Relative error allowed in a step.")] = 1e-10,
+    atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units.")] = 1e-12,
+    step: Annotated[
+        float | None, typer.Option(help="Step in s (rk4, generalised_alpha).", show_default=False)
+    ] = None,
+    spectral_radius: Annotated[
+        float | None,
+        typer.Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False),
+    ] = None,
+    samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
+    algorithm: Annotated[
+        str,
+        typer.Option(
+            help="`articulated` (recursion), `composite` (mass matrix), `frisch` (nested bodies, 1975) or "
+            "`frisch_as_printed`."
+        ),
+    ] = "articulated",
+    plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+) -> None:
+    """
+    Simulate a scene; write `trajectory.csv` and charts; print a summary.
+
+    **Examples**
+
+        flexmb simulate boom.toml --t-end 60
+        flexmb simulate boom.toml --t-end 60 --rtol 1e-12 --samples 1001 --out fine
+        flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
+        flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
+        flexmb simulate boom.toml --t-end 60 --algorithm frisch
+
+    **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
+    momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
+
+    **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
+    wrong, 130 interrupted by Ctrl-C (what was reached is written).
+    """
+    interrupted = False
+    with no_traceback():
+        from flexmb.run.interruption import Interrupted
+        from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
+        from flexmb.run.summary import summary
+
+        check_folder(out)
+        with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
+            try:
+                trajectory = run(
+                    load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                    rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
+                    spectral_radius=spectral_radius,
+                )  # fmt: skip
+            except Interrupted as stopped:
+                trajectory, interrupted = stopped.trajectory, True
+        console.print(summary(trajectory))  # first: a full disk takes the files only
+        folder(out)
+        with writing(out / "trajectory.csv"):
+            trajectory.to_csv(out / "trajectory.csv")
+        with writing(out):
+            written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
+    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+    if interrupted:
+        raise typer.Exit(EXIT_INTERRUPTED)
+    if not trajectory.finished:
+        raise typer.Exit(EXIT_STOPPED)

@@ -1,0 +1,66 @@
+"""What all commands share: consoles, exit codes, the words that they read, and errors as messages."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.text import Text
+
+from flexmb.output.printable import printable
+from flexmb.output.writing import in_words
+from flexmb.scene.check import SceneError
+
+EXIT_STOPPED = 1
+EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130  # as of shells: 128 and the number of the signal
+
+console = Console(markup=False, emoji=False)  # names and paths stand in what they print
+errors = Console(stderr=True, markup=False, emoji=False)
+
+SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
+
+
+def vector(option: str, text: str) -> tuple[float, ...]:
+    """Three numbers, or the unit vector of x, y, z."""
+    if text in ("x", "y", "z"):
+        return tuple(float(text == name) for name in "xyz")
+    try:
+        numbers = tuple(float(word) for word in text.split(","))
+    except ValueError:
+        numbers = ()
+    if len(numbers) != 3:
+        raise ValueError(f"--{option} is x, y, z or three numbers such as 0,0.6,0.8; got {text!r}")
+    return numbers
+
+
+def range_of(option: str, text: str) -> list[float]:
+    """`from:to:count`, ends included."""
+    try:
+        first, last, count = text.split(":")
+        start, stop, steps = float(first), float(last), int(count)
+    except ValueError:
+        raise ValueError(f"--{option} is from:to:count, such as 0:40:41; got {text!r}") from None
+    if steps < 2:
+        raise ValueError(f"--{option}: give at least 2 values, not {steps}")
+    return [start + (stop - start) * i / (steps - 1) for i in range(steps)]
+
+
+@contextmanager
+def no_traceback() -> Iterator[None]:
+    """What the user can put right is a message, not a traceback."""
+    try:
+        yield
+    except BrokenPipeError:  # whoever read the output has read enough
+        raise
+    except (SceneError, NotImplementedError, ValueError, ImportError, OSError) as error:
+        text = in_words(error) if isinstance(error, OSError) else str(error)
+        errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)
+        raise typer.Exit(EXIT_USAGE) from None
+    except ArithmeticError as error:  # there are no accelerations, or they overflow
+        errors.print(Text("error: ", style="bold red") + Text(str(error)), soft_wrap=True)
+        raise typer.Exit(EXIT_STOPPED) from None

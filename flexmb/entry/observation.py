@@ -1,0 +1,138 @@
+"""Entry points of what is observed at one state: markers, loads, energy and momentum, by any algorithm.
+
+A new output starts here: a member of `Outputs`, its shape in `shapes`, and the lines of a kernel that fill it. Its
+names are given in `flexmb.system.observables`, its course through time in `flexmb.run.trajectory`.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+
+import numpy as np
+
+from flexmb.entry.articulated import world_loads
+from flexmb.jain.balance import energy_and_momentum
+from flexmb.jain.kinematics import acceleration_sweep, port_acceleration, port_velocity, pose_sweep, velocity_sweep
+from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
+from flexmb.jain.sweeps import forward_dynamics
+from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import helper, kernel
+from flexmb.motion.coordinates import load_state
+from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
+from flexmb.tables.status import OK
+from flexmb.typing import Index, Real
+
+
+@bundle
+class Outputs:
+    """What an observation writes, World axes, but for which marker is where; numbers are parts of `every`."""
+
+    marker_body: Index  # (K,)
+    marker_port: Index  # (K,)
+    drives: Real  # (nu,) loads of prescribed speeds; no part of `every`, for those of free speeds mean nothing
+    every: Real  # all of what follows, in a row
+    rates: Real  # (nu,) accelerations
+    markers: Real  # (K,24) position, R_World_marker (9), velocity (6), classical acceleration (6), true deformation
+    loads: Real  # (N,6) [torque; force] of hinges, those of the model: a ruthless body shows them at its rest shape
+    wheel_loads: Real  # (W,6)
+    energy: Real  # (4,) as in flexmb.jain.balance
+    momentum: Real  # (6,) likewise
+
+
+def shapes(speeds: int, markers: int, hinges: int, wheels: int) -> dict[str, tuple[int, ...]]:
+    """Of the parts of `Outputs.every`, in their order."""
+    return {
+        "rates": (speeds,),
+        "markers": (markers, 24),
+        "loads": (hinges, 6),
+        "wheel_loads": (wheels, 6),
+        "energy": (4,),
+        "momentum": (6,),
+    }
+
+
+def parts(every: Real, of: Mapping[str, tuple[int, ...]]) -> dict[str, Real]:
+    """Views of a row of numbers, by name."""
+    found, start = {}, 0
+    for name, shape in of.items():
+        stop = start + math.prod(shape)
+        found[name], start = every[start:stop].reshape(shape), stop
+    return found
+
+
+def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: Index) -> Outputs:
+    """Outputs of these shapes, for markers at these ports of these bodies."""
+    every = np.zeros(sum(math.prod(shape) for shape in of.values()))
+    return Outputs(marker_body, marker_port, np.zeros(of["rates"]), every, **parts(every, of))
+
+
+@kernel
+def observe(t, y, c, w, out):
+    """Everything observable at one state by the recursion; w.speed is filled as well. Returns a status code."""
+    load_state(t, y, c, w)
+    status = forward_dynamics(c, w)
+    if status != OK:
+        return status
+    drive_loads(c, w)
+    pose_sweep(c, w)
+    hinge_loads(c, w)
+    world_loads(c, w, out.loads)
+    for j in range(out.rates.shape[0]):
+        out.rates[j] = w.speed[j].acceleration
+        out.drives[j] = w.speed[j].drive
+    _observe_motion(c, w, out)
+    return OK
+
+
+@kernel
+def observe_motion(t, y, c, w, out):
+    """What follows from the state and given accelerations, out.rates, by kinematics and bodies' own momentum.
+
+    Markers, loads of wheels, energy and momentum.
+    """
+    load_state(t, y, c, w)
+    for j in range(out.rates.shape[0]):
+        w.speed[j].acceleration = out.rates[j]
+    velocity_sweep(c, w, False, False)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    _observe_motion(c, w, out)
+
+
+@helper
+def _observe_motion(c, w, out):
+    """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state."""
+    _world_wheel_loads(c, w, out.wheel_loads)
+    velocity_sweep(c, w, False, True)
+    energy_and_momentum(c, w, out.energy, out.momentum)
+    velocity_sweep(c, w, True, True)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    for i in range(out.marker_port.shape[0]):
+        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
+@helper
+def _observe_marker(c, w, k, port, row):
+    """The row (24,) of a marker at a port of body k."""
+    R = mat3(w.body[k].pose_rotation, 0)
+    omega, v = port_velocity(w, k, port)
+    alpha, a = port_acceleration(c, w, k, port)
+    store3(row, 0, add(vec3(w.body[k].pose_position, 0), times(R, vec3(w.port[port].r, 0))))
+    store9(row, 3, matmul(R, mat3(w.port[port].R, 0)))
+    store3(row, 12, times(R, omega))
+    store3(row, 15, times(R, v))
+    store3(row, 18, times(R, alpha))
+    store3(row, 21, add(times(R, a), vec3(c.gravity, 0)))
+
+
+@helper
+def _world_wheel_loads(c, w, loads):
+    """Loads on all wheels in World axes."""
+    for k in range(c.body.shape[0]):
+        R = mat3(w.body[k].pose_rotation, 0)
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            tau, f = wheel_load(c, w, k, i)
+            store3(loads[i], 0, times(R, tau))
+            store3(loads[i], 3, times(R, f))

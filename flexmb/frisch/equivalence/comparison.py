@@ -1,0 +1,149 @@
+"""Which model of an appendage is better for which question, with the numbers of the paper's "Interpretation of
+results".
+
+A spring-hinged rigid body has only one vibration for each axis, but moves exactly however far it turns. Modes bring one
+vibration each, but leave out everything of second order in the deflection.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flexmb.frisch.equivalence.appendage import Appendage, inertia_about_origin
+from flexmb.frisch.equivalence.mode_count import Direction, directions
+from flexmb.frisch.equivalence.relations import Fit, best_hinge, fit_at, modal_effective_inertia
+
+AT_CLAMP, BEST, GIVEN = "hinge at the clamp", "best hinge", "given hinge"
+
+
+@dataclass(frozen=True)
+class Preference:
+    """`better` is "rigid" for the spring-hinged rigid body, "flexible" for modes; `reason` has the numbers."""
+
+    question: str
+    better: Literal["rigid", "flexible", "either"]
+    reason: str
+
+
+@dataclass(frozen=True)
+class Equivalence:
+    """An appendage with modes compared with a rigid body on a spring hinge.
+
+    `accuracy` that is asked for, as a fraction; `fits` by name: `AT_CLAMP`, `BEST` and, where a point was given,
+    `GIVEN`; `directions`: how the modes converge about and along the body axes and hinge axes; `verdicts` about the
+    given hinge, or else the best one.
+    """
+
+    appendage: Appendage
+    accuracy: float
+    fits: dict[str, Fit]
+    directions: tuple[Direction, ...]
+    verdicts: tuple[Preference, ...]
+
+
+def equivalence(
+    body: Appendage,
+    *,
+    accuracy: float = 0.05,
+    axes: ArrayLike | None = None,
+    modes: tuple[int, ...] | None = None,
+    point: ArrayLike | None = None,
+) -> Equivalence:
+    """Compare an appendage with rigid models of it.
+
+    `accuracy`, a fraction, decides verdicts and counts of modes; `axes` (k,3) and `modes` as in `best_hinge`; `point`
+    (3,) m: a hinge to be judged beside the best one. Raises ValueError as `best_hinge` does.
+    """
+    if not 0.0 < accuracy < 1.0:
+        raise ValueError(f"accuracy is a part of one, such as 0.05, got {accuracy:g}")
+    best = best_hinge(body, axes, modes)
+    axes, modes = best.hinge.axes, best.modes
+    fits = {AT_CLAMP: fit_at(body, np.zeros(3), axes, modes), BEST: best}
+    if point is not None:
+        fits[GIVEN] = fit_at(body, point, axes, modes)
+    aligned = np.max(np.abs(axes), axis=1) > 1.0 - 1e-9
+    found = directions(body, np.vstack([np.eye(3), axes[~aligned]]))
+    return Equivalence(body, accuracy, fits, found, _verdicts(body, accuracy, fits.get(GIVEN, best)))
+
+
+def coupling_error(body: Appendage, fit: Fit) -> float:
+    """Largest relative difference of effective mass and effective inertia between a hinge and its modes, along the
+    modes.
+
+    Base and hinge exchange momentum as base and modes do if these agree: at resonance they are the pull on the base.
+    """
+    hinge, modes = fit.effective_inertia, modal_effective_inertia(body, fit.modes)
+    errors = []
+    for part in (slice(0, 3), slice(3, 6)):
+        size, along = np.linalg.eigh(modes[part, part])
+        whole = np.trace(body.rigid_inertia[part, part])
+        for value, axis in zip(size, along.T, strict=True):
+            if value > 1e-6 * whole:
+                errors.append(abs(axis @ hinge[part, part] @ axis / value - 1.0))
+    return float(max(errors, default=0.0))
+
+
+def _verdicts(body: Appendage, accuracy: float, fit: Fit) -> tuple[Preference, ...]:
+    f = body.frequencies / (2.0 * np.pi)
+    first = min(fit.modes)
+    mismatch = max(relation.mismatch for group in fit.relations for relation in group)
+    coupling = coupling_error(body, fit)
+    follows = max(mismatch, coupling) <= accuracy
+    named = " and ".join(f"{f[mode]:.4g} Hz" for mode in sorted(fit.modes))
+    verdicts = [
+        Preference(
+            f"vibration at {named} and what it does to the base",
+            "either" if follows else "flexible",
+            f"(149)-(151) agree within {percent(mismatch)}, effective mass and inertia within {percent(coupling)}",
+        )
+    ]
+    others = [n for n in range(body.mode_count) if n not in fit.modes]
+    if others:
+        left = _beyond(body, fit)
+        verdicts.append(
+            Preference(
+                f"vibration at other frequencies, from {f[others[0]]:.4g} Hz",
+                "flexible",
+                f"the hinge has none; modes other than {_listed(fit.modes)} have {percent(left[1])} of the mass across "
+                f"the appendage and {percent(left[0])} of its inertia about the clamp",
+            )
+        )
+    angle = np.sqrt(2.0 * accuracy)
+    verdicts += [
+        Preference(
+            f"deflections beyond {angle:.2g} rad at the hinge",
+            "rigid",
+            f"modes leave out terms of second order, 1 - cos = {percent(accuracy)} there; the hinge turns exactly",
+        ),
+        Preference(
+            f"base spinning faster than {np.sqrt(accuracy) * f[first]:.3g} Hz",
+            "rigid",
+            f"modes without second-order shapes do not stiffen, an error of (spin / {f[first]:.4g} Hz)^2 in the "
+            "squared frequency; a rigid body that turns outward does",
+        ),
+    ]
+    return tuple(verdicts)
+
+
+def _beyond(body: Appendage, fit: Fit) -> tuple[float, float]:
+    """Fractions of inertia about the hinge axes, and of mass along the modes' velocity, that other modes move."""
+    modal, rigid = modal_effective_inertia(body, fit.modes), inertia_about_origin(body.moving)
+    turning = [(q @ modal[:3, :3] @ q) / (q @ rigid[:3, :3] @ q) for q in fit.hinge.axes]
+    velocity = [body.parameters.A[mode] for mode in fit.modes]
+    moving = [(v @ modal[3:, 3:] @ v) / (v @ rigid[3:, 3:] @ v) for v in velocity if np.any(v)]
+    return 1.0 - float(np.mean(turning)), 1.0 - float(np.mean(moving)) if moving else 1.0
+
+
+def percent(value: float) -> str:
+    """A fraction in percent with three digits; round-off is shown as zero."""
+    if abs(value) < 1e-9:
+        return "0 %"
+    return f"{100.0 * value:.3g} %" if abs(value) >= 1e-5 else "< 0.001 %"
+
+
+def _listed(modes: tuple[int, ...]) -> str:
+    return " and ".join(str(mode + 1) for mode in sorted(modes))

@@ -1,0 +1,104 @@
+"""What the file of a hinge declares of its kind, and what most kinds have in common."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.jit.kernel import helper
+from flexmb.scene.hinges import AngularCoordinate
+from flexmb.scene.schema import Hinge, PointMass, Vector
+from flexmb.scene.tree import coordinates
+from flexmb.tables.arrays import NO_AXIS
+from flexmb.typing import Real
+
+Item = Hinge | PointMass
+Names = list[tuple[str, str]]
+
+
+class Reduced(NamedTuple):
+    """A hinge of a scene as its kernels take it.
+
+    `sequence` holds the axis numbers of a gimbal; `turn` (3,3) turns both hinge frames, so that a single axis is z.
+    """
+
+    sequence: tuple[int, ...] = ()
+    turn: Real = np.eye(3)
+
+
+def scalar_state(item: Item) -> tuple[list[float], list[float]]:
+    """Initial values and rates of scalar coordinates (rad or m, per second)."""
+    found = [
+        (c.angle_rad, c.rate_rad_s) if isinstance(c, AngularCoordinate) else (c.position_m, c.rate_m_s)
+        for _, c in coordinates(item)
+    ]
+    return [value for value, _ in found], [rate for _, rate in found]
+
+
+def scalar_names(item: Item) -> tuple[Names, Names]:
+    """(name, unit) of scalar coordinates and of their rates, by their keys in the scene."""
+    units = [(name, "rad" if isinstance(c, AngularCoordinate) else "m") for name, c in coordinates(item)]
+    return units, [(f"{name}.rate", f"{unit}/s") for name, unit in units]
+
+
+def no_ball(item: Any) -> tuple[float, float]:
+    """Neither stiffness nor damping but that of scalar coordinates."""
+    return 0.0, 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class HingeKind:
+    """One kind of hinge. See `flexmb.hinges` for its kernels `pose`, `motion`, `rate` and `retract`.
+
+    `reduced` gives the hinges and point masses of a scene that are of this kind in their kernels' terms, None for all
+    others. `state` gives their initial coordinates and speeds, `names` the (name, unit) of both, `ball` stiffness
+    (N m/rad) and damping (N m s/rad) of an isotropic spring on the first three speeds; its quaternion comes first.
+    """
+
+    name: str
+    coordinates: int
+    speeds: int
+    pose: Callable[..., Any]
+    motion: Callable[..., Any]
+    rate: Callable[..., Any]
+    retract: Callable[..., Any]
+    reduced: Callable[[Item], Reduced | None]
+    axis: int = NO_AXIS  # of a single speed along z: ANGULAR_Z or LINEAR_Z
+    quaternion: int = -1  # where it begins among the coordinates; -1 where there is none
+    displacements: tuple[int, ...] = ()  # speeds (m/s); all others are angular
+    state: Callable[[Any], tuple[list[float], list[float]]] = scalar_state
+    names: Callable[[Any], tuple[Names, Names]] = scalar_names
+    ball: Callable[[Any], tuple[float, float]] = no_ball
+
+
+def scalar_hinge(
+    name: str, freedoms: int, *, pose: Callable[..., Any], motion: Callable[..., Any],
+    reduced: Callable[[Item], Reduced | None], axis: int = NO_AXIS, displacements: tuple[int, ...] = (),
+) -> HingeKind:  # fmt: skip
+    """A kind all of whose speeds are the rates of its coordinates."""
+
+    @helper
+    def rate(q, i, u, j, sequence, dq):
+        for n in range(freedoms):
+            dq[i + n] = u[j + n]
+
+    @helper
+    def retract(q, i, increment, j, result):
+        for n in range(freedoms):
+            result[i + n] = q[i + n] + increment[j + n]
+
+    return HingeKind(
+        name, freedoms, freedoms, pose, motion, rate, retract, reduced, axis=axis, displacements=displacements
+    )
+
+
+def z_to(axis: Vector) -> Real:
+    """A rotation whose third column is `axis`."""
+    z = np.asarray(axis, float) / np.linalg.norm(axis)
+    aside = np.eye(3)[np.argmin(np.abs(z))]
+    x = np.cross(aside, z)
+    x /= np.linalg.norm(x)
+    return np.column_stack([x, np.cross(z, x), z])

@@ -1,0 +1,17 @@
+"""The integrators there are, each declared in its own file."""
+
+from __future__ import annotations
+
+from flexmb.integrate import dop853, exponential, generalised_alpha, radau5, rk4
+from flexmb.integrate.integrator import Integrator
+from flexmb.tables import arguments
+
+INTEGRATORS: dict[str, Integrator] = {
+    module.INTEGRATOR.name: module.INTEGRATOR for module in (dop853, rk4, radau5, exponential, generalised_alpha)
+}
+"""By name."""
+
+
+def integrator(name: str) -> Integrator:
+    """The integrator of that name; ValueError for a name that there is not."""
+    return INTEGRATORS[arguments.one_of("method", name, INTEGRATORS)]

@@ -1,0 +1,59 @@
+"""Wheels: each is one more speed of its body, and acts on the node that carries it.
+
+The mass matrix of the body holds the despun wheel: its mass and its inertia, as if it turned with the node.
+"""
+
+from flexmb.jain.forces import add_port_torque
+from flexmb.jain.ports import port_bias, port_velocity
+from flexmb.jit.kernel import helper
+from flexmb.spatial.inertia import add_inertia, outer_inertia
+from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, times, vec3
+
+
+@helper
+def spin_axis(c, w, i):
+    """Axis q of wheel i, body axes."""
+    return times(mat3(w.port[c.wheel[i].port].R, 0), vec3(c.wheel[i].axis, 0))
+
+
+@helper
+def gyroscopic_torque(c, w, k, i, axis):
+    """w_node x I thetad q of wheel i on body k."""
+    omega, _ = port_velocity(w, k, c.wheel[i].port)
+    return cross(omega, scale(c.wheel[i].axial * w.u[c.wheel[i].u_index], axis))
+
+
+@helper
+def wheel_forces(c, w, k):
+    """Wheels of body k, eliminated: I (thetadd + q . alpha_node) = torque.
+
+    A free wheel takes the axial inertia away from the body again (rank one) and hands its torque to the node; both free
+    and prescribed wheels add the gyroscopic torque.
+    """
+    for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+        port = c.wheel[i].port
+        j = c.wheel[i].u_index
+        axial, axis = c.wheel[i].axial, spin_axis(c, w, i)
+        gyroscopic = gyroscopic_torque(c, w, k, i, axis)
+        f = c.speed[j].prescribed
+        if f >= 0:
+            torque = axpy(axial * w.function[f, 2], axis, gyroscopic)
+        else:
+            alpha, _ = port_bias(w, k, port)
+            torque = axpy(w.speed[j].applied - axial * dot(axis, alpha), axis, gyroscopic)
+            _remove_axial_inertia(c, w, k, port, axis, axial)
+        add_port_torque(c, w, w, k, port, torque)
+
+
+@helper
+def _remove_axial_inertia(c, w, k, port, axis, axial):
+    """M_m -= I a a' with a = [W' q; q; 0]."""
+    zero = (0.0, 0.0, 0.0)
+    add_inertia(w.body[k].inertia, 0, outer_inertia(axis, zero, -axial))
+    nm = c.body[k].modes
+    for n in range(nm):
+        an = dot(vec3(w.port_mode[port, n].W, 0), axis)
+        for i in range(3):
+            w.mode[k, n].pfr[i] -= axial * an * axis[i]
+        for i in range(nm):
+            w.pff[k, n, i] -= axial * an * dot(vec3(w.port_mode[port, i].W, 0), axis)

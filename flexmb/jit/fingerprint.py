@@ -1,0 +1,241 @@
+"""What a compiled kernel depends on, as one digest: the code of every function it reaches, and nothing else.
+
+A kernel is walked as its compiler walks it: from its code through the global names, the attributes of modules and the
+closure cells that this refers to, to helpers, choosers (`by_bundle`), constants and classes, and on from there. Of each
+function count its instructions, names, constants and defaults, but neither docstring nor comments, nor line numbers and
+files; of constants their values. So correcting a comment compiles nothing anew, and editing one hinge compiles what
+reaches this hinge. Numba and numpy count by their versions, the room `jit`, which is part of the compiler, as a whole.
+
+Whatever cannot be told from its value ends in a TypeError: a kernel that is wrongly found on disk is silently wrong.
+Globals count as they are when a kernel is first asked for; as for numba, rebinding them later changes nothing.
+"""
+
+from __future__ import annotations
+
+import builtins
+import dis
+import hashlib
+import inspect
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, is_dataclass
+from enum import Enum
+from functools import cache
+from importlib.util import find_spec
+from pathlib import Path
+from types import CodeType, FunctionType, ModuleType
+from typing import Any
+
+import llvmlite
+import numba
+import numpy as np
+
+_BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
+_ROOM = Path(__file__).parent
+_COMPILE_NOTHING = {"__init__", "counting"}  # files of this room
+_PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
+_KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
+_CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
+_STORE = bytes([dis.opmap["STORE_NAME"]])
+
+
+def fingerprint(kernel: FunctionType) -> str:
+    """Digest of all that the compiled kernel depends on, but for the types of its arguments and the processor.
+
+    Raises TypeError where a function refers to something whose value cannot be told.
+    """
+    functions = reached(kernel)
+    place = {function: i for i, function in enumerate(functions)}
+    digest = hashlib.sha256(_compiler())
+    for function in functions:
+        own = _own(function)
+        digest.update(own.digest + b"".join(place[called].to_bytes(4) for called in own.refers_to))
+    return digest.hexdigest()
+
+
+def reached(kernel: FunctionType) -> list[FunctionType]:
+    """The kernel and all functions that it refers to, directly or not, in the order in which they are met."""
+    met = {kernel: None}
+    waiting = [kernel]
+    for function in waiting:
+        for called in _own(function).refers_to:
+            if called not in met:
+                met[called] = None
+                waiting.append(called)
+    return waiting
+
+
+@cache
+def _compiler() -> bytes:
+    """Digest of what compiles: Python, numba and what it stands on, and the code of this room."""
+    versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
+    room = [_digest(_FileWords(file.stem)) for file in sorted(_ROOM.glob("*.py")) if file.stem not in _COMPILE_NOTHING]
+    return hashlib.sha256(repr((versions, room)).encode()).digest()
+
+
+@dataclass(frozen=True)
+class _Own:
+    """What one function says by itself, and the functions it refers to in the order of its words."""
+
+    digest: bytes
+    refers_to: tuple[FunctionType, ...]
+
+
+@cache
+def _own(function: FunctionType) -> _Own:
+    words = _Words(function)
+    return _Own(_digest(words), tuple(words.refers_to))
+
+
+def _digest(words: Iterable[str | bytes]) -> bytes:
+    digest = hashlib.sha256()
+    for word in words:
+        text = word if isinstance(word, bytes) else word.encode()
+        digest.update(b"%d:" % len(text) + text)
+    return digest.digest()
+
+
+class _Words:
+    """A function as a sequence of words, which differ where what is compiled differs."""
+
+    def __init__(self, function: FunctionType) -> None:
+        self.refers_to: list[FunctionType] = []
+        self._function = function
+        self._modules = set[str]()
+        self._attributes = sorted(_names(function.__code__))
+
+    def __iter__(self) -> Iterator[str | bytes]:
+        function = self._function
+        yield f"{function.__module__}.{function.__qualname__}"  # part of the symbols in what is compiled
+        yield from self._code(function.__code__)
+        yield from self._value(function.__defaults__)
+        for name, default in (function.__kwdefaults__ or {}).items():
+            yield name
+            yield from self._value(default)
+        for name, cell in zip(function.__code__.co_freevars, function.__closure__ or (), strict=True):
+            yield name
+            yield from self._value(cell.cell_contents)
+
+    def _code(self, code: CodeType) -> Iterator[str | bytes]:
+        """Its instructions; in place of the numbers of constants, among which docstrings have one, their values."""
+        operations, arguments = code.co_code[::2], bytearray(code.co_code[1::2])
+        constants, names = list[Any](), dict[str, None]()
+        for i, operation in enumerate(operations):
+            if operation not in _CONSTANT and operation != _GLOBAL:
+                continue
+            number = arguments[i] + (arguments[i - 1] << 8 if i and operations[i - 1] == _EXTENDED else 0)
+            if operation == _GLOBAL:
+                names[code.co_names[number >> 1]] = None  # the last bit is no part of the number
+            else:
+                arguments[i] = 0
+                if not _is_told(code, operations[i + 1 : i + 2], arguments[i + 1 : i + 2]):
+                    constants.append(code.co_consts[number])
+        yield operations
+        yield bytes(arguments)
+        yield code.co_exceptiontable
+        counts = code.co_argcount, code.co_posonlyargcount, code.co_kwonlyargcount, code.co_flags & _KIND
+        yield repr((counts, code.co_names, code.co_varnames, code.co_freevars, code.co_cellvars))
+        yield from self._value(tuple(constants))
+        for name in names:
+            yield name
+            yield from self._value(self._global(name))
+
+    def _global(self, name: str) -> Any:
+        try:
+            space = self._function.__globals__
+            return space[name] if name in space else getattr(builtins, name)
+        except AttributeError:
+            raise TypeError(f"{self._function.__qualname__}: there is no {name}") from None
+
+    def _value(self, value: Any) -> Iterator[str | bytes]:
+        """A constant, or what a name stands for."""
+        function = getattr(value, "py_func", value)  # of what is compiled
+        if isinstance(function, FunctionType) and _root(function.__module__) not in _BY_VERSION:
+            self.refers_to.append(function)
+            yield f"function {sorted(map(str, getattr(value, 'targetoptions', {}).items()))}"
+        elif isinstance(value, ModuleType):
+            yield from self._module(value)
+        elif isinstance(value, type):
+            yield from self._class(value)
+        elif type(value) in _PLAIN:
+            yield f"{type(value).__name__} {value!r}"
+        elif isinstance(value, CodeType):
+            yield "code"
+            yield from self._code(value)
+        elif isinstance(value, (tuple, frozenset)):
+            yield from self._collection(value)
+        elif isinstance(value, Enum):
+            yield f"member {value.name}"
+            yield from self._value(value.value)
+        elif isinstance(value, (np.ndarray, np.generic)) and not value.dtype.hasobject:
+            yield f"array {value.dtype!r} {value.shape} {value.flags.c_contiguous} {value.flags.f_contiguous}"
+            yield value.tobytes()
+        elif isinstance(value, (np.dtype, numba.types.Type)):
+            yield f"type {value!r}"
+        elif hasattr(value, "__name__") and _root(_home(value)) in _BY_VERSION:
+            yield f"{type(value).__name__} {_home(value)}.{value.__name__}"
+        else:
+            raise TypeError(
+                f"{self._function.__module__}.{self._function.__qualname__} refers to a {type(value).__qualname__}, "
+                f"which the key of a compiled kernel cannot tell from others: {value!r}"
+            )
+
+    def _module(self, module: ModuleType) -> Iterator[str | bytes]:
+        """Its name, and what it holds of all names that the function looks up in anything."""
+        yield f"module {module.__name__}"
+        if _root(module.__name__) in _BY_VERSION or module.__name__ in self._modules:
+            return
+        self._modules.add(module.__name__)
+        for name in self._attributes:
+            if hasattr(module, name):
+                yield name
+                yield from self._value(getattr(module, name))
+
+    def _class(self, value: type) -> Iterator[str | bytes]:
+        """A class that a kernel may make an object of, or that a chooser asks for."""
+        yield f"class {value.__module__}.{value.__qualname__}"
+        if issubclass(value, tuple) and hasattr(value, "_fields"):
+            yield repr(value._fields)
+            yield from self._value(tuple(getattr(value, "_field_defaults", {}).values()))
+        elif issubclass(value, Enum):
+            yield from self._value(tuple(value))
+        elif not (is_dataclass(value) or issubclass(value, BaseException) or _root(value.__module__) in _BY_VERSION):
+            raise TypeError(f"{self._function.__qualname__}: the key of a compiled kernel knows no classes as {value}")
+
+    def _collection(self, value: tuple[Any, ...] | frozenset[Any]) -> Iterator[str | bytes]:
+        yield f"{type(value).__name__} of {len(value)}"
+        items: Iterable[Any] = value if isinstance(value, tuple) else sorted(value, key=repr)
+        for item in items:
+            yield from self._value(item)
+
+
+class _FileWords(_Words):
+    """A file of this room: what its functions refer to is in this room too, or in the libraries."""
+
+    def __init__(self, name: str) -> None:
+        name = f"{__package__}.{name}"
+        loader: Any = getattr(find_spec(name), "loader", None)
+        super().__init__(FunctionType(loader.get_code(name), {"__name__": name}))
+
+    def _global(self, name: str) -> Any:
+        return None
+
+
+def _is_told(code: CodeType, operation: bytes, argument: Sequence[int]) -> bool:
+    """Whether the next instruction stores a constant as the docstring of a file or class, or as its line."""
+    return operation == _STORE and code.co_names[argument[0]] in ("__doc__", "__firstlineno__")
+
+
+def _names(code: CodeType) -> set[str]:
+    """All names in a function and in those inside it."""
+    inner = (_names(constant) for constant in code.co_consts if isinstance(constant, CodeType))
+    return set(code.co_names).union(*inner)
+
+
+def _home(value: Any) -> str:
+    """Module of a built-in function; numpy's have none of their own, but a class."""
+    return getattr(value, "__module__", None) or type(value).__module__
+
+
+def _root(module: str) -> str:
+    return module.partition(".")[0]

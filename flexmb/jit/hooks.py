@@ -1,0 +1,94 @@
+"""What is used of numba's internals: three hooks, for versions of numba that they were tried with.
+
+`parts`  helpers are compiled into what calls them only; see `flexmb/jit/parts.py`.
+`keep`   compiled kernels are kept on disk by a cache of our own; see `flexmb/jit/cache.py`.
+`address`  a compiled kernel is called by the address of the wrapper that numba made with it; see `pointer.py`.
+
+With any other numba, or where one of the internals is missing, kernels are compiled by plain `njit` and reached through
+`cfunc`, both documented: results are the same, every process compiles anew, and one warning says so. Numba's own cache
+is no way out: it does not see an edited helper in another file, and two processes may overwrite each other's entries.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import cache
+from types import FunctionType
+from typing import Any
+
+from numba import __version__, cfunc
+
+from flexmb.jit.folder import cache_directory, warn_once
+
+OLDEST, NEWEST = (0, 60), (0, 68)  # numba versions that the hooks were tried with: tests/flexmb/jit/test_hooks.py
+
+# "contract" fuses a*b + c. No "nnan" or "ninf": they would let the compiler delete the checks that catch a blow-up.
+SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "nogil": True}
+
+
+def _compiled_anew(compiled: Any, function: FunctionType) -> None:
+    """Without a cache: nothing is kept."""
+
+
+def _through_cfunc(kernel: Any, signature: Any) -> int:
+    return int(_c_function(kernel, signature).address)
+
+
+@cache
+def _c_function(kernel: Any, signature: Any) -> Any:
+    """Held as long as the process: its address is of no use without it."""
+    return cfunc(signature, **SEMANTICS)(kernel.py_func)
+
+
+@dataclass(frozen=True)
+class Hooks:
+    """How helpers and kernels are compiled: as here, by what numba documents, or by its internals."""
+
+    parts: dict[str, Any] = field(default_factory=dict)  # options of njit for a helper
+    keep: Callable[[Any, FunctionType], None] = _compiled_anew  # (dispatcher, its function)
+    address: Callable[[Any, Any], int] = _through_cfunc  # of (dispatcher, signature), once it is compiled for it
+
+
+def _by_internals() -> Hooks:
+    """Raises ImportError or AttributeError where numba is another than was tried."""
+    if not OLDEST <= _version() <= NEWEST:
+        raise ImportError(f"it was tried with {_text(OLDEST)} to {_text(NEWEST)}")
+    from numba.core.types.function_type import CompileResultWAP
+
+    from flexmb.jit.cache import KernelCache
+    from flexmb.jit.parts import PartCompiler
+
+    def keep(compiled: Any, function: FunctionType) -> None:
+        directory = cache_directory()
+        if directory is not None:
+            compiled._cache = KernelCache(function, directory)
+
+    def address(kernel: Any, signature: Any) -> int:
+        return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())
+
+    parts = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler}
+    return Hooks(parts, keep, address)
+
+
+def _version() -> tuple[int, int]:
+    major, minor = __version__.split(".")[:2]
+    return int(major), int(minor)
+
+
+def _text(version: tuple[int, int]) -> str:
+    return ".".join(map(str, version))
+
+
+def _hooks() -> Hooks:
+    try:
+        return _by_internals()
+    except (ImportError, AttributeError) as problem:
+        warn_once(
+            f"numba {__version__} is not one that flexmb knows from inside ({problem}): compilation takes longer and "
+            f"every process does it anew; results are the same. Install numba>={_text(OLDEST)},<={_text(NEWEST)}.*"
+        )
+        return Hooks()
+
+
+HOOKS = _hooks()

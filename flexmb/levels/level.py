@@ -1,0 +1,71 @@
+"""What the file of a fidelity level declares of it, and the tables that it makes of a body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flexmb.modal.flexible_model import FlexibleModel
+from flexmb.modal.integrals import TurningPoints
+from flexmb.scene.bodies import Level
+from flexmb.tables.arrays import MODE, PAIR
+from flexmb.typing import Real, Record
+
+_SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+
+
+@dataclass(frozen=True)
+class InertiaTables:
+    """Tables of one body for `flexmb.tables.arrays.Constants`, (m) and (m,m) modes.
+
+    `rigid` (10,) holds mass, first moment and inertia about the origin at rest; `mode` and `pair` are MODE and PAIR
+    records; `summed` are the points left to sum at run time. `product`, `slope` (SLOPE records) and `mass_slope` are
+    rows of the tables of these names.
+    """
+
+    rigid: Real
+    mode: Record
+    pair: Record
+    summed: TurningPoints | None = None
+    product: Real | None = None
+    slope: Record | None = None
+    mass_slope: Real | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class FidelityLevel:
+    """One fidelity level. `inertia_and_bias(c, w, k)` is its kernel, see `flexmb.levels`.
+
+    `tables(model, wheels)` makes the tables of a body, whose last `wheels` points are its despun wheels.
+    `without_masses` is that kernel without what is constant at this level and was taken care of before the run, where
+    modes are condensed: the modal masses, at rest the coupling too. It is `inertia_and_bias` where nothing is constant.
+    """
+
+    name: Level
+    inertia_and_bias: Callable[..., Any]
+    without_masses: Callable[..., Any]
+    tables: Callable[[FlexibleModel, int], InertiaTables]
+    cost: float  # operations of a body with four modes against one of level ruthless
+    flexible: bool = True  # whether the body keeps its modes
+    at_rest: bool = False  # whether inertia and kinematics are those of the rest shape, for all coordinates
+    second_order: bool = False  # whether displacements have a part of second order in the coordinates
+
+
+def empty_tables(model: FlexibleModel) -> tuple[Record, Record]:
+    """`mode` and `pair` of a body with its stiffness and damping, all else zero."""
+    mode, pair = np.zeros(model.mode_count, MODE), np.zeros((model.mode_count, model.mode_count), PAIR)
+    pair["stiffness"], pair["damping"] = model.stiffness, model.damping
+    return mode, pair
+
+
+def six(m: Real) -> list[float]:
+    """xx, yy, zz, xy, xz, yz of a symmetric matrix."""
+    return [float(m[i, j]) for i, j in _SIX]
+
+
+def sixes(m: Real) -> Real:
+    """The same of symmetric matrices (...,3,3), (...,6)."""
+    return np.stack([m[..., i, j] for i, j in _SIX], axis=-1)

@@ -1,0 +1,50 @@
+"""Output times of a run, and the memory that they take."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from flexmb.system.tree_system import System
+from flexmb.tables import arguments
+from flexmb.typing import Real
+
+OUTPUT_BYTES = 2**32
+"""Memory that the outputs of one run may take."""
+_NUMBER_BYTES, _OBJECT_BYTES, _SAMPLE_BYTES = 16, 200, 2000  # evaluated, then gathered; of Python, measured
+_TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
+
+
+def sample_times(samples: int | Sequence[float] | Real, t_end: float) -> Real:
+    """Times (T,) from 0 to t_end (s), so many or these; ValueError or TypeError for what makes no sense."""
+    if np.ndim(samples) == 0:
+        number = arguments.whole("samples", samples)
+        if number < 2:
+            raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
+        if number > OUTPUT_BYTES // _SAMPLE_BYTES:
+            raise ValueError(f"samples is {number}: {_TOO_MANY}")
+        times = np.linspace(0.0, t_end, number)
+        if np.all(np.diff(times) > 0.0):
+            return times
+        raise ValueError(f"samples is {number}: there are not so many numbers from 0 to t_end = {t_end:g} s")
+    times = arguments.array("samples", samples)
+    increasing = times.ndim == 1 and len(times) > 1 and bool(np.all(np.diff(times) > 0.0))
+    if not (increasing and times[0] == 0.0 and times[-1] == t_end):
+        raise ValueError(f"the output times must increase from 0 to t_end = {t_end:g} s: sort them and add both ends")
+    return times.copy()
+
+
+def refuse_too_many(samples: int, system: System) -> None:
+    """ValueError where the outputs would not fit into OUTPUT_BYTES."""
+    most = OUTPUT_BYTES // sample_bytes(system)
+    if samples > most:
+        raise ValueError(f"samples is {samples}, and this scene allows {most}: {_TOO_MANY}")
+
+
+def sample_bytes(system: System) -> int:
+    """Memory that one output time of a run takes, at most."""
+    scene = system.scene
+    places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
+    numbers = system.nq + 2 * system.nu + 24 * len(scene.markers) + 6 * places + 11
+    return _NUMBER_BYTES * numbers + _OBJECT_BYTES * (4 * len(scene.markers) + places) + _SAMPLE_BYTES

@@ -1,0 +1,118 @@
+"""Keyword arguments that methods of the builder have in common or that few scenes need, as typed dictionaries.
+
+Type checkers and editors know their names, and other names are refused when a call is made. A name that is not given
+has the default of the schema.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Literal, TypedDict
+
+from numpy.typing import ArrayLike
+
+from flexmb.scene import schema as s
+from flexmb.scene.problems import closest
+
+
+def refuse_others(what: str, names: Iterable[str], known: type) -> None:
+    """TypeError for a name that a typed dictionary does not have, with the nearest that it has."""
+    for name in names:
+        if name not in known.__annotations__:
+            raise TypeError(f'{what} has no "{name}": {closest(name, known.__annotations__)}')
+
+
+class Placement(TypedDict, total=False):
+    """Where a hinge sits: nodes of parent and child, and the hinge frames' fixed offsets from them (node axes, m)."""
+
+    parent_node: str
+    child_node: str
+    parent_position: ArrayLike
+    parent_quaternion: ArrayLike
+    child_position: ArrayLike
+    child_quaternion: ArrayLike
+
+
+class Angle(TypedDict, total=False):
+    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad),
+    `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time."""
+
+    angle: float
+    rate: float
+    stiffness: float
+    damping: float
+    rest: float
+    torque: s.Function | None
+    prescribed: s.Function | None
+
+
+class Displacement(TypedDict, total=False):
+    """A linear coordinate: initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m),
+    `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of time."""
+
+    position: float
+    rate: float
+    stiffness: float
+    damping: float
+    rest: float
+    force: s.Function | None
+    prescribed: s.Function | None
+
+
+class TurningHinge(Placement, Angle, total=False):
+    """Where a hinge sits, and its one angle."""
+
+
+class SlidingHinge(Placement, Displacement, total=False):
+    """Where a hinge sits, and its one displacement."""
+
+
+class BeamOptions(TypedDict, total=False):
+    """How a beam becomes points and modes, see `flexmb.scene.schema.BeamBody`: `theory`, `mass` matrix, inertia
+    `points`; and rigid lumps fixed to it, `tip_masses`."""
+
+    theory: Literal["euler-bernoulli", "timoshenko"]
+    mass: Literal["consistent", "lumped"]
+    points: Literal["line", "rotary", "section"]
+    tip_masses: Sequence[s.TipMass]
+
+
+class ModalMatrices(TypedDict, total=False):
+    """`stiffness`, `damping`: modal matrices (m,m). `gravity_stiffness` (3,m,m) and `gradient_stiffness` (3,3,m,m):
+    geometric stiffness under unit loads, see `flexmb.scene.schema.ModalBody`."""
+
+    stiffness: ArrayLike
+    damping: ArrayLike
+    gravity_stiffness: ArrayLike
+    gradient_stiffness: ArrayLike
+
+
+class WheelMotion(TypedDict, total=False):
+    """A wheel's `offset` (m) from its node, initial `angle` (rad) and `speed` (rad/s), `friction` (N m s/rad), motor
+    `torque` (N m) or `prescribed` angle (rad) as functions of time."""
+
+    offset: ArrayLike
+    angle: float
+    speed: float
+    friction: float
+    torque: s.Function | None
+    prescribed: s.Function | None
+
+
+class ClosureFrames(TypedDict, total=False):
+    """Frames A and B of a closure: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
+
+    node_a: str
+    node_b: str
+    position_a: ArrayLike
+    quaternion_a: ArrayLike
+    position_b: ArrayLike
+    quaternion_b: ArrayLike
+
+
+class SectionShape(TypedDict, total=False):
+    """A beam section's torsion constant `J` (m⁴), `shear_factor`, and station `x` (m)."""
+
+    J: float | None
+    shear_factor: float
+    x: float

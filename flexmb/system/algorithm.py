@@ -1,0 +1,57 @@
+"""What an algorithm declares about itself: the last lines of its file. `algorithms` lists all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Set
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal, NamedTuple
+
+from flexmb.frisch.errata import Erratum
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.closure.system import ClosedMotion, Closures
+    from flexmb.entry.observation import Outputs
+    from flexmb.system.tree_system import System
+
+Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
+"""Names of the algorithms, for type checkers: a test holds them to the list."""
+
+
+class Route(NamedTuple):
+    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold."""
+
+    tables: Callable[[], tuple[Any, Any]]
+    rhs: Any
+    project: Any
+
+
+@dataclass(frozen=True)
+class DynamicsAlgorithm:
+    """A way from a state to its accelerations, and what it can do besides.
+
+    All functions take y = [q, u, work] and raise DynamicsError where there are no accelerations.
+    """
+
+    name: Algorithm
+    summary: str
+    """What it is, in one line."""
+    accelerations: Callable[[System, float, Real], Real]
+    """udot (nu,) of a tree."""
+    observe: Callable[[System, float, Real, Outputs], None]
+    """Fills everything observable of a tree."""
+    kernel: Callable[[System], tuple[Any, tuple[Any, ...]]]
+    """The kernel of the accelerations, and fresh tables that it takes after t and y."""
+    route: Callable[[System], Route] | None = None
+    """For runs of trees; None where it is for single states."""
+    closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
+    """For closed chains; None where it knows trees only."""
+    jacobian: bool = False
+    """It has the Jacobians that stiff integrators need, of trees."""
+    errata: Set[Erratum] | None = None
+    """Defects of Frisch's print that it keeps; None where its equations are not his."""
+
+    @property
+    def is_first_order(self) -> bool:
+        """Whether it takes bodies of level `full` as `linear`."""
+        return self.errata is not None

@@ -1,0 +1,27 @@
+"""The algorithms there are, each declared in its own file, and the names of those that can do something."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+from flexmb.system.algorithm import DynamicsAlgorithm
+from flexmb.system.by_composite_bodies import ALGORITHM as COMPOSITE
+from flexmb.system.by_nested_bodies import FRISCH, FRISCH_AS_PRINTED
+from flexmb.system.by_recursion import ALGORITHM as ARTICULATED
+from flexmb.system.by_unsplit_recursion import ALGORITHM as UNSPLIT
+from flexmb.tables import arguments
+
+ALGORITHMS: dict[str, DynamicsAlgorithm] = {
+    each.name: each for each in (ARTICULATED, UNSPLIT, COMPOSITE, FRISCH, FRISCH_AS_PRINTED)
+}
+"""By name."""
+
+RUNNING = tuple(each.name for each in ALGORITHMS.values() if each.route is not None)
+ON_CHAINS = tuple(each.name for each in ALGORITHMS.values() if each.closed_motion is not None)
+WITH_JACOBIAN = tuple(each.name for each in ALGORITHMS.values() if each.jacobian)
+NESTED = tuple(each.name for each in ALGORITHMS.values() if each.errata is not None)
+
+
+def chosen(name: str, among: Iterable[str] = ALGORITHMS) -> DynamicsAlgorithm:
+    """The algorithm of that name; ValueError for a name that is not `among` those."""
+    return ALGORITHMS[arguments.one_of("algorithm", name, among)]

@@ -1,0 +1,48 @@
+"""Accelerations by articulated bodies: the O(N) recursion."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from flexmb.entry import articulated
+from flexmb.entry.observation import Outputs, observe
+from flexmb.motion import coordinates
+from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.closure.system import ClosedMotion, Closures
+    from flexmb.system.tree_system import System
+
+
+def _accelerations(system: System, t: float, y: Real) -> Real:
+    c, w = system.recursion_constants, system._recursion_w
+    system._check(articulated.accelerations(t, y, c, w), int(w.fault[0]))
+    system._trust(t, y, w)
+    return w.speed["acceleration"].copy()
+
+
+def _observe(system: System, t: float, y: Real, out: Outputs) -> None:
+    c, w = system.recursion_constants, system._recursion_w
+    system._check(observe(t, y, c, w, out), int(w.fault[0]))
+    system._trust(t, y, w)
+
+
+def _tables(system: System) -> tuple[Any, Any]:
+    return system.recursion_constants, system.recursion_workspace()
+
+
+def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
+    return closures.motion(t, y)
+
+
+ALGORITHM = DynamicsAlgorithm(
+    "articulated",
+    "the O(N) recursion",
+    _accelerations,
+    _observe,
+    kernel=lambda system: (articulated.accelerations, _tables(system)),
+    route=lambda system: Route(lambda: _tables(system), articulated.rhs, coordinates.project),
+    closed_motion=_closed_motion,
+    jacobian=True,
+)

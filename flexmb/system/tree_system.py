@@ -1,0 +1,230 @@
+"""A compiled scene: its arrays, its state vectors, and pointwise mechanics.
+
+    system = compile(scene)
+    state = system.initial_state
+    acc = system.accelerations(state)
+
+q holds, body by body (depth-first, point masses last), hinge coordinates, modal coordinates and wheel angles; u the
+speeds in the same order. `system.coordinate(name)` and `system.speed(name)` give the places of a hinge, "<body>.hinge",
+"<body>.modes", a wheel or a point mass.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+
+import numpy as np
+
+from flexmb.building.assemble import assemble
+from flexmb.building.links import links
+from flexmb.building.numbering import Numbering, wheels_by_body
+from flexmb.entry import articulated
+from flexmb.entry.observation import Outputs, observe_motion
+from flexmb.frisch.nested_system import NestedSystem, Partitions
+from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
+from flexmb.jain.operators import Operators, SpatialOperators
+from flexmb.motion import coordinates
+from flexmb.scene import schema as s
+from flexmb.system import algorithms
+from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.mechanics import Mechanics
+from flexmb.system.observables import Evaluation, Names, Observation
+from flexmb.tables import arguments
+from flexmb.tables.arrays import Workspace
+from flexmb.tables.state import State, finite_result
+from flexmb.tables.workspaces import workspace
+from flexmb.typing import Index, Real
+
+
+class System(Mechanics):
+    """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
+
+    def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
+        super().__init__()
+        self.scene = scene
+        self._links = links(scene)
+        self._wheels = wheels_by_body(scene)
+        self._numbering = Numbering(self._links, self._wheels)
+        assembled = assemble(scene, self._links, self._numbering)
+        self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
+        self.layout = self._numbering.layout
+        self.nq, self.nu = self.layout.nq, self.layout.nu
+        self._w = self.workspace()
+        self.recursion_constants = with_elimination(self.constants, elimination)
+        self._recursion_w = self.recursion_workspace()
+        hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
+        self._observation = Observation(Names(markers, hinges, wheels, self._driven([*hinges, *wheels])), self.nu)
+        self.rhs, self.project = articulated.rhs, coordinates.project
+        self._nested: dict[str, NestedSystem] = {}
+        self._operators: SpatialOperators | None = None
+
+    @property
+    def body_names(self) -> tuple[str, ...]:
+        """Bodies in the order of the dynamics, point masses last."""
+        return tuple(link.name for link in self._links)
+
+    def coordinate(self, name: str) -> slice:
+        """Place in q of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self._numbering.q, name)
+
+    def speed(self, name: str) -> slice:
+        """Place in u of a hinge, "<body>.hinge", "<body>.modes", wheel or point mass."""
+        return _find(self._numbering.u, name)
+
+    def state(self, q: Real, u: Real, t: float = 0.0) -> State:
+        """State from q (nq,), u (nu,) and t (s), copies; quaternions need not have unit length, they are scaled.
+
+        ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, TypeError for what are no
+        real numbers.
+        """
+        return self.layout.state(q, u, t)
+
+    @property
+    def initial_state(self) -> State:
+        """The scene's state at t = 0; prescribed coordinates have their functions' values."""
+        q, u = np.zeros(self.nq), np.zeros(self.nu)
+        for link in self._links:
+            name = link.hinge.name
+            q[self.coordinate(name)], u[self.speed(name)] = link.kind.state(link.hinge)
+        for wheel in self.scene.wheels:
+            q[self.coordinate(wheel.name)], u[self.speed(wheel.name)] = wheel.angle_rad, wheel.speed_rad_s
+        for modal in self.scene.modal_states:
+            name = f"{modal.body}.modes"
+            if self.coordinate(name).stop > self.coordinate(name).start:
+                q[self.coordinate(name)] = modal.coordinates
+                u[self.speed(name)] = modal.rates or 0.0
+        y = np.concatenate([q, u, [0.0]])
+        self.project(0.0, y, self.constants)
+        return self.layout.known(0.0, y)
+
+    def workspace(self) -> Workspace:
+        """A fresh workspace for `rhs`; one per thread."""
+        return workspace(self.constants, self.nq, self.nu)
+
+    def recursion_workspace(self) -> Workspace:
+        """A fresh workspace for `rhs` with `recursion_constants`, whose bodies are eliminated as chosen."""
+        return workspace(self.recursion_constants, self.nq, self.nu)
+
+    @property
+    def elimination(self) -> dict[str, str]:
+        """By flexible body, how the recursion eliminates its modes: "explicit", "woodbury" or "condensed"."""
+        body = self.recursion_constants.body
+        return {
+            name: ELIMINATIONS[body["elimination"][k]] for k, name in enumerate(self.body_names) if body["modes"][k]
+        }
+
+    def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
+        """Frisch's equations of this scene, corrected or as printed, built at the first call.
+
+        ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
+        """
+        errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
+        if algorithm not in self._nested:
+            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
+        return self._nested[algorithm]
+
+    def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
+        """The partitioned equations of motion, Frisch (111), by the names of the paper."""
+        t, y = self.layout.entering(state)
+        return self.nested(algorithm).partitions(t, y)
+
+    def operators(self, state: State) -> Operators:
+        """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
+        t, _ = self.layout.entering(state)
+        if self._operators is None:
+            self._operators = SpatialOperators(self.scene)
+        found = self._operators.at(t, state.q, state.u)
+        for part in (found.M_m, found.a_m, found.b_m, found.V_m):
+            finite_result(part, t)
+        return found
+
+    def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
+        """udot (nu,) of the free motion under all loads; prescribed speeds have their functions' rates.
+
+        "articulated": the O(N) recursion; "unsplit": the same with modes and hinge of a body eliminated together;
+        "composite": mass matrix by composite bodies, bias by inverse dynamics, Cholesky's factors, partitioned for
+        prescribed speeds; "frisch": the nested-body equations of 1975, corrected, "frisch_as_printed": to the letter.
+        Frisch's equations are of first order in the deformation: they take bodies of level `full` as `linear`.
+        Raises DynamicsError where an inertia is not positive definite, or numbers are so large that they overflow.
+        """
+        t, y = self.layout.entering(state)
+        return finite_result(self._accelerations(t, y, algorithm), t)
+
+    def _accelerations(self, t: float, y: Real, algorithm: Algorithm) -> Real:
+        return algorithms.chosen(algorithm).accelerations(self, t, y)
+
+    def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
+        """The algorithm as runs see it; `stabilise` is for closed chains.
+
+        ValueError for an algorithm that is for single states, or does not apply to the scene.
+        """
+        if arguments.number("stabilise", stabilise) != 0.0:
+            raise ValueError(f"stabilise is {stabilise:g}, but the scene has no closures: leave it out")
+        made = algorithms.chosen(algorithm, algorithms.RUNNING).route
+        assert made is not None  # of those that run
+        return made(self)
+
+    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
+
+        Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced, Jain & Rodriguez (44).
+        """
+        t, y = self.layout.entering(state)
+        if accelerations is None:
+            return self._evaluate(t, y, "articulated").loads
+        rates = self.layout.rates("accelerations", accelerations)
+        return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+
+    def _by_hinge(self, loads: Real) -> dict[str, Real]:
+        return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
+
+    def energy(self, state: State) -> dict[str, float]:
+        """Kinetic, strain, spring and gravity energy (J)."""
+        return self._evaluate(*self.layout.entering(state), "articulated").energy
+
+    def momentum(self, state: State) -> Real:
+        """(6,) [angular about the World origin; linear], World axes."""
+        return self._evaluate(*self.layout.entering(state), "articulated").momentum
+
+    def evaluate(self, t: float, q: Real, u: Real, algorithm: Algorithm = "articulated") -> Evaluation:
+        """Everything observable at time t (s) of q (nq,) and u (nu,).
+
+        Quaternions need not have unit length, they are scaled; prescribed coordinates and speeds are taken from their
+        functions. ValueError or TypeError for arrays that do not fit, as of `state`; DynamicsError where the
+        accelerations do not exist, or numbers are so large that they overflow.
+        With "frisch" or "frisch_as_printed", accelerations, hinge loads, drive loads and wheel torques are those of
+        these equations; a wheel's force follows from its acceleration (the paper counts its mass as the body's).
+        """
+        return self._evaluate(*self.layout.packed(t, q, u), algorithm)
+
+    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        algorithms.chosen(algorithm).observe(self, t, y, self._observation.out)
+        return self._observation.evaluation(t)
+
+    def _observe_motion(self, t: float, y: Real, out: Outputs) -> None:
+        """Markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
+        observe_motion(t, y, self.constants, self._w, out)
+
+    def _observe_forced(self, t: float, y: Real, out: Outputs) -> None:
+        """The same, and the loads of hinges by inverse dynamics."""
+        out.loads[:] = self._inverse(t, y, out.rates)[1]
+        self._observe_motion(t, y, out)
+
+    def _wheel_names(self) -> Iterator[str]:
+        yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))
+
+    def _driven(self, names: Iterable[str]) -> dict[str, Index]:
+        """Places in u of the prescribed coordinates, by hinge or wheel."""
+        found = {}
+        for name in names:
+            place = self.speed(name)
+            driven = self.constants.speed["prescribed"][place] >= 0
+            if np.any(driven):
+                found[name] = place.start + np.flatnonzero(driven)
+        return found
+
+
+def _find(places: dict[str, slice], name: str) -> slice:
+    if name not in places:
+        raise KeyError(f"no coordinates of that name: {name!r}; there are {', '.join(sorted(places))}")
+    return places[name]

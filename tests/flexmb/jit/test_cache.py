@@ -1,0 +1,250 @@
+"""The cache of compiled kernels: whatever happens to its files, results stay right and nothing ends in a traceback."""
+
+import os
+import shutil
+import subprocess
+import sys
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from flexmb.jit import folder as folders
+from flexmb.jit import hooks
+from flexmb.jit.folder import cache_directory, forget, warn_once
+from flexmb.jit.kernel import kernel
+
+ROOT = Path(__file__).parents[3]
+TINY = """
+from flexmb.tables.soundness import unsound as kernel
+import numpy as np
+result = kernel(np.array([1.0, np.nan]), np.zeros(0, np.int64)), kernel(np.ones(2), np.zeros(0, np.int64))
+assert result == (1, 0), result
+"""
+REAL = """
+from flexmb.integrate.rk4 import rk4 as kernel
+from tests.flexmb.integrate.integration_problems import HARMONIC, exact, solve
+assert abs(solve(HARMONIC, [0.0, 1.0], step=1e-2).last - exact(HARMONIC, 1.0)).max() < 1e-6
+"""
+HITS = "\nprint(sum(kernel.stats.cache_hits.values()))"
+PROBES = {"tiny": TINY + HITS, "real": REAL + HITS}
+
+
+def run(cache: Path, probe: str, *options: str) -> subprocess.CompletedProcess:
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(cache), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, *options, "-c", PROBES[probe]]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done
+
+
+def kernels(cache: Path) -> list[Path]:
+    found = sorted(cache.rglob("*.kernel"))
+    assert found
+    return found
+
+
+def emptied(file: Path) -> None:
+    file.write_bytes(b"")
+
+
+def cut(file: Path) -> None:
+    file.write_bytes(file.read_bytes()[:-100])
+
+
+def garbage(file: Path) -> None:
+    file.write_bytes(os.urandom(5000))
+
+
+def flipped(file: Path) -> None:
+    """One bit in the machine code."""
+    data = bytearray(file.read_bytes())
+    data[len(data) // 2] ^= 1
+    file.write_bytes(bytes(data))
+
+
+def folder(file: Path) -> None:
+    file.unlink()
+    file.mkdir()
+    (file / "inside").write_text("")
+
+
+DAMAGES = (emptied, cut, garbage, flipped, folder)
+
+
+def weighted(values, weight):
+    """A tiny kernel, of integers or of floats."""
+    total = 0.0
+    for value in values:
+        total += weight * value
+    return total
+
+
+def hits(cache: Path, monkeypatch) -> int:
+    """Versions of the kernel that were found in a cache: of two."""
+    monkeypatch.setattr(hooks, "cache_directory", lambda: cache / "sources")
+    warn_once.cache_clear()
+    forget.cache_clear()
+    fresh = kernel(weighted)
+    assert fresh(np.arange(4), 2.0) == 12.0
+    assert fresh(np.array([0.5, 0.25]), 2.0) == 1.5
+    return sum(fresh.stats.cache_hits.values())
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_damaged_files_are_compiled_anew_with_one_warning(damage, tmp_path, monkeypatch):
+    assert [hits(tmp_path, monkeypatch) for _ in range(2)] == [0, 2]
+    for file in kernels(tmp_path):
+        damage(file)
+    with pytest.warns(RuntimeWarning, match="damaged files in") as warned:
+        assert hits(tmp_path, monkeypatch) == 0
+    assert len(warned) == 1
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert hits(tmp_path, monkeypatch) == 2
+
+
+def test_files_that_changed_names_are_not_taken_for_each_other(tmp_path, monkeypatch):
+    """Two processes that compile for different types at once could do that to an index."""
+    hits(tmp_path, monkeypatch)
+    one, other = kernels(tmp_path)
+    swapped = other.read_bytes(), one.read_bytes()
+    one.write_bytes(swapped[0])
+    other.write_bytes(swapped[1])
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 0
+
+
+def test_one_damaged_file_costs_one_kernel(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
+    cut(kernels(tmp_path)[0])
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 1
+
+
+def test_a_real_kernel_is_repaired_too(tmp_path):
+    """All of its files at once, each by another damage: one warning."""
+    run(tmp_path, "real")
+    files = kernels(tmp_path)
+    assert len(files) >= 3
+    for file, damage in zip(files, DAMAGES, strict=False):
+        damage(file)
+    repaired = run(tmp_path, "real")
+    assert repaired.stdout.strip() == "0"
+    assert repaired.stderr.count("RuntimeWarning: damaged files in") == 1
+    assert run(tmp_path, "real").stdout.strip() == "1"
+
+
+@pytest.mark.skipif(os.name == "nt" or os.geteuid() == 0, reason="who may do everything is locked out of nothing")
+def test_a_file_without_permission_is_replaced(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
+    for file in kernels(tmp_path):
+        file.chmod(0)
+    with pytest.warns(RuntimeWarning, match="damaged files in"):
+        assert hits(tmp_path, monkeypatch) == 0
+
+
+@pytest.mark.filterwarnings("ignore:damaged files")
+def test_a_kernel_that_cannot_be_kept_runs_with_one_warning(tmp_path, monkeypatch):
+    (tmp_path / "sources").write_text("no folder")
+    with pytest.warns(RuntimeWarning, match="cannot be kept .* NUMBA_CACHE_DIR") as warned:
+        assert hits(tmp_path, monkeypatch) == 0
+    assert len({str(warning.message) for warning in warned}) == len(warned)
+
+
+def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path))
+    place = cache_directory.__wrapped__()
+    place.rmdir()
+    place.write_text("no folder")
+    assert cache_directory.__wrapped__() == place
+    assert place.is_dir()
+
+
+def test_kernels_that_nobody_uses_are_forgotten_when_others_are_compiled(tmp_path, monkeypatch):
+    hits(tmp_path, monkeypatch)
+    earlier = tmp_path / "sources" / "of-earlier-sources.kernel"
+    earlier.write_text("")
+    compiled = sorted((tmp_path / "sources").glob("weighted-*"))
+    for file in (earlier, *compiled):
+        os.utime(file, (0, 0))
+    assert hits(tmp_path, monkeypatch) == 2
+    assert earlier.exists()  # nothing was compiled
+    compiled[0].unlink()
+    assert hits(tmp_path, monkeypatch) == 1
+    assert not earlier.exists()
+    assert kernels(tmp_path) == compiled
+
+
+def test_where_nothing_can_be_written_a_warning_says_so_and_kernels_run(tmp_path):
+    place = tmp_path / "file"
+    place.write_text("")
+    done = run(place, "tiny")
+    assert done.stderr.count("RuntimeWarning: compiled kernels cannot be kept") == 1
+    assert "NUMBA_CACHE_DIR" in done.stderr
+
+
+def test_processes_that_compile_at_once_share_one_sound_cache(tmp_path):
+    environment = os.environ | {"NUMBA_CACHE_DIR": str(tmp_path), "PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-W", "error", "-c", PROBES["tiny"]]
+    started = [subprocess.Popen(command, env=environment, cwd=ROOT, stdout=subprocess.DEVNULL) for _ in range(3)]
+    assert [each.wait() for each in started] == [0] * 3
+    assert run(tmp_path, "tiny", "-W", "error").stdout.strip() == "1"
+    assert all(file.suffix == ".kernel" for file in tmp_path.rglob("*") if file.is_file())
+
+
+def test_without_the_compiler_one_line_says_why():
+    environment = os.environ | {"NUMBA_DISABLE_JIT": "1", "PYTHONPATH": str(ROOT)}
+
+    def stderr(code: str) -> str:
+        done = subprocess.run([sys.executable, "-c", code], env=environment, cwd=ROOT, capture_output=True, text=True)
+        assert done.returncode != 0
+        return done.stderr
+
+    last = stderr("import flexmb; flexmb.compile").splitlines()[-1]
+    assert last.startswith("ImportError: flexmb runs compiled kernels")
+    scene = next((ROOT / "cases").rglob("scene.toml"))
+    command = f"['flexmb', 'simulate', {str(scene)!r}, '--t-end', '1']"
+    words = stderr(f"import sys; sys.argv = {command}; import flexmb.cli; flexmb.cli.main()")
+    assert len(words.splitlines()) == 1 and "NUMBA_DISABLE_JIT is set" in words
+
+
+EDITED = "from flexmb.entry import entry; print(entry(1.0), sum(entry.stats.cache_hits.values()))"
+ENTRY = """
+from flexmb.jit.kernel import kernel
+from flexmb.part import part
+
+@kernel
+def entry(x):
+    return part(x)
+"""
+PART = """
+from flexmb.jit.kernel import helper
+
+@helper
+def part(x):
+    "{words}"
+    return {factor} * x
+"""
+
+
+def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(tmp_path):
+    """A package of its own: the room jit, a kernel, and a helper in another file."""
+    package = tmp_path / "flexmb"
+    shutil.copytree(ROOT / "flexmb" / "jit", package / "jit")
+    (package / "__init__.py").write_text("")
+    (package / "entry.py").write_text(ENTRY)
+    environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}
+
+    def run(factor: float, words: str) -> str:
+        (package / "part.py").write_text(PART.format(factor=factor, words=words))
+        command = [sys.executable, "-c", EDITED]
+        done = subprocess.run(command, env=environment, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return done.stdout.strip()
+
+    assert run(2.0, "Times two.") == "2.0 0"
+    assert run(2.0, "Times two.") == "2.0 1"
+    assert run(2.0, "Two times what it takes.") == "2.0 1"
+    assert run(3.0, "Two times what it takes.") == "3.0 0"
+    assert run(2.0, "Two times.") == "2.0 1"

@@ -1,0 +1,121 @@
+"""Hooks into numba's internals: they are in use with the numba installed here, and there is a way without them."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import numpy as np
+import pytest
+
+from flexmb.jit import hooks
+from flexmb.jit.bundle import bundle
+from flexmb.jit.cache import KernelCache
+from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.parts import PartCompiler, _Part
+
+ROOT = Path(__file__).parents[3]
+
+
+@bundle
+class Numbers:
+    values: np.ndarray
+
+
+@helper
+def doubled(numbers, i):
+    return 2.0 * numbers.values[i]
+
+
+@kernel
+def total(numbers):
+    found = 0.0
+    for i in range(numbers.values.shape[0]):
+        found += doubled(numbers, i)
+    return found
+
+
+@pytest.fixture
+def compiled(tmp_path, monkeypatch):
+    """Compiled in this test, for a helper has no versions where its kernel was found on disk."""
+    monkeypatch.setattr(hooks, "cache_directory", lambda: tmp_path)
+    fresh = kernel(total.py_func)
+    assert fresh(Numbers(np.arange(4.0))) == 12.0
+    return fresh
+
+
+def test_the_hooks_are_in_use():
+    """With a numba that nobody tried yet this fails: try it, then move the bounds in `hooks` and pyproject.toml."""
+    assert hooks.Hooks() != hooks.HOOKS, f"numba {numba.__version__} takes none of the hooks"
+    assert hooks.HOOKS.parts["pipeline_class"] is PartCompiler
+
+
+def test_helpers_are_parts_without_machine_code(compiled):
+    [version] = doubled.overloads.values()
+    assert type(version.library) is _Part
+    assert version.library._finalized
+    assert "doubled" in version.library.get_llvm_str()
+
+
+def test_the_dispatcher_asks_our_cache(compiled, tmp_path):
+    assert isinstance(compiled._cache, KernelCache)
+    assert len(list(tmp_path.glob("total-*.kernel"))) == 1
+    again = kernel(total.py_func)
+    assert again(Numbers(np.ones(2))) == 4.0
+    assert sum(again.stats.cache_hits.values()) == 1
+
+
+def test_addresses_of_a_bundle_are_loaded_once(compiled):
+    """A loop over an array of a bundle does not read its address again and again."""
+    [text] = compiled.inspect_llvm().values()
+    assert "!invariant.load" in text
+
+
+PROBE = """
+import warnings
+import numba
+numba.njit(lambda x: x)(1.0)  # numba itself has all it needs
+{hidden}
+with warnings.catch_warnings(record=True) as warned:
+    warnings.simplefilter("always")
+    from flexmb.jit.hooks import HOOKS, Hooks
+    from flexmb.integrate.rk4 import rk4
+    from flexmb.tables.soundness import unsound
+    from tests.flexmb.integrate.integration_problems import HARMONIC, solve
+    from tests.flexmb.jit.test_bundle import choose, fill_inner, Nested, pair
+    import numpy as np
+    told = [each.message for each in warned if each.category is RuntimeWarning]
+    print("plain" if HOOKS == Hooks() else "hooks", *told)
+print(fill_inner(Nested(pair(), np.array([1.0, 3.0])), 2.0), choose(pair()), unsound(np.ones(2), np.zeros(0, np.int64)))
+print(solve(HARMONIC, [0.0, 1.0], step=1e-2).last.tolist())
+"""
+HIDDEN = {
+    "another version": "numba.__version__ = '0.99.1'",
+    "a linker of another name": "import numba.core.codegen; del numba.core.codegen.JITCodeLibrary",
+    "a cache of another name": "import numba.core.caching; del numba.core.caching.NullCache",
+}
+
+
+def probe(hidden: str) -> tuple[str, list[str]]:
+    """The first line and all others."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", PROBE.format(hidden=hidden)]
+    done = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    first, *others = done.stdout.splitlines()
+    return first, others
+
+
+@pytest.fixture(scope="module")
+def by_hooks():
+    first, others = probe("")
+    assert first == "hooks"
+    return others
+
+
+@pytest.mark.parametrize("hidden", HIDDEN)
+def test_without_the_hooks_results_are_the_same_and_one_warning_says_so(hidden, by_hooks):
+    first, others = probe(HIDDEN[hidden])
+    assert first.startswith("plain numba ") and first.count("is not one that flexmb knows from inside") == 1
+    assert others == by_hooks

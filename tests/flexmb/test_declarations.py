@@ -1,0 +1,161 @@
+"""Hinges and levels are what their files declare: every list follows, and a kind made up here moves as it should."""
+
+from dataclasses import fields
+from typing import get_args
+
+import numpy as np
+import pytest
+
+from flexmb.building import assemble, carried
+from flexmb.dense import DenseSystem, body_frames
+from flexmb.dense.hinge_frames import hinge_frame, moved, rotated
+from flexmb.entry import articulated
+from flexmb.hinges import catalogue
+from flexmb.hinges.kind import HingeKind, Reduced, scalar_hinge, z_to
+from flexmb.jit.counting import count
+from flexmb.jit.kernel import helper
+from flexmb.jit.numbered import numbered
+from flexmb.levels.body import LEVELS
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import Level
+from flexmb.scene.build import angular
+from flexmb.scene.hinges import Z_AXIS, _Hinge
+from flexmb.spatial.rotation import rotation_z
+from flexmb.system.system import System
+from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
+from tests import trees
+from tests.bounds import backward_error, gamma
+
+AXIS = (0.6, 0.0, 0.8)
+POINTS = [
+    s.PointMass(name="p", body="b", mass_kg=1.0, directions=tuple(map(tuple, np.eye(3)[:free]))) for free in range(4)
+]
+ENDS = {"name": "h", "parent": "ground", "child": "b"}
+TWO_AXES = s.Gimbal(**ENDS, sequence="zy", rotations=(angular(), angular()))
+ITEMS = [*(struct(**ENDS) for struct in get_args(s.Hinge)), TWO_AXES, *POINTS]
+
+
+@pytest.mark.parametrize("item", ITEMS, ids=lambda item: type(item).__name__)
+def test_every_hinge_of_the_schema_is_of_one_kind(item):
+    """... which has as many initial values and names as coordinates and speeds."""
+    [kind] = [kind for kind in catalogue.KINDS if kind.reduced(item) is not None]
+    assert catalogue.kind_of(item)[0] is kind
+    for pair in (kind.state(item), kind.names(item)):
+        assert tuple(map(len, pair)) == (kind.coordinates, kind.speeds)
+
+
+def test_every_kind_is_of_the_schema():
+    assert {catalogue.kind_of(item)[0] for item in ITEMS} == set(catalogue.KINDS)
+    assert len({kind.name for kind in catalogue.KINDS}) == len(catalogue.KINDS)
+
+
+@pytest.mark.parametrize("kind", catalogue.KINDS, ids=lambda kind: kind.name)
+def test_what_a_kind_says_of_its_speeds_is_true(kind):
+    """Displacements have (m/s), a single axis is along z, and a quaternion has one coordinate more than speeds."""
+    item = next(item for item in ITEMS if catalogue.kind_of(item)[0] is kind)
+    units = [unit for _, unit in kind.names(item)[1]]
+    assert [n for n, unit in enumerate(units) if unit == "m/s"] == list(kind.displacements)
+    state = np.ones(8)
+    H = count(kind.motion, state, 0, state, 0, np.array([0, 1, 2]), np.zeros((6, 6))).arguments[-1].astype(float)
+    rows = [row for row in (ANGULAR_Z, LINEAR_Z) if kind.speeds == 1 and np.array_equal(H[:, 0], np.eye(6)[row])]
+    assert rows == ([kind.axis] if kind.axis >= 0 else [])
+    assert (kind.quaternion >= 0) == (kind.coordinates == kind.speeds + 1)
+
+
+def test_levels_are_those_of_the_schema():
+    assert tuple(level.name for level in LEVELS) == get_args(Level)
+
+
+def test_a_thing_of_no_kind_is_refused():
+    with pytest.raises(TypeError, match="no kind of flexmb.hinges takes a Screw: h"):
+        catalogue.kind_of(Screw(**ENDS))
+
+
+PITCH = 0.3  # m/rad
+
+
+class Screw(_Hinge, frozen=True, kw_only=True, tag="screw"):
+    """Rotation about `axis`, and PITCH times as much translation along it."""
+
+    axis: s.Vector = Z_AXIS
+    rotation: s.AngularCoordinate = s.AngularCoordinate()
+
+
+@helper
+def pose(q, i, sequence):
+    return rotation_z(q[i]), (0.0, 0.0, PITCH * q[i])
+
+
+@helper
+def motion(q, i, u, j, sequence, H):
+    H[2, 0] = 1.0
+    H[5, 0] = PITCH
+    zero = (0.0, 0.0, 0.0)
+    return ((0.0, 0.0, u[j]), (0.0, 0.0, PITCH * u[j])), (zero, zero)
+
+
+def reduced(item) -> Reduced | None:
+    return Reduced(turn=z_to(item.axis)) if isinstance(item, Screw) else None
+
+
+SCREW = scalar_hinge("screw", 1, pose=pose, motion=motion, reduced=reduced)
+
+
+def screw_frame(hinge, c):
+    if not isinstance(hinge, Screw):
+        return hinge_frame(hinge, c)
+    angle = c[..., 0]
+    return moved((hinge.axis, angle.map(lambda x: PITCH * x))).carry(rotated((hinge.axis, angle)))
+
+
+@pytest.fixture
+def with_screw(monkeypatch):
+    """A catalogue of one more kind, and the dense route with its frame."""
+    kinds = (*catalogue.KINDS, SCREW)
+    for room in (catalogue, assemble, carried):
+        monkeypatch.setattr(room, "KINDS", kinds)
+    for name in ("pose", "motion", "rate", "retract"):
+        monkeypatch.setattr(catalogue, name, numbered(name, [getattr(kind, name) for kind in kinds]))
+    monkeypatch.setattr(catalogue, "_QUATERNION", np.array([kind.quaternion for kind in kinds]))
+    monkeypatch.setattr(body_frames, "hinge_frame", screw_frame)
+
+
+def screwed(bodies: int = 4) -> s.Scene:
+    """A random tree whose last hinges are screws."""
+    scene = trees.random_scene(3, trees.Recipe(bodies=bodies, carriers=("rigid", "modal"), wheels=1, point_masses=1))
+    place = [key for key in _Hinge.__struct_fields__]
+    screws = [
+        Screw(
+            **{key: getattr(hinge, key) for key in place}, axis=AXIS,
+            rotation=angular(angle=0.4, rate=1.5, stiffness=3.0, damping=0.2),
+        )
+        for hinge in scene.hinges[1:]
+    ]  # fmt: skip
+    return s.Scene(
+        **{key: getattr(scene, key) for key in scene.__struct_fields__ if key != "hinges"},
+        hinges=(scene.hinges[0], *screws),
+    )  # fmt: skip
+
+
+def test_a_made_up_hinge_needs_its_declaration_only(with_screw):
+    """Tables, numbering, dispatch and initial state follow; the accelerations solve the dense equations."""
+    scene = screwed()
+    system, dense = System(scene), DenseSystem(scene)
+    q, u = np.zeros(system.nq), np.zeros(system.nu)
+    for link in system._links:
+        q[system.coordinate(link.hinge.name)], u[system.speed(link.hinge.name)] = link.kind.state(link.hinge)
+    q, u = dense.on_profile(q, u, 0.0)
+    assert sum(body["hinge_kind"] == len(catalogue.KINDS) - 1 for body in system.constants.body) == 3
+    y = np.concatenate([q, u, [0.0]])
+    counted = count(articulated.accelerations, 0.0, y, system.constants, system.workspace())
+    rates = np.array([float(speed.acceleration) for speed in counted.arguments[3].speed])
+    free = np.ones(dense.nu, dtype=bool)
+    free[[x.u for x in dense.tree.scalars if x.prescribed is not None]] = False
+    right = dense.applied(q, u) - dense.bias(q, u)
+    assert backward_error(dense.mass_matrix(q)[free], rates, right[free]) <= gamma(dense.nu)
+
+
+def test_a_declaration_has_no_field_that_nobody_reads():
+    """Every field of HingeKind differs between kinds: one that is always its default is not needed."""
+    for field in fields(HingeKind):
+        assert len({str(getattr(kind, field.name)) for kind in catalogue.KINDS}) > 1, field.name

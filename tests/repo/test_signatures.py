@@ -1,0 +1,54 @@
+"""No function has more than eight arguments; those whose arguments are the options of a command line may."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+
+import crosscheck.cli
+import flexmb.cli
+from tests.repo.project import ROOT
+
+MOST = 8
+# (file, function) that still have more: to be emptied, not to be filled.
+KNOWN = {
+    ("flexmb/scene/build.py", "beam"),
+    ("flexmb/scene/build.py", "modal_body"),
+    ("flexmb/scene/build.py", "revolute"),
+    ("flexmb/scene/build.py", "prismatic"),
+    ("flexmb/scene/build.py", "wheel"),
+    ("flexmb/scene/build.py", "closure"),
+    ("flexmb/scene/shapes.py", "beam_section"),
+}
+
+
+def long_signatures(source: str) -> Iterator[str]:
+    """Names of the functions with more arguments than that, positional and keyword-only ones, `self` included."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef):
+            given = node.args
+            if len(given.posonlyargs) + len(given.args) + len(given.kwonlyargs) > MOST:
+                yield node.name
+
+
+def commands() -> set[tuple[str, str]]:
+    """(file, function) of every command of the command lines."""
+    found = [each.callback for app in (flexmb.cli.app, crosscheck.cli.app) for each in app.registered_commands]
+    return {(f"{each.__module__.replace('.', '/')}.py", each.__name__) for each in found if each is not None}
+
+
+def test_functions_have_few_arguments() -> None:
+    files = [path for package in ("flexmb", "crosscheck") for path in sorted((ROOT / package).rglob("*.py"))]
+    found = {
+        (path.relative_to(ROOT).as_posix(), name)
+        for path in files
+        for name in long_signatures(path.read_text(encoding="utf-8"))
+    }
+    assert found - commands() - KNOWN == set()
+
+
+def test_a_ninth_argument_is_seen() -> None:
+    nine = ", ".join(f"a{i}" for i in range(9))
+    assert list(long_signatures(f"def f({nine}): ...\ndef g({nine[4:]}): ...")) == ["f"]
+    assert list(long_signatures(f"def f(a, /, b, *, {nine[8:]}): ...")) == ["f"]
+    assert list(long_signatures(f"def f({nine[4:]}, *more, **others): ...")) == []
