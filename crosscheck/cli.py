@@ -1,4 +1,4 @@
-"""The command `crosscheck`: thin, it only reads words and shows results."""
+"""The command `crosscheck`: it reads the command line and shows results; the work is done by the other rooms."""
 
 from __future__ import annotations
 
@@ -20,13 +20,15 @@ from crosscheck.library.selection import without_part
 from crosscheck.records.lock import FolderInUseError, locked
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
-from crosscheck.report.console import cases_table, engines_table, print_outcome, words
-from crosscheck.running.engine_list import describe_engines
-from crosscheck.running.live import LiveProgress
-from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.installed import describe_engines
+from crosscheck.running.pool import TIME_LIMIT_S, Limits
 from crosscheck.running.sweep import sweep
-from crosscheck.verify.table import channels_table
-from crosscheck.verify.verify import sample_times_csv, verify_csv
+from crosscheck.terminal.csv_channels import channels_table
+from crosscheck.terminal.listings import cases_table, engines_table, maps_table
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.text import words
+from crosscheck.terminal.verdicts import print_outcome
+from crosscheck.verify.against_case import sample_times_csv, verify_csv
 from flexmb.output.writing import in_words
 from flexmb.scene.problems import closest
 
@@ -110,10 +112,10 @@ def run(
         _refuse(idle)
     with _sole_writer(out):
         with LiveProgress(console) as live:
+            limits = Limits(jobs, time_limit)
             sweep(
-                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, workers=jobs, time_limit_s=time_limit,
-                listener=live.hear,
-            )  # fmt: skip
+                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear
+            )
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
         _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
 
@@ -221,21 +223,21 @@ def stability(
     **Examples**: `crosscheck stability list` · `crosscheck stability vibrating_hinge --depth 5` ·
     `crosscheck stability all --pictures docs/pictures`
     """
-    from crosscheck.stability.console import run_and_draw, show_maps  # they load the compiler
     from crosscheck.stability.run import PROVIDER, maps_of
+    from crosscheck.terminal.map_runs import run_and_draw  # they load the compiler
 
     _check_limit(time_limit)
     known = maps_of(PROVIDER)
     if maps == ["list"]:
-        return show_maps(console, known.values())
+        console.print(maps_table(known.values()))
+        return
     chosen = list(known) if maps == ["all"] else maps
     for name in chosen:
         if name not in known:
             _refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
     with _sole_writer(out):
-        code = run_and_draw(
-            console, chosen, out, pictures or out, depth=depth, fresh=fresh, workers=jobs, time_limit_s=time_limit
-        )
+        limits = Limits(jobs, time_limit)
+        code = run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits)
     raise typer.Exit(code)
 
 
@@ -249,7 +251,7 @@ def _found(words: tuple[str, ...]) -> tuple[find.Case, ...]:
 
 @contextmanager
 def _sole_writer(out: Path) -> Iterator[None]:
-    """Hold the folder for as long as something is written there; what the user can put right is one line."""
+    """Lock the folder while something is written there; an error that the user can put right is shown in one line."""
     with _in_one_line(), locked(out):
         yield
 
@@ -260,7 +262,7 @@ def _check_limit(seconds: float | None) -> None:
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
-    """Write what the cases have reached beside their run files, or say why not; whether it was done."""
+    """Write the figures that the cases have reached beside their run files, or say why not; whether it was done."""
     try:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
@@ -284,12 +286,12 @@ def _conclude(
 
 @contextmanager
 def _in_one_line() -> Iterator[None]:
-    """What the user can put right ends the command with one line, and warnings are lines too: no tracebacks."""
+    """Show each warning, and the error that ends the command, in one line without a traceback."""
     with warnings.catch_warnings():
         warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
         try:
             yield
-        except BrokenPipeError:  # whoever read the output has read enough
+        except BrokenPipeError:  # the reader of the output has closed it
             raise
         except OSError as error:
             _refuse(in_words(error))

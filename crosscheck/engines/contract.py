@@ -6,14 +6,15 @@ body components to World components; spatial vectors are angular first. Native c
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Literal, Protocol, runtime_checkable
+from dataclasses import dataclass, field, fields
+from typing import Any, Literal, Protocol, runtime_checkable
 
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 Array = Real  # as engines outside this package import it
 Status = Literal["finished", "diverged", "failed"]
+ENERGIES = ("kinetic", "strain", "spring", "gravity")  # the kinds of energy that an engine may give
 
 
 @dataclass(frozen=True)
@@ -88,11 +89,21 @@ class MarkerPath:
     velocity: Real
 
 
+def _by_name(*columns: int | None) -> Any:
+    """An output that several items have, by their names: arrays (T, *columns)."""
+    return field(default_factory=dict, metadata={"columns": columns})
+
+
+def _single(*columns: int | None) -> Any:
+    """An output of the whole scene: an array (T, *columns), or None where the engine does not know it."""
+    return field(default=None, metadata={"columns": columns})
+
+
 @dataclass(frozen=True)
 class Trajectory:
     """One run. Arrays are cut to the T samples reached: a diverged run keeps its good part and says when and why.
 
-    All this is checked before it is recorded (`crosscheck.running.checked`); an answer that breaks it counts as
+    All this is checked before it is recorded (`crosscheck.engines.answers`); an answer that breaks it counts as
     *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
     does not offer.
     `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
@@ -103,14 +114,20 @@ class Trajectory:
     message: str
     times: Real
     markers: dict[str, MarkerPath]
-    loads: dict[str, Real] = field(default_factory=dict)
-    wheel_loads: dict[str, Real] = field(default_factory=dict)
-    drives: dict[str, Real] = field(default_factory=dict)
-    energy: dict[str, Real] = field(default_factory=dict)
-    momentum: Real | None = None
-    work: Real | None = None
+    loads: dict[str, Real] = _by_name(6)
+    wheel_loads: dict[str, Real] = _by_name(6)
+    drives: dict[str, Real] = _by_name(None)
+    energy: dict[str, Real] = _by_name()
+    momentum: Real | None = _single(6)
+    work: Real | None = _single()
     wall_s: float = 0.0
     evaluations: int = 0
+
+
+OUTPUTS: dict[str, tuple[int | None, ...]] = {
+    each.name: each.metadata["columns"] for each in fields(Trajectory) if "columns" in each.metadata
+}
+"""The outputs of a run beside the markers, with the shape that each array has after its T samples; None is any."""
 
 
 @runtime_checkable

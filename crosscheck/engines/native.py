@@ -15,7 +15,17 @@ from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, MarkerPath, MarkerSnapshot, Run, Snapshot, Status, Support, Trajectory
+from crosscheck.engines.contract import (
+    OUTPUTS,
+    Effort,
+    MarkerPath,
+    MarkerSnapshot,
+    Run,
+    Snapshot,
+    Status,
+    Support,
+    Trajectory,
+)
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.run.simulate import simulate
@@ -162,12 +172,7 @@ class NativeModel:
             markers={
                 name: MarkerPath(path.position, path.quaternion, path.velocity) for name, path in done.markers.items()
             },
-            loads=done.loads,
-            wheel_loads=done.wheel_loads,
-            drives=done.drives,
-            energy=done.energy,
-            momentum=done.momentum,
-            work=done.work,
+            **{name: getattr(done, name) for name in OUTPUTS},
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
         )

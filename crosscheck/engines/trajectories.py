@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.contract import MarkerPath, Snapshot, Status, Trajectory
+from crosscheck.engines.contract import OUTPUTS, MarkerPath, Snapshot, Status, Trajectory
 from flexmb.typing import Real
 
 
@@ -34,15 +35,19 @@ def stack(
             )
             for name in first.markers
         },
-        loads={name: np.array([sample.loads[name] for sample in samples]) for name in first.loads},
-        wheel_loads={name: np.array([sample.wheel_loads[name] for sample in samples]) for name in first.wheel_loads},
-        drives={name: np.array([sample.drives[name] for sample in samples]) for name in first.drives},
-        energy={kind: np.array([sample.energy[kind] for sample in samples]) for kind in first.energy},
-        momentum=None if first.momentum is None else np.array([sample.momentum for sample in samples]),
+        **{name: _stacked([getattr(sample, name) for sample in samples]) for name in OUTPUTS if name != "work"},
         work=work,
         wall_s=wall_s,
         evaluations=evaluations,
     )
+
+
+def _stacked(values: Sequence[Any]) -> Any:
+    """One output over time: arrays by name, one array, or None where the engine does not know it."""
+    first = values[0]
+    if isinstance(first, dict):
+        return {name: np.array([value[name] for value in values]) for name in first}
+    return None if first is None else np.array(values)
 
 
 def continuous(quaternions: Real) -> Real:

@@ -8,12 +8,14 @@ from pathlib import Path
 import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.judging.accepted import FILE, dumps, figures, merged
+from crosscheck.judging.figures import figures
+from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
+from crosscheck.library.accepted import FILE, dumps, merged
 from crosscheck.library.find import Case
-from crosscheck.records.records import Archive, CaseRecord, read
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
-from crosscheck.report.outcome import conclude
 
 
 class NotAccepted(ValueError):

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from crosscheck.judging.uncertainty import Rung, Uncertainty, estimate, spatial, unknown
+from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
-from crosscheck.records.records import BrokenLine, CaseRecord, Environment, Packed, Record, RunRecord, RunStatus, unpack
+from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
+from crosscheck.records.packing import Packed, unpack
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 
@@ -58,7 +59,7 @@ class Result:
 
     @property
     def ending(self) -> Ending:
-        """How a run that did not finish ended; not for one that did."""
+        """How the run ended; only of a run that did not finish."""
         assert self.status != "finished"
         return Ending(self.status, f"{self.engine} on {self.variant}: {self.message}", self.reached_s)
 
@@ -80,7 +81,7 @@ class Result:
         ladder = [run for run in self._ladder() if run.status == "finished"]
         if _without_effect(ladder):
             ladder = ladder[-1:]
-        rungs = [Rung(run.effort_value, self.values(channel, run)) for run in ladder]
+        rungs = [RungSignal(run.effort_value, self.values(channel, run)) for run in ladder]
         size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
         return estimate(channel, finest.effort_kind, rungs, finest.evaluations, size)
 
@@ -90,7 +91,7 @@ class Result:
         return [run for run in self.runs if (run.effort_kind, run.effort_method) == method][-RUNGS:]
 
     def _gap(self, channel: str) -> str:
-        """What the ladder lacks; "" if nothing."""
+        """What is missing from the ladder, so that it says nothing about convergence; "" if nothing is."""
         recorded = {run.rung for run in self.runs}
         missing = [rung for rung in range(self.finest.rungs) if rung not in recorded]
         if missing:
@@ -220,7 +221,7 @@ def _case_results(case: CaseRecord, runs: Iterable[RunRecord]) -> CaseResults:
 
 
 def _malformed(run: RunRecord) -> str:
-    """How a finished run's signals are none, each (T, k) with T sample times; "" if they are."""
+    """Why the signals of a finished run are not arrays (T, k) at T sample times; "" if they are."""
     if run.status != "finished":
         return ""
     if run.times is None:
@@ -237,7 +238,7 @@ def _never_recorded(variant: str, engine: str) -> Result:
 
 
 def _on(ladder: Sequence[tuple[str, str, float]], run: RunRecord) -> bool:
-    """Whether a run is one of the efforts that the case prescribes now, at its place; another ladder's say nothing."""
+    """Whether a run is one of the efforts that the case prescribes now, at its place in the ladder."""
     place = slice(run.rung, run.rung + 1)
     return run.rungs == len(ladder) and list(ladder[place]) == [(run.effort_kind, run.effort_method, run.effort_value)]
 
@@ -258,7 +259,7 @@ def _same(one: RunRecord, other: RunRecord) -> bool:
 
 
 def _past(status: RunStatus) -> str:
-    """A status as what a run did."""
+    """A status as the verb of a sentence about a run."""
     return f"was {status}" if status == "refused" else status
 
 

@@ -58,7 +58,7 @@ class Uncertainty:
 
 
 @dataclass(frozen=True)
-class Rung:
+class RungSignal:
     """One run of a ladder in one channel: the effort's step (s) or relative tolerance, and the signal (T, k)."""
 
     effort: float
@@ -70,7 +70,7 @@ def unknown(samples: int, why: str) -> Uncertainty:
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
 
 
-def estimate(channel: str, kind: str, rungs: Sequence[Rung], evaluations: int, size: float) -> Uncertainty:
+def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], evaluations: int, size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
     `size` is the magnitude of the signal's family, `evaluations` the number of right-hand sides (0 if not counted).
@@ -90,7 +90,7 @@ def estimate(channel: str, kind: str, rungs: Sequence[Rung], evaluations: int, s
     return _enveloped(factor, gap, floor, how, order)
 
 
-def _fault(kind: str, rungs: Sequence[Rung], evaluations: int, size: float) -> str:
+def _fault(kind: str, rungs: Sequence[RungSignal], evaluations: int, size: float) -> str:
     """Why nothing can be said from such runs; "" if something can."""
     if len(rungs) < 2:
         return "fewer than two efforts finished with different results"

@@ -10,8 +10,9 @@ last three are never what was expected.
 E, U and the goal are relative to the channel's range (or to the scale that the case states). Where that range lies
 below U, the signal is zero as far as can be told, and the range of its family (say, all hinge torques) is used.
 
-Judging is total: it has an answer to every input, and none that is not finite, or not positive where it must be, can
-end as agreement. It asks whether what it needs holds, never whether it fails: a comparison with NaN is false.
+Judging is total: every input has an answer, and a number that is not finite, or not positive where it must be, never
+ends as agreement. Conditions therefore ask whether a requirement holds, never whether it fails: every comparison with
+NaN is false.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ from typing import Literal, get_args
 import msgspec
 import numpy as np
 
-from crosscheck.judging.accepted import Figure
 from crosscheck.judging.uncertainty import Uncertainty
+from crosscheck.library.accepted import Figure
 from flexmb.run.channels import distance, family, signal_range
 from flexmb.typing import Real
 
@@ -39,6 +40,7 @@ Status = Literal[
     "crashed",
     "did not run",
 ]
+VerdictKind = Literal["comparison", "control", "conservation"]
 STATUSES: tuple[Status, ...] = get_args(Status)
 # The gravest first: what stands for several.
 GRAVITY: tuple[Status, ...] = (
@@ -57,7 +59,7 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
     case: str
     comparison: str
-    kind: Literal["comparison", "control", "conservation"]
+    kind: VerdictKind
     channel: str
     variant_a: str
     engine_a: str
@@ -82,6 +84,13 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
         return (self.variant_a, self.engine_a), (self.variant_b, self.engine_b)
 
     @property
+    def pair(self) -> str:
+        """Who is compared with whom, in words."""
+        if self.variant_a == self.variant_b:
+            return f"{self.engine_a} – {self.engine_b}"
+        return f"{self.engine_a} ({self.variant_a}) – {self.engine_b} ({self.variant_b})"
+
+    @property
     def ok(self) -> bool:
         """Whether it came out as the case expects, within its bounds; what crashed or did not run never does."""
         return self.status == self.expected and not self.outside and self.status not in NEVER_EXPECTED
@@ -89,7 +98,7 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
 
 @dataclass(frozen=True)
 class Ending:
-    """How a run that did not finish ended, and the last sample time it reached (s), if it reached any."""
+    """How a run ended that did not finish, and the last sample time (s) that it reached, if it reached any."""
 
     status: Status
     reason: str
@@ -171,7 +180,7 @@ def conserve(drift: Real, scale: float, limit: float) -> Finding:
 
 
 def _incomparable(a: Real, b: Real) -> Finding | None:
-    """Why there is nothing to take a distance of, if so."""
+    """The finding where the values have no distance; None where they have one."""
     if a.ndim != 2 or a.shape != b.shape:
         return Finding("failed", f"the results are of different shapes, {a.shape} and {b.shape}: samples by components")
     if a.size == 0:
@@ -182,7 +191,7 @@ def _incomparable(a: Real, b: Real) -> Finding | None:
 
 
 def _unmeasurable(a: Signal, b: Signal, goal: float, scale: float | None) -> Finding | None:
-    """Why no distance means anything here, if so: U, goal, scale or sizes that are none."""
+    """The finding where a distance would mean nothing, as U, goal, scale or sizes are no such numbers; else None."""
     for uncertainty in (a.uncertainty, b.uncertainty):
         if not uncertainty.value >= 0.0:
             return Finding("unresolved", f"an uncertainty of {uncertainty.value:g} is none: {uncertainty.how}")

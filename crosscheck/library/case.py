@@ -99,9 +99,9 @@ Every key, those with a default in brackets with it; the structs below say more 
   ``diverged_s``, ``because`` and ``reason``, as above;
 - ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
 
-``case_check.py`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
+``library/check`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
 that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
-the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.judging.accepted`).
+the E and U that each comparison has reached; `crosscheck run --accept` writes it (see `crosscheck.library.accepted`).
 """
 
 from __future__ import annotations
@@ -135,18 +135,18 @@ class CaseError(ValueError):
     """A case folder that cannot be run: the message names the file, the place in it and the remedy."""
 
 
-class _Strict(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class _CasePart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """Refuses unknown keys; frozen."""
 
 
-class Side(_Strict, frozen=True, kw_only=True):
+class ComparisonSide(_CasePart, frozen=True, kw_only=True):
     """One side of a comparison: a variant run by an engine."""
 
     variant: str
     engine: str
 
 
-class Refined(_Strict, frozen=True, kw_only=True):
+class Refined(_CasePart, frozen=True, kw_only=True):
     """A finer spatial discretisation of the same variant: more segments, pieces or elements per beam.
 
     `order` is the convergence order of the discretisation's error (2 for finite segments with springs at mid-segment
@@ -159,7 +159,7 @@ class Refined(_Strict, frozen=True, kw_only=True):
     order: float = 2.0
 
 
-class EffortLadder(_Strict, frozen=True, kw_only=True):
+class EffortLadder(_CasePart, frozen=True, kw_only=True):
     """Efforts that replace an engine's own ladder for a variant: `values` from coarse to fine, at least two."""
 
     engine: str
@@ -168,7 +168,7 @@ class EffortLadder(_Strict, frozen=True, kw_only=True):
     values: tuple[float, ...]
 
 
-class Variant(_Strict, frozen=True, kw_only=True):
+class Variant(_CasePart, frozen=True, kw_only=True):
     """A model of the case: a scene file, a transformation, and the engines that run the result.
 
     `transform`: "rigidify" (flexible bodies rigid), "modal_points" (beams as raw points and modes), "segments" (every
@@ -195,7 +195,7 @@ class Variant(_Strict, frozen=True, kw_only=True):
     note: str = ""
 
 
-class Comparison(_Strict, frozen=True, kw_only=True):
+class Comparison(_CasePart, frozen=True, kw_only=True):
     """Two results held against each other: `a` and `b`, or every pair of `engines` of one `variant`.
 
     `goals` maps channel patterns to the resolution goal, relative to the channel's range. `scales` replaces the range
@@ -206,8 +206,8 @@ class Comparison(_Strict, frozen=True, kw_only=True):
     name: str
     variant: str | None = None
     engines: tuple[str, ...] = ()
-    a: Side | None = None
-    b: Side | None = None
+    a: ComparisonSide | None = None
+    b: ComparisonSide | None = None
     goals: dict[str, float]
     scales: dict[str, float] = {}
     expect: Expectation = "agree"
@@ -216,8 +216,14 @@ class Comparison(_Strict, frozen=True, kw_only=True):
     because: str = ""
     reason: str = ""
 
+    @property
+    def sides(self) -> tuple[ComparisonSide, ComparisonSide]:
+        """Both sides of a comparison that is one pair, as `selection.select` leaves them."""
+        assert self.a is not None and self.b is not None
+        return self.a, self.b
 
-class Control(_Strict, frozen=True, kw_only=True):
+
+class Control(_CasePart, frozen=True, kw_only=True):
     """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; they must come out *differ*.
 
     Mutations: "mass" and "inertia" (+1 % of body `target`), "com" (+1 % of the body's mass-centre offset),
@@ -229,13 +235,18 @@ class Control(_Strict, frozen=True, kw_only=True):
     name: str
     mutation: MutationKind
     target: str = ""
-    a: Side
-    b: Side
+    a: ComparisonSide
+    b: ComparisonSide
     goals: dict[str, float]
     scales: dict[str, float] = {}
 
+    @property
+    def sides(self) -> tuple[ComparisonSide, ComparisonSide]:
+        """The faulty side, and the true one."""
+        return self.a, self.b
 
-class Conservation(_Strict, frozen=True, kw_only=True):
+
+class Conservation(_CasePart, frozen=True, kw_only=True):
     """A conserved quantity: its drift over the run, less the recorded work, relative to `scale`, is at most `limit`.
 
     `scale` (SI) is by default the largest magnitude reached: for the energy the largest sum of magnitudes of its kinds.
@@ -254,7 +265,7 @@ class Conservation(_Strict, frozen=True, kw_only=True):
     reason: str = ""
 
 
-class Chart(_Strict, frozen=True, kw_only=True):
+class Chart(_CasePart, frozen=True, kw_only=True):
     """A work-precision chart: error of `observable` against the most certain result of variant `reference`."""
 
     title: str = ""
@@ -263,7 +274,7 @@ class Chart(_Strict, frozen=True, kw_only=True):
     reference: str
 
 
-class RunFile(_Strict, frozen=True, kw_only=True):
+class RunFile(_CasePart, frozen=True, kw_only=True):
     """run.toml. `time_limit_s` is how long one engine may take for one variant, all its efforts together."""
 
     title: str
@@ -286,7 +297,7 @@ class RunFile(_Strict, frozen=True, kw_only=True):
         raise CaseError(f'no variant "{name}"; the variants are {known}')
 
 
-class Provenance(_Strict, frozen=True, kw_only=True):
+class Provenance(_CasePart, frozen=True, kw_only=True):
     """provenance.toml: where the case's data and its expected outcome come from.
 
     `reference` says what anchors the case: a published number, a closed form, or the agreement of independent codes.

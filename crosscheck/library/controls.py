@@ -12,7 +12,7 @@ from typing import TypeVar
 import msgspec
 
 from crosscheck.library.case import CaseError, MutationKind
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, SidBody
 from flexmb.scene.hinges import Hinge
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import coordinates
@@ -99,6 +99,8 @@ def _node_rotation(scene: Scene, target: str) -> Scene:
     body_name, _, node_name = target.rpartition(".")
 
     def transposed(body: Body) -> Body:
+        if isinstance(body, SidBody):
+            raise CaseError(f'body "{body.name}" keeps its nodes in a file: control "node_rotation" needs them inline')
         nodes = tuple(
             msgspec.structs.replace(node, quaternion=_conjugate(node.quaternion)) if node.name == node_name else node
             for node in body.nodes
@@ -166,14 +168,17 @@ def _stiffer_hinge(hinge: Hinge) -> Hinge:
     """Every spring of the hinge: of its scalar coordinates, or of the whole (spherical)."""
     if hasattr(hinge, "stiffness_Nm_rad"):
         return msgspec.structs.replace(hinge, stiffness_Nm_rad=FACTOR * hinge.stiffness_Nm_rad)
-    changes: dict[str, object] = {}
+    single: dict[str, msgspec.Struct] = {}
+    several: dict[str, tuple[msgspec.Struct, ...]] = {}
     for name, coordinate in coordinates(hinge):
         key = next(key for key in coordinate.__struct_fields__ if key.startswith("stiffness"))
         stiffer = msgspec.structs.replace(coordinate, **{key: FACTOR * getattr(coordinate, key)})
-        field = name.partition("[")[0]
-        single = field == name
-        changes[field] = stiffer if single else (*changes.get(field, ()), stiffer)
-    return msgspec.structs.replace(hinge, **changes)
+        field, numbered, _ = name.partition("[")
+        if numbered:
+            several[field] = (*several.get(field, ()), stiffer)
+        else:
+            single[field] = stiffer
+    return msgspec.structs.replace(hinge, **single, **several)
 
 
 def _on_body(scene: Scene, target: str, change: Callable[[Body], Body]) -> Scene:

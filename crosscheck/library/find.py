@@ -8,10 +8,10 @@ from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TypeVar
 
-from crosscheck.judging.accepted import FILE as ACCEPTED
-from crosscheck.judging.accepted import Accepted
+from crosscheck.library.accepted import FILE as ACCEPTED
+from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile, Variant
-from crosscheck.library.case_check import check_accepted, check_run_file
+from crosscheck.library.check import check_accepted, check_run_file
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError, closest
@@ -114,7 +114,7 @@ def load_case(folder: Path) -> Case:
 
 
 def _present(file: Path) -> bool:
-    """Whether anything stands at the file's place: what cannot be read is refused there, not passed over."""
+    """Whether there is a file, even one that cannot be read: then reading it says so, and it is not passed over."""
     return os.path.lexists(file)
 
 

@@ -1,23 +1,15 @@
-"""Patterns of channels in a run file: which of several names a channel, and whether one can name any channel at all."""
+"""Patterns of channels in a run file: which of several patterns a channel belongs to, and which can name none."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from fnmatch import fnmatchcase
 
+from crosscheck.library.channels import KINDS
 from flexmb.run.channels import matches
 
-PARTS = {
-    "marker": ("position", "orientation", "velocity", "angular_velocity"),
-    "load": ("torque", "force"),
-    "wheel_load": ("torque", "force"),
-    "drive": (),
-}
-KINDS = {
-    "energy": ("kinetic", "strain", "spring", "gravity", "total"),
-    "momentum": ("angular", "linear"),
-    "work": (),
-}
+PARTS = {kind.name: tuple(part.name for part in kind.parts if part.name) for kind in KINDS if kind.of_items}
+WHOLE = {kind.name: tuple(part.name for part in kind.parts if part.name) for kind in KINDS if not kind.of_items}
 
 
 def most_specific(patterns: Iterable[str], channel: str) -> str | None:
@@ -45,13 +37,13 @@ def fault(pattern: str) -> str:
         return ""
     kind, dotted, part = pattern.partition(".")
     if not dotted:
-        known = [*PARTS, *KINDS]
+        known = [*PARTS, *WHOLE]
         return "" if any(fnmatchcase(each, kind) for each in known) else f"it is none of {', '.join(known)}"
-    parts = _matching(KINDS, kind)
+    parts = _matching(WHOLE, kind)
     known = [each for group in parts for each in group]
     if any(fnmatchcase(each, part) for each in known):
         return ""
-    whole = ", ".join(f"{each}.{part}" for each, group in KINDS.items() for part in group)
+    whole = ", ".join(f"{each}.{part}" for each, group in WHOLE.items() for part in group)
     return f"channels with a dot alone are {whole}"
 
 

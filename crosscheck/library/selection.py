@@ -1,5 +1,6 @@
-"""What of a case is run: its run file reduced to the engines that were asked for, every comparison an explicit pair.
-A variant then has one list of engines, those beside it among them.
+"""The part of a case that is run: its run file, reduced to the engines that were asked for.
+
+In the reduced run file every comparison is an explicit pair, and `engines` of a variant include those of `also`.
 
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
@@ -14,7 +15,7 @@ from itertools import combinations
 import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
-from crosscheck.library.case import Chart, Comparison, Conservation, RunFile, Side, Variant
+from crosscheck.library.case import Chart, Comparison, ComparisonSide, Conservation, Control, RunFile, Variant
 from flexmb.scene.problems import closest
 
 
@@ -22,10 +23,11 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The reduced run file; variants keep the engines that something needs, and go where nothing does."""
     run = _joined(run, asked)
     comparisons = [pair for comparison in run.comparisons for pair in _pairs(run, comparison)]
-    kept = tuple(pair for pair in comparisons if _wanted(asked, (pair.a.engine, pair.b.engine)))
-    controls = tuple(control for control in run.controls if _wanted(asked, (control.a.engine, control.b.engine)))
+    kept = tuple(pair for pair in comparisons if _wanted(asked, pair.sides))
+    controls = tuple(control for control in run.controls if _wanted(asked, control.sides))
     conservations = tuple(each for item in run.conservations if (each := _narrowed(run, item, asked)) is not None)
-    needed = {(side.variant, side.engine) for item in (*kept, *controls) for side in (item.a, item.b)}
+    pairs: tuple[Comparison | Control, ...] = (*kept, *controls)
+    needed = {(side.variant, side.engine) for pair in pairs for side in pair.sides}
     needed |= {(item.variant, engine) for item in conservations for engine in item.engines}
     needed |= {(v.name, engine) for v in run.variants for engine in _all(v) if engine in asked or not asked}
     variants = tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines)
@@ -40,7 +42,7 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
-    """Which of the engines asked for nothing in any of the run files is for, and which could be; "" if none is idle."""
+    """A message that names the engines that were asked for and have no part in any of the run files; "" if all have."""
     runs = tuple(runs)
     busy = {engine for run in runs for variant in select(run, asked).variants for engine in variant.engines}
     idle = [engine for engine in asked if engine not in busy]
@@ -51,7 +53,7 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The run file with foreign engines added to the variants that are compared engine by engine."""
+    """The run file with engines that it does not know added to the variants that are compared engine by engine."""
     known = set(BUILT_IN).union(*(_all(variant) for variant in run.variants))
     foreign = tuple(engine for engine in asked if engine not in known)
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
@@ -72,19 +74,21 @@ def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:
             comparison,
             variant=None,
             engines=(),
-            a=Side(variant=comparison.variant, engine=first),
-            b=Side(variant=comparison.variant, engine=second),
+            a=ComparisonSide(variant=comparison.variant, engine=first),
+            b=ComparisonSide(variant=comparison.variant, engine=second),
         )
         for first, second in combinations(engines, 2)
     ]
 
 
-def _wanted(asked: tuple[str, ...], involved: tuple[str, str]) -> bool:
+def _wanted(asked: tuple[str, ...], sides: tuple[ComparisonSide, ComparisonSide]) -> bool:
+    """Whether two sides are compared when these engines are asked for."""
+    involved = {side.engine for side in sides}
     if not asked:
         return True
     if len(asked) == 1:
         return asked[0] in involved
-    return set(involved) <= set(asked)
+    return involved <= set(asked)
 
 
 def _narrowed(run: RunFile, item: Conservation, asked: tuple[str, ...]) -> Conservation | None:

@@ -1,4 +1,4 @@
-"""One writer in a folder at a time: a second one is told who is there, at once."""
+"""One process at a time writes into a folder; a second one is refused at once and told which process is there."""
 
 from __future__ import annotations
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from crosscheck.records.records import BrokenLine, CaseRecord, Confirmed, Environment, Record, RunRecord
+from crosscheck.records.kinds import BrokenLine, CaseRecord, Confirmed, Environment, Record, RunRecord
 
 
 def standing(records: Sequence[Record]) -> list[Record]:

@@ -53,11 +53,11 @@ def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
         files = _with_parents(module)
         if not files:
             if not _place(top):
-                found.libraries.add(top)  # not installed: that it is missing is part of what a result depends on
+                found.libraries.add(top)  # not installed, and a result can depend on that too
             continue
         found.files.update(files)
         for name, file in files.items():
-            if name != "flexmb" or module == "flexmb":  # what that imports by itself, it imports for its users only
+            if name != "flexmb" or module == "flexmb":  # what flexmb/__init__.py imports is for its users alone
                 waiting.extend(imported(name, file))
     return found
 

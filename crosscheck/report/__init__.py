@@ -3,12 +3,13 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
-from crosscheck.records.records import Record, read
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import Record
 from crosscheck.records.session import standing
+from crosscheck.report.ci import write_junit, write_summary, write_verdicts
 from crosscheck.report.html import write_report
-from crosscheck.report.outcome import Outcome, conclude, write_verdicts
-from crosscheck.report.summary import write_junit, write_summary
 from flexmb.output.writing import folder, writing
 
 __all__ = ["Choice", "Outcome", "write_all"]
@@ -18,7 +19,7 @@ Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
 def write_all(
     records: Path, out: Path, strict: bool = False, chosen: Choice = standing
-) -> tuple[Outcome, Path]:
+) -> tuple[SessionOutcome, Path]:
     """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
 
     `strict`: figures that are worse than recorded, or not recorded, are not as expected.

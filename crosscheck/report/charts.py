@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.judging.judge import drift_of
+from crosscheck.judging.case_verdicts import drift_of
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
+from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
@@ -24,14 +25,6 @@ from flexmb.typing import Real
 COMPONENTS = {1: [""], 2: ["1", "2"], 3: ["x", "y", "z"], 4: ["w", "x", "y", "z"]}
 RUNAWAY = 20.0  # a signal this many times as large as another has run away from it
 STILL, BAND = 1e-3, 0.05  # a signal that moves by less than this part of its size is still, and is shown in such a band
-PANELS = (
-    ("Motion", "marker"),
-    ("Energy", "energy"),
-    ("Momentum", "momentum"),
-    ("Hinge loads", "load"),
-    ("Wheel loads", "wheel_load"),
-    ("Drive loads", "drive"),
-)
 
 
 def payload(cases: Iterable[tuple[CaseResults, list[Verdict]]]) -> dict[str, Any]:
@@ -60,11 +53,11 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
                 groups.setdefault(verdict.comparison, {}).setdefault(channel, []).append(verdict)
     panels = []
     for name, channels in groups.items():
-        for title, prefix in PANELS:
-            chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == prefix}
-            if chosen:
+        for kind in KINDS:
+            chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
+            if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                panels.append({"comparison": name, "title": title, "channels": views, "first": _first(views)})
+                panels.append({"comparison": name, "title": kind.panel, "channels": views, "first": _first(views)})
     return panels
 
 
@@ -150,7 +143,7 @@ def _drifts(store: Store, case: CaseResults) -> list[dict[str, Any]]:
         curves = []
         for engine in item.engines:
             result = case.get(item.variant, engine)
-            channel = {"energy": "energy.total"}.get(item.quantity, f"momentum.{item.quantity.partition('_')[0]}")
+            channel = CONSERVED[item.quantity]
             if channel not in result.channels:
                 continue
             drift, scale = drift_of(result, channel)

@@ -12,15 +12,15 @@ from jinja2 import Environment, PackageLoader, select_autoescape
 from markupsafe import Markup, escape
 from plotly.offline import get_plotlyjs
 
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import STATUSES
 from crosscheck.report.charts import payload
-from crosscheck.report.outcome import Outcome
 from crosscheck.report.views import comparison_tables, conservation_table, control_table, overview
 from flexmb.output.printable import printable
 
 
-def write_report(session: Session, outcome: Outcome, file: Path) -> None:
+def write_report(session: Session, outcome: SessionOutcome, file: Path) -> None:
     """Write the report of a judged session."""
     templates = _templates()
     data = payload([(case, outcome.verdicts[case.case.case]) for case in session.cases])
@@ -84,7 +84,7 @@ def _breakable(text: str) -> Markup:
     return Markup(str(escape(printable(text))).replace("/", "/<wbr>"))
 
 
-def _case_view(number: int, case: CaseResults, outcome: Outcome) -> dict[str, Any]:
+def _case_view(number: int, case: CaseResults, outcome: SessionOutcome) -> dict[str, Any]:
     record = case.case
     verdicts = outcome.verdicts[record.case]
     return {

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.judging.verdict import GRAVITY, Status, Verdict
-from crosscheck.report.summary import pair
-from flexmb.run.channels import family
+from crosscheck.judging.verdict import GRAVITY, Verdict
+from crosscheck.library.channels import part_of
 
-SYMBOLS: dict[Status, str] = {
+SYMBOLS: dict[str, str] = {
     "agree": "✓",
     "differ": "≠",
     "unresolved": "?",
@@ -20,24 +19,10 @@ SYMBOLS: dict[Status, str] = {
     "crashed": "☠",
     "did not run": "–",
 }
-FAMILIES = {
-    "marker.position": "Marker positions",
-    "marker.orientation": "Marker orientations",
-    "marker.velocity": "Marker velocities",
-    "marker.angular_velocity": "Angular velocities",
-    "energy": "Energy",
-    "momentum.linear": "Linear momentum",
-    "momentum.angular": "Angular momentum",
-    "load.torque": "Hinge torques",
-    "load.force": "Hinge forces",
-    "wheel_load.torque": "Wheel bearing torques",
-    "wheel_load.force": "Wheel bearing forces",
-    "drive": "Drive loads",
-}
 
 
 @dataclass(frozen=True)
-class Cell:
+class VerdictCell:
     """One cell: a status with its look ("good", "expected", "bad"), a short text, and the reasons behind it."""
 
     status: str
@@ -52,7 +37,7 @@ class Cell:
         return SYMBOLS.get(self.status, "")
 
 
-EMPTY = Cell("", "empty", "", "", ())
+EMPTY = VerdictCell("", "empty", "", "", ())
 
 
 @dataclass(frozen=True)
@@ -60,12 +45,12 @@ class Row:
     """A row of cells, one a column of its table, with rows beneath it that it summarises."""
 
     label: str
-    cells: tuple[Cell, ...]
+    cells: tuple[VerdictCell, ...]
     rows: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
-class Table:
+class VerdictTable:
     """A table of verdicts."""
 
     title: str
@@ -74,7 +59,7 @@ class Table:
     rows: tuple[Row, ...]
 
 
-def overview(verdicts: dict[str, list[Verdict]]) -> Table:
+def overview(verdicts: dict[str, list[Verdict]]) -> VerdictTable:
     """Cases and their comparisons against pairs of engines, controls and conservation."""
     everything = [verdict for group in verdicts.values() for verdict in group]
     columns = list(dict.fromkeys(_column(verdict) for verdict in everything))
@@ -88,10 +73,10 @@ def overview(verdicts: dict[str, list[Verdict]]) -> Table:
             for name in names
         )
         rows.append(Row(case, _cells(columns, group, _column), below))
-    return Table("Verdicts", "", tuple(columns), tuple(rows))
+    return VerdictTable("Verdicts", "", tuple(columns), tuple(rows))
 
 
-def comparison_tables(verdicts: Iterable[Verdict]) -> list[Table]:
+def comparison_tables(verdicts: Iterable[Verdict]) -> list[VerdictTable]:
     """A table for each comparison: kinds of channels, with their channels beneath, against pairs."""
     groups: dict[str, list[Verdict]] = {}
     for verdict in verdicts:
@@ -100,7 +85,7 @@ def comparison_tables(verdicts: Iterable[Verdict]) -> list[Table]:
     return [_comparison_table(name, group) for name, group in groups.items()]
 
 
-def conservation_table(verdicts: list[Verdict]) -> Table | None:
+def conservation_table(verdicts: list[Verdict]) -> VerdictTable | None:
     """Conserved quantities against engines."""
     if not verdicts:
         return None
@@ -109,10 +94,10 @@ def conservation_table(verdicts: list[Verdict]) -> Table | None:
     for verdict in verdicts:
         groups.setdefault(f"{verdict.comparison.capitalize()}, {verdict.variant_a}", []).append(verdict)
     rows = tuple(Row(name, _cells(columns, group, lambda each: each.engine_a)) for name, group in groups.items())
-    return Table("Conservation", "Drift over the run, relative to the largest magnitude reached.", columns, rows)
+    return VerdictTable("Conservation", "Drift over the run, relative to the largest magnitude reached.", columns, rows)
 
 
-def control_table(verdicts: list[Verdict]) -> Table | None:
+def control_table(verdicts: list[Verdict]) -> VerdictTable | None:
     """Negative controls; beneath them the channels that must notice them."""
     if not verdicts:
         return None
@@ -124,31 +109,31 @@ def control_table(verdicts: list[Verdict]) -> Table | None:
         below = tuple(Row(verdict.channel, (_cell([verdict]),)) for verdict in group)
         rows.append(Row(name, (_cell(group),), below if len(below) > 1 else ()))
     note = "Deliberate faults of the scene. A comparison that does not notice them proves nothing."
-    return Table("Negative controls", note, ("The fault is",), tuple(rows))
+    return VerdictTable("Negative controls", note, ("The fault is",), tuple(rows))
 
 
-def _comparison_table(name: str, group: list[Verdict]) -> Table:
-    columns = list(dict.fromkeys(pair(verdict) for verdict in group))
+def _comparison_table(name: str, group: list[Verdict]) -> VerdictTable:
+    columns = list(dict.fromkeys(verdict.pair for verdict in group))
     kinds = dict.fromkeys(_kind(verdict.channel) for verdict in group)
     rows = []
     for kind in kinds:
         inside = [verdict for verdict in group if _kind(verdict.channel) == kind]
         channels = dict.fromkeys(verdict.channel for verdict in inside)
         below = tuple(
-            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], pair))
+            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], _pair))
             for channel in channels
         )
-        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, pair), below))
+        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, _pair), below))
     expected = group[0].expected
     note = "" if expected == "agree" else f"Expected here: {expected}, because {group[0].expected_reason}"
-    return Table(name, note, tuple(columns), tuple(rows))
+    return VerdictTable(name, note, tuple(columns), tuple(rows))
 
 
-def _cells(columns: Iterable[str], group: list[Verdict], column: Callable[[Verdict], str]) -> tuple[Cell, ...]:
+def _cells(columns: Iterable[str], group: list[Verdict], column: Callable[[Verdict], str]) -> tuple[VerdictCell, ...]:
     return tuple(_cell([verdict for verdict in group if column(verdict) == name]) for name in columns)
 
 
-def _cell(group: list[Verdict]) -> Cell:
+def _cell(group: list[Verdict]) -> VerdictCell:
     """Summary of some verdicts by the gravest unexpected one, or else by the gravest."""
     if not group:
         return EMPTY
@@ -156,7 +141,7 @@ def _cell(group: list[Verdict]) -> Cell:
     worst = min(bad or group, key=lambda verdict: (GRAVITY.index(verdict.status), -(verdict.E or 0.0)))
     good = worst.status == "agree" or worst.kind == "control"
     look = "bad" if bad else "good" if good else "expected"
-    text = worst.status
+    text: str = worst.status
     if worst.kind == "control" and worst.status in ("differ", "agree"):
         text = "noticed" if worst.ok else "missed"
     if worst.kind == "conservation" and worst.status in ("differ", "agree"):
@@ -170,8 +155,8 @@ def _cell(group: list[Verdict]) -> Cell:
     if grown:
         text += ", worse than recorded" if len(grown) == len(group) else f", {len(grown)} worse than recorded"
     shown = bad or grown or [verdict for verdict in group if verdict.status == worst.status]
-    reasons = tuple(f"{verdict.channel}, {pair(verdict)}: {_reason(verdict)}" for verdict in shown[:12])
-    return Cell(worst.status, look, text, _numbers(worst), reasons)
+    reasons = tuple(f"{verdict.channel}, {verdict.pair}: {_reason(verdict)}" for verdict in shown[:12])
+    return VerdictCell(worst.status, look, text, _numbers(worst), reasons)
 
 
 def _reason(verdict: Verdict) -> str:
@@ -194,7 +179,12 @@ def _numbers(verdict: Verdict) -> str:
 
 
 def _kind(channel: str) -> str:
-    return FAMILIES.get(family(channel), channel)
+    part = part_of(channel)
+    return channel if part is None else part.title
+
+
+def _pair(verdict: Verdict) -> str:
+    return verdict.pair
 
 
 def _column(verdict: Verdict) -> str:

@@ -15,7 +15,7 @@ import numpy as np
 
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.library.case import Chart
-from crosscheck.records.records import RunRecord
+from crosscheck.records.kinds import RunRecord
 from flexmb.run.channels import distance, signal_range
 
 RESOLVED = 2.0  # estimates of U are no more accurate than this factor

@@ -12,11 +12,7 @@ from pathlib import Path
 import msgspec
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
-from crosscheck.engines.registry import home
-from crosscheck.records.made_by import made_by
-from crosscheck.records.records import Confirmed, RunRecord, pack
-from crosscheck.running.checked import (
+from crosscheck.engines.answers import (
     BrokenContract,
     checked_ladder,
     checked_model,
@@ -25,6 +21,11 @@ from crosscheck.running.checked import (
     checked_version,
     clean,
 )
+from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
+from crosscheck.engines.registry import home
+from crosscheck.records.kinds import Confirmed, RunRecord
+from crosscheck.records.made_by import made_by
+from crosscheck.records.packing import pack
 from crosscheck.running.plan import Done, Job
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
@@ -36,7 +37,10 @@ REPEATS = 3
 
 
 def execute(job: Job, emit: Emit) -> None:
-    """Run a job; every outcome but the end of the process is a record, and a string says what is being done."""
+    """Run a job. Every outcome is emitted as a record, and what is being done as a string.
+
+    Only the end of the process leaves no record.
+    """
     blank = RunRecord(
         case=job.case,
         variant=job.variant,
@@ -128,7 +132,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
 
 
 def _key(engine: Engine, version: str, job: Job, rungs: int) -> str:
-    """What makes the engine's results, scene and effort apart: see `made_by`; channels not stored are not there."""
+    """The key of everything that the results depend on, but for scene and effort; see `made_by`."""
     code = made_by({type(engine).__module__, home(job.engine)} - {""})
     kept = job.kept if rungs > FULLY_STORED else ()
     return hashlib.sha256(f"{code} {version} {kept}".encode()).hexdigest()[:16]
@@ -149,7 +153,7 @@ def _run(
         channels = channels_of(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
-    except BaseException as error:  # the same as above, for one effort: the others may still work
+    except BaseException as error:  # as in `execute`, but the other efforts may still work
         return msgspec.structs.replace(record, status="failed", message=describe(error))
     return msgspec.structs.replace(
         record,

@@ -11,12 +11,12 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.contract import Effort
-from crosscheck.library.case import TAKES_APART, Control, Refined, RunFile, Variant
+from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.controls import mutate
 from crosscheck.library.find import Case
 from crosscheck.library.selection import select
-from crosscheck.records.drawing import draw, levels
-from crosscheck.records.records import CaseRecord, VariantInfo
+from crosscheck.records.kinds import CaseRecord, VariantInfo
+from crosscheck.running.draw import draw
 from crosscheck.running.pool import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
@@ -28,7 +28,7 @@ MAIN, REFINED = "main", "refined"
 
 
 class Done(NamedTuple):
-    """A run that is recorded: its effort, what made it, and its place: a ladder of another length is run anew."""
+    """A run that is recorded: its effort, what made it, and its rung of how many; another ladder is run anew."""
 
     effort: str
     made_by: str
@@ -111,8 +111,10 @@ def variant_scene(scene: Scene, variant: Variant, refined: Refined | None = None
         case "modal_points":
             return modal_points(scene)
         case "segments":
+            assert variant.segments is not None  # as the rules of a run file demand
             return finite_segments(scene, variant.split_body, variant.segments)
         case "substructures":
+            assert variant.pieces is not None
             return substructured(scene, variant.split_body, variant.pieces, eigenmodes=variant.eigenmodes)
     return scene
 
@@ -147,7 +149,7 @@ def scene_identity(scene: Scene, times: Real) -> str:
 def _attempt(
     case: Case, variant: Variant, refined: Refined | None = None, control: Control | None = None
 ) -> tuple[Scene | None, str]:
-    """The checked scene of a variant, or why there is none: one bad variant must not stop the others."""
+    """The checked scene of a variant, or None and the reason: one bad variant must not stop the others."""
     try:
         scene = case.scene(variant)
         if control is not None:  # a fault in what the variant models, hence at its level
@@ -203,13 +205,20 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
         return VariantInfo(level="", drawing=None, error=error)
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
     drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
-    return VariantInfo(level=levels(scene), drawing=draw(drawn) if drawable else None)
+    return VariantInfo(level=_levels(scene), drawing=draw(drawn) if drawable else None)
+
+
+def _levels(scene: Scene) -> str:
+    """The levels of the scene's bodies, as shown in verdicts: "rigid", "full", "full, rigid"."""
+    found = {body.level for body in scene.bodies if not isinstance(body, RigidBody)}
+    return ", ".join(sorted(found)) if found else "rigid"
 
 
 def _engines_compared_across(run: RunFile, variant: Variant) -> tuple[str, ...]:
     """Engines whose result of this variant is compared with another variant: there its discretisation matters."""
-    crossing = [item for item in (*run.comparisons, *run.controls) if item.a.variant != item.b.variant]
-    found = {side.engine for item in crossing for side in (item.a, item.b) if side.variant == variant.name}
+    pairs: tuple[Comparison | Control, ...] = (*run.comparisons, *run.controls)
+    crossing = [(a, b) for a, b in (pair.sides for pair in pairs) if a.variant != b.variant]
+    found = {side.engine for pair in crossing for side in pair if side.variant == variant.name}
     return tuple(engine for engine in variant.engines if engine in found)
 
 

@@ -39,6 +39,27 @@ Function = Callable[[Any, Callable[[Any], None]], None]
 
 
 @dataclass(frozen=True)
+class Limits:
+    """What running many jobs may take; None leaves it to the machine, to the case or to `TIME_LIMIT_S`.
+
+    `workers` is the number of processes (by default one per core), `time_s` how long a job may take, and `memory_bytes`
+    how much a worker may hold (by default an equal part of what the machine has).
+    """
+
+    workers: int | None = None
+    time_s: float | None = None
+    memory_bytes: float | None = None
+
+    @property
+    def processes(self) -> int:
+        """How many workers there are."""
+        return self.workers or os.cpu_count() or 1
+
+
+BY_DEFAULT = Limits()
+
+
+@dataclass(frozen=True)
 class Event:
     """What happened to job number `job`: it started, emitted `content`, ended, crashed or was stopped at a limit.
 
@@ -79,10 +100,10 @@ def run_jobs(
     """Run `function(job, emit)` for every job in `workers` processes; events in the order in which they come.
 
     `function` must be importable by name. `kind(job)` names what a worker has to load or compile for a job: workers
-    stay with their kind while there are jobs of it, and only one is at a kind until its first job is done, so that what
-    that job leaves in caches on disk is not made twice. Whatever workers print goes to the file `log`, which starts
-    again when it becomes too long. Numerical libraries get one thread per worker. Closing the iterator early stops the
-    workers.
+    stay with their kind while there are jobs of it. Only one worker is at a kind until its first job is done, so that
+    what that job compiles and leaves on disk is not compiled twice. Whatever workers print goes to the file `log`,
+    which starts again when it becomes too long. Numerical libraries get one thread per worker. Closing the iterator
+    early stops the workers.
 
     A job is stopped after `time_limit_s(job)`, or when its worker with all that this started holds more memory than
     `memory_limit_bytes` (by default an equal part of what the machine has).
@@ -196,7 +217,7 @@ def _receive(worker: _Worker) -> Event | None:
 
 
 def _watch(worker: _Worker, held: dict[int, int], memory_bytes: float) -> Event | None:
-    """The end of a worker that says nothing any more, because it is dead or because it exceeds a limit."""
+    """The event that ends the job of a silent worker that is dead or exceeds a limit; None where it is just at work."""
     assert worker.job is not None and worker.process is not None and worker.pipe is not None
     if time.monotonic() > worker.deadline:
         return Event(worker.job, "stopped", f"it was stopped at its limit of {worker.limit_s:g} s")

@@ -11,12 +11,12 @@ from pathlib import Path
 
 import psutil
 
-USABLE = 0.8  # of the memory; the rest is for the system and for who runs the workers
+USABLE = 0.8  # of the memory; the rest is for the system and for the process that runs the workers
 CGROUP = Path("/sys/fs/cgroup/memory.max")
 
 
 def memory_limit(workers: int) -> float:
-    """How many bytes each of so many workers may hold: what all may hold together is there."""
+    """How many bytes each of the `workers` may hold, so that all of them together fit into the memory."""
     total = float(psutil.virtual_memory().total)
     with suppress(OSError, ValueError):  # a container has less than its machine; "max" is no number
         total = min(total, float(CGROUP.read_text(encoding="ascii")))

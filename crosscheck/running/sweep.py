@@ -5,18 +5,19 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
+from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import COMPILED_LIKE
 from crosscheck.library.find import Case
-from crosscheck.records.records import Archive, Confirmed, Record, RunRecord, environment, read
-from crosscheck.running.checked import clean
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import Confirmed, Record, RunRecord
+from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import Done, Job, plan
-from crosscheck.running.pool import Event, run_jobs
+from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
 
 PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
@@ -28,23 +29,20 @@ def sweep(
     records: Path,
     *,
     fresh: bool = False,
-    workers: int | None = None,
     provider: str = PROVIDER,
-    time_limit_s: float | None = None,
-    memory_limit_bytes: float | None = None,
+    limits: Limits = BY_DEFAULT,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
     """Run cases and append to the file `records`; what it already holds is confirmed, not run again, unless `fresh`.
 
     What it holds counts where scene, effort and all that made it are the same (`made_by`). `asked` are the engines
-    (none: all), `workers` the number of processes (default: one per core). An engine that takes longer than
-    `time_limit_s` for a scene (default: the case's limit, or else the pool's), or more memory than `memory_limit_bytes`
-    (default: its part of the machine's), is stopped. `listener` hears every event, with the list of jobs.
+    (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own limit of
+    time. `listener` hears every event, with the list of jobs.
     """
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
-    plans = [plan(case, asked, provider, time_limit_s) for case in cases]
+    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
     jobs = [replace(job, done=_done(known, job)) for _, planned in plans for job in planned]
     archive = Archive(records)
     try:
@@ -53,9 +51,7 @@ def sweep(
             archive.write(record)
         log = str(records.with_suffix(".log"))
         doing: dict[int, str] = {}
-        for event in run_jobs(
-            execute, jobs, workers or os.cpu_count() or 1, log, _engine, _time_limit, memory_limit_bytes
-        ):
+        for event in run_jobs(execute, jobs, limits.processes, log, _engine, _time_limit, limits.memory_bytes):
             if isinstance(event.content, RunRecord | Confirmed):
                 archive.write(event.content)
             elif event.kind == "emitted":
@@ -69,7 +65,7 @@ def sweep(
 
 
 def _engine(job: Job) -> str:
-    """A worker stays with its engine: each loads its library, or compiles its kernels, once."""
+    """The kind of a job: a worker stays with one engine, so that it loads its library or compiles its kernels once."""
     return COMPILED_LIKE.get(job.engine, job.engine)
 
 

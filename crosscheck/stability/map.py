@@ -66,7 +66,7 @@ class Axis(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
 
 
 @dataclass(frozen=True)
-class Outcome:
+class Measurement:
     """The result of a cell: the value of the quantity, or the status and reason why there is none."""
 
     value: float = np.nan
@@ -117,7 +117,7 @@ class StabilityMap:
     title: str
     quantity: str
     scene: Callable[[float, float], Scene]
-    measure: Callable[[Scene, float, float], Outcome]
+    measure: Callable[[Scene, float, float], Measurement]
     x: Axis
     y: Axis
     thresholds: tuple[float, ...]
@@ -136,7 +136,7 @@ class StabilityMap:
         """Number of the class of a value."""
         return int(np.searchsorted(self.thresholds, value, side="right"))
 
-    def outcome(self, x: float, y: float) -> Outcome:
+    def outcome(self, x: float, y: float) -> Measurement:
         """The quantity at one place."""
         return self.measure(self.scene(x, y), x, y)
 

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from crosscheck.stability.judge import label
+from crosscheck.stability.boundary import label
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.run import Finished
 

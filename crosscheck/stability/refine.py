@@ -21,7 +21,7 @@ class Cell(NamedTuple):
     j: int
 
 
-class Mesh:
+class CellMesh:
     """Cells over two axes, each with a label (class or status) once it is known; axes of categories are not halved."""
 
     def __init__(self, x: Axis, y: Axis, depth: int) -> None:

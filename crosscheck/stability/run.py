@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import os
 from collections.abc import Callable, Iterator, Sequence
 from functools import cache
 from importlib import import_module
@@ -11,14 +10,15 @@ from pathlib import Path
 from time import process_time
 from typing import Any, NamedTuple
 
+from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.records.records import Archive, environment
-from crosscheck.running.checked import clean
-from crosscheck.running.pool import Event, run_jobs
-from crosscheck.stability.judge import MapVerdict, judge, label
-from crosscheck.stability.map import Outcome, StabilityMap
-from crosscheck.stability.records import CellRecord, MapRecord, Written, cells_of, identity, read
-from crosscheck.stability.refine import Cell, Mesh
+from crosscheck.records.archive import Archive
+from crosscheck.records.machine import environment
+from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
+from crosscheck.stability.boundary import MapVerdict, judge, label
+from crosscheck.stability.map import Measurement, StabilityMap
+from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
+from crosscheck.stability.refine import Cell, CellMesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"
 Listener = Callable[[StabilityMap, int, int], None]
@@ -40,7 +40,7 @@ class Finished(NamedTuple):
     """A map that was run: its mesh, what its cells gave, and the judgement."""
 
     map: StabilityMap
-    mesh: Mesh
+    mesh: CellMesh
     records: dict[Cell, CellRecord]
     verdict: MapVerdict
 
@@ -51,20 +51,19 @@ def run_map(
     *,
     depth: int | None = None,
     fresh: bool = False,
-    workers: int | None = None,
     provider: str = PROVIDER,
-    time_limit_s: float | None = None,
+    limits: Limits = BY_DEFAULT,
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda what, done, known: None,
 ) -> Finished:
     """Run one map of the provider to `depth` halvings (default: its own) and append to the file `records`.
 
-    Cells already recorded by the same sources are kept unless `fresh`. A cell that takes longer than `time_limit_s`
-    (default: the scheduler's) is stopped; for the map it did not run, and the next run asks for it again. `listener` is
-    told how many of the cells known so far are done. Raises KeyError where there is no such map.
+    Cells already recorded by the same sources are kept unless `fresh`. A cell that takes longer than the `limits` allow
+    is stopped; for the map it did not run, and the next run asks for it again. `listener` is told how many of the cells
+    known so far are done. Raises KeyError where there is no such map.
     """
     what = maps_of(provider)[name]
-    mesh = Mesh(what.x, what.y, what.depth if depth is None else depth)
+    mesh = CellMesh(what.x, what.y, what.depth if depth is None else depth)
     if fresh:
         records.unlink(missing_ok=True)
     mark = identity(what)
@@ -90,9 +89,10 @@ def run_map(
             return mesh.settle((record.cell, label(what, record)) for record in found)
 
         ask(sorted(mesh.waiting))
-        limit = {} if time_limit_s is None else {"time_limit_s": lambda job: time_limit_s}
+        time_s = limits.time_s
+        limit = {} if time_s is None else {"time_limit_s": lambda job: time_s}
         log = str(records.with_suffix(".log"))
-        for event in scheduler(run_cell, jobs, workers or os.cpu_count() or 1, log, **limit):
+        for event in scheduler(run_cell, jobs, limits.processes, log, **limit):
             if event.kind in ("emitted", "crashed", "stopped"):
                 record = event.content if event.kind == "emitted" else _cut_short(jobs[event.job], event)
                 archive.write(record)
@@ -116,13 +116,13 @@ def run_cell(job: CellJob, emit: Callable[[Any], None]) -> None:
     try:
         outcome = maps_of(job.provider)[job.map].outcome(job.x, job.y)
     except EngineMissing as error:
-        outcome = Outcome(status="did not run", message=str(error))
+        outcome = Measurement(status="did not run", message=str(error))
     except KeyboardInterrupt:
         raise
     except BaseException as error:
-        outcome = Outcome(status="failed", message=clean(f"{type(error).__name__}: {error}"))
+        outcome = Measurement(status="failed", message=clean(f"{type(error).__name__}: {error}"))
     if outcome.status == "measured" and not math.isfinite(outcome.value):
-        outcome = Outcome(status="failed", message=f"the quantity is {outcome.value}")
+        outcome = Measurement(status="failed", message=f"the quantity is {outcome.value}")
     emit(
         CellRecord(
             identity=job.identity, level=job.cell.level, i=job.cell.i, j=job.cell.j, x=job.x, y=job.y,

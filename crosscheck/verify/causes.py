@@ -1,7 +1,7 @@
-"""Guessing why a signal differs: what, done to it, makes it agree. Without that no guess is made.
+"""Guesses why a signal differs: the cause is what, once corrected, makes it agree; without that there is no guess.
 
-A factor (millimetres, degrees, a sign), components exchanged, another order or sense of quaternions, the axes of the
-body instead of the World's, another origin, times shifted by whole samples.
+The corrections tried: a factor (millimetres, degrees, a sign), components exchanged, another order or sense of
+quaternions, the axes of the body instead of the World's, another origin, times shifted by whole samples.
 """
 
 from __future__ import annotations

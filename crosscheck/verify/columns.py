@@ -12,25 +12,14 @@ from pathlib import Path
 
 import numpy as np
 
+from crosscheck.library.channels import kind_named
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 
-MARKER_GROUPS = {
-    "position": ("px", "py", "pz"),
-    "orientation": ("qw", "qx", "qy", "qz"),
-    "velocity": ("vx", "vy", "vz"),
-    "angular_velocity": ("wx", "wy", "wz"),
-}
-LOAD_GROUPS = {"torque": ("tx", "ty", "tz"), "force": ("fx", "fy", "fz")}
-# Columns of Trajectory.to_csv that are compared: ending, its letters, unit, and how the channel is called.
-OWN_GROUPS = {
-    "position": ("xyz", "m", "marker:{}.position"),
-    "quaternion": ("wxyz", "1", "marker:{}.orientation"),
-    "velocity": ("xyz", "m/s", "marker:{}.velocity"),
-    "angular_velocity": ("xyz", "rad/s", "marker:{}.angular_velocity"),
-    "torque": ("xyz", "N m", "load:{}.torque"),
-    "force": ("xyz", "N", "load:{}.force"),
-}
+MARKER_GROUPS = {part.name: part.letters for part in kind_named("marker").parts}
+LOAD_GROUPS = {part.name: part.letters for part in kind_named("load").parts}
+# What is compared of Trajectory.to_csv: the kind of channels and the part, by what the columns call it.
+OWN_GROUPS = {part.own: (kind, part) for kind in ("marker", "load") for part in kind_named(kind).parts}
 OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
 TIME_MATCH_S = 1e-9
 LIMIT = 128 * MIB
@@ -187,16 +176,16 @@ def _own_channels(filled: dict[str, Real]) -> Columns:
     found: dict[str, Real] = {}
     for item, _, part in [name.rpartition(".")[0].rpartition(".") for name in left]:
         if part in OWN_GROUPS:
-            letters, unit, channel = OWN_GROUPS[part]
-            names = [f"{item}.{part}.{letter}" for letter in letters]
+            kind, signal = OWN_GROUPS[part]
+            names = [f"{item}.{part}.{letter}" for letter in ("wxyz" if signal.width == 4 else "xyz")]
             if all(name in left for name in names):
-                _require_unit(names, units, unit)
-                found[channel.format(item)] = np.column_stack([left.pop(name) for name in names])
-    for part, unit in (("angular", "N m s"), ("linear", "N s")):
-        names = [f"momentum.{part}.{letter}" for letter in "xyz"]
+                _require_unit(names, units, signal.unit)
+                found[f"{kind}:{item}.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
+    for signal in kind_named("momentum").parts:
+        names = [f"momentum.{signal.name}.{letter}" for letter in "xyz"]
         if all(name in left for name in names):
-            _require_unit(names, units, unit)
-            found[f"momentum.{part}"] = np.column_stack([left.pop(name) for name in names])
+            _require_unit(names, units, signal.unit)
+            found[f"momentum.{signal.name}"] = np.column_stack([left.pop(name) for name in names])
     for name in [name for name in left if name == "work" or name.startswith("energy.")]:
         _require_unit([name], units, "J")
         found[name] = left.pop(name)[:, None]

@@ -13,7 +13,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 
 from crosscheck.judging.results import CaseResults, collect
-from crosscheck.records.records import read
+from crosscheck.records.archive import read
 from crosscheck.report.workprecision import WorkPrecision, work_precision
 from tests.repo.project import ROOT
 

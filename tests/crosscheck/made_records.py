@@ -8,13 +8,14 @@ from collections.abc import Iterable
 import msgspec
 import numpy as np
 
-from crosscheck.judging.accepted import Accepted
+from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
+from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import RunFile
 from crosscheck.library.selection import select
-from crosscheck.records.records import CaseRecord, RunRecord, VariantInfo, pack
-from crosscheck.report.outcome import Outcome, conclude
+from crosscheck.records.kinds import CaseRecord, RunRecord, VariantInfo
+from crosscheck.records.packing import pack
 from flexmb.typing import Real
 
 TIMES = np.linspace(0.0, 1.0, 11)
@@ -76,7 +77,9 @@ def ended(run: RunRecord, status: str, message: str = "for a reason", **changes:
     return msgspec.structs.replace(run, status=status, message=message, **changes)
 
 
-def judged(text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False) -> Outcome:
+def judged(
+    text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False
+) -> SessionOutcome:
     """The outcome of a session that left these runs."""
     run = select(run_file(text), ())
     infos = {variant.name: VariantInfo(level="rigid", drawing=None) for variant in run.variants}
@@ -84,7 +87,7 @@ def judged(text: str, runs: Iterable[RunRecord], accepted: Accepted | None = Non
     return conclude(collect([case, *runs]), strict)
 
 
-def single(outcome: Outcome) -> Verdict:
+def single(outcome: SessionOutcome) -> Verdict:
     """The only verdict."""
     (verdict,) = outcome.all
     return verdict

@@ -5,12 +5,13 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
+from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.find import load_case
-from crosscheck.records.records import read
+from crosscheck.records.archive import read
 from crosscheck.records.session import last_session
-from crosscheck.report.outcome import Outcome, conclude
+from crosscheck.running.pool import Limits
 from crosscheck.running.sweep import sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"
@@ -31,13 +32,15 @@ def copy_case(folder: Path, run_file: str | None = None) -> Path:
     return target
 
 
-def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: object) -> Outcome:
+def run_case(case: Path, records: Path, asked: tuple[str, ...] = (), **options: object) -> SessionOutcome:
     """Run a case folder and judge its records."""
-    sweep([load_case(case)], asked, records, workers=2, provider=PROVIDER, **options)
+    sweep([load_case(case)], asked, records, provider=PROVIDER, limits=Limits(workers=2), **options)
     return conclude(collect(last_session(read(records))))
 
 
-def compare_engines(folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6') -> Outcome:
+def compare_engines(
+    folder: Path, engines: tuple[str, ...], goals: str = '"marker:tip.position" = 1e-6'
+) -> SessionOutcome:
     """All pairs of some engines on the pendulum."""
     names = ", ".join(f'"{name}"' for name in engines)
     run_file = f"""

@@ -13,9 +13,9 @@ from typer.testing import CliRunner
 from crosscheck import cli
 from crosscheck.engines.contract import Run
 from crosscheck.library.find import load_case
-from crosscheck.running.engine_list import EngineState
+from crosscheck.running.installed import EngineState
 from crosscheck.running.sweep import sweep
-from crosscheck.verify.verify import verify_csv
+from crosscheck.verify.against_case import verify_csv
 from tests.crosscheck.fake_engines import TOLERANCES, Pendulum
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
 

@@ -19,20 +19,23 @@ from hypothesis import strategies as st
 from markdown_it import MarkdownIt
 from rich.console import Console
 
+from crosscheck.judging.outcome import Absence, SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.case import Comparison, Side
+from crosscheck.library.case import Comparison, ComparisonSide
 from crosscheck.library.find import load_case
-from crosscheck.records.records import Archive, BrokenLine, RunRecord, environment, read
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import BrokenLine, RunRecord
+from crosscheck.records.machine import environment
 from crosscheck.report import write_all
-from crosscheck.report.console import cases_table, engines_table, print_outcome
+from crosscheck.report.ci import write_junit, write_summary
 from crosscheck.report.html import embedded
-from crosscheck.report.outcome import Absence, Outcome, conclude
-from crosscheck.report.summary import write_junit, write_summary
-from crosscheck.running.engine_list import EngineState
-from crosscheck.running.live import LiveProgress
+from crosscheck.running.installed import EngineState
 from crosscheck.running.plan import plan
 from crosscheck.running.pool import Event
+from crosscheck.terminal.listings import cases_table, engines_table
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.verdicts import print_outcome
 from flexmb.output.printable import chart_text, printable
 from tests.crosscheck.sessions import CASE, PROVIDER
 
@@ -45,13 +48,13 @@ NASTY = (
 FOREIGN = st.text(st.characters(exclude_categories=["Cs"]), min_size=1, max_size=20) | st.sampled_from(NASTY)
 
 
-def outcome_of(name: str) -> Outcome:
+def outcome_of(name: str) -> SessionOutcome:
     verdict = Verdict(
         case=name, comparison=name, kind="comparison", channel=f"marker:{name}.position", variant_a=name, engine_a=name,
         variant_b=name, engine_b=name, level="", status="differ", expected="agree", E=1.0, U=0.1, goal=0.1, scale=1.0,
         reason=name,
     )  # fmt: skip
-    return Outcome({name: [verdict]}, [Absence(name, name, name, "main", "did not run", name)], (name,))
+    return SessionOutcome({name: [verdict]}, [Absence(name, name, name, "main", "did not run", name)], (name,))
 
 
 def flat(text: str) -> str:
@@ -134,7 +137,7 @@ def hostile(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("hostile")
     case, evil = load_case(CASE), "</script><script>alert('[/]|`')</script><!-- ]]>\x1b[31m\x00\u2028%{x}"
     record, _ = plan(case, (), PROVIDER)
-    one, other = Side(variant=evil, engine=evil), Side(variant=evil, engine=evil + "2")
+    one, other = ComparisonSide(variant=evil, engine=evil), ComparisonSide(variant=evil, engine=evil + "2")
     run = msgspec.structs.replace(
         record.run,
         title=evil,

@@ -13,8 +13,10 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.records.records import Archive, RunRecord, read, records
-from crosscheck.report import summary
+from crosscheck.records import archive as archive_module
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import RunRecord
+from crosscheck.report import ci
 from crosscheck.running.sweep import sweep
 from flexmb import cli as flexmb_cli
 from flexmb.output.writing import check_folder
@@ -94,7 +96,7 @@ def test_a_disk_that_fills_up_keeps_what_was_recorded(
 
     def write(self: Archive, record) -> None:
         if isinstance(record, RunRecord) and sum(isinstance(each, RunRecord) for each in read(self._file)) == 3:
-            with records.writing(self._file):
+            with archive_module.writing(self._file):
                 raise OSError(errno.ENOSPC, "No space left on device")
         whole(self, record)
 
@@ -112,7 +114,7 @@ def test_a_report_on_a_full_disk_is_one_line(runner, tmp_path, monkeypatch) -> N
     def full(*_, **__) -> None:
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(summary.Path, "write_text", full)
+    monkeypatch.setattr(ci.Path, "write_text", full)
     words = ["report", str(tmp_path / "records.jsonl"), "--out", str(tmp_path)]
     is_one_line(runner.invoke(cli.app, words, env=WIDE), str(tmp_path))
 
@@ -137,7 +139,7 @@ def test_a_broken_record_is_named_and_run_again(runner: CliRunner, tmp_path: Pat
 
 
 def test_a_full_disk_takes_the_files_only(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The summary of a simulation is printed before it is written."""
+    """The ci of a simulation is printed before it is written."""
     from flexmb.run.trajectory import Trajectory
 
     def full(self: Trajectory, path: Path) -> None:

@@ -23,14 +23,17 @@ import numpy as np
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.find import load_case
-from crosscheck.records.records import Packed, RunRecord, environment, read
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import RunRecord
+from crosscheck.records.machine import environment
+from crosscheck.records.packing import Packed
 from crosscheck.report import write_all
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
-from crosscheck.stability import records as maps
-from crosscheck.stability.console import read_verdicts
-from crosscheck.stability.judge import MapVerdict
+from crosscheck.stability import map_records as maps
+from crosscheck.stability.boundary import MapVerdict
 from crosscheck.stability.map import Axis
+from crosscheck.stability.verdict_file import read_verdicts
 from crosscheck.verify.columns import VerifyError, read_columns
 from flexmb.scene.check import check_scene
 from flexmb.scene.files import dumps, load_scene, loads

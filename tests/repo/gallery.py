@@ -10,10 +10,10 @@ from __future__ import annotations
 import tomllib
 from typing import NamedTuple
 
+from crosscheck.stability.boundary import MapVerdict
 from crosscheck.stability.catalogue import stability_maps
-from crosscheck.stability.console import VERDICTS, read_verdicts
-from crosscheck.stability.judge import MapVerdict
 from crosscheck.stability.map import StabilityMap
+from crosscheck.stability.verdict_file import VERDICTS, read_verdicts
 from tests.repo.project import ROOT
 
 PAGE = ROOT / "docs" / "gallery.md"

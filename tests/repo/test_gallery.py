@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from crosscheck.stability.catalogue import stability_maps
-from crosscheck.stability.console import VERDICTS, read_verdicts
+from crosscheck.stability.verdict_file import VERDICTS, read_verdicts
 from tests.repo.gallery import PAGE, PICTURES, other_pictures, page
 
 LARGEST = 200_000  # bytes

@@ -10,9 +10,9 @@ import numpy as np
 from crosscheck.engines.conventions import Frame, frame, rotation_matrix
 from crosscheck.engines.exudyn import joints
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.joints import Link, Port
+from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
-from crosscheck.engines.exudyn.motion import AT_REST, Motion, across_quaternion
+from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import axes
 from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical, Weld
@@ -36,7 +36,7 @@ class Placed:
 
     body: Body
     carrier: Carrier
-    motion: Motion
+    motion: FrameMotion
     eta: Real = field(default_factory=lambda: np.zeros(0))
     rate: Real = field(default_factory=lambda: np.zeros(0))
     crosses: dict[str, list[int]] = field(default_factory=dict)
@@ -59,15 +59,15 @@ class Assembly:
     scene: Scene
     shop: Workshop
     bodies: dict[str, Placed]
-    hinges: dict[str, Link]
-    wheels: dict[str, Link]
-    guides: dict[str, Link]
-    closures: dict[str, Link]
+    hinges: dict[str, ExudynLink]
+    wheels: dict[str, ExudynLink]
+    guides: dict[str, ExudynLink]
+    closures: dict[str, ExudynLink]
     carriers: tuple[Carrier, ...]
     sampler: int
 
     @property
-    def links(self) -> dict[str, Link]:
+    def links(self) -> dict[str, ExudynLink]:
         return self.hinges | self.wheels | self.guides | self.closures
 
     @property
@@ -152,18 +152,18 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
 
 def _attach(
     shop: Workshop, scene: Scene, placed: dict[str, Placed], body: Body, hinge: Hinge, held: set[str]
-) -> tuple[Link, Placed]:
+) -> tuple[ExudynLink, Placed]:
     """A body and the hinge that joins it to its parent."""
     own = frame(hinge.parent_position_m, hinge.parent_quaternion)
     if hinge.parent == GROUND:
-        port = Port(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
+        port = HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
     else:
         port = _port(shop, placed[hinge.parent], hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
     zero = port.zero @ outboard.rotation.T
     found: list[Placed] = []
 
-    def make(hinge_motion: Motion) -> Carrier:
+    def make(hinge_motion: FrameMotion) -> Carrier:
         found.append(_place(shop, scene, body, hinge, hinge_motion, zero, held))
         return found[0].carrier
 
@@ -187,7 +187,7 @@ def _steps(hinge: Hinge) -> list[tuple[Real, joints.Coordinate]]:
 
 
 def _place(
-    shop: Workshop, scene: Scene, body: Body, hinge: Hinge, hinge_motion: Motion, zero: Real, held: set[str]
+    shop: Workshop, scene: Scene, body: Body, hinge: Hinge, hinge_motion: FrameMotion, zero: Real, held: set[str]
 ) -> Placed:
     """The carrier of a body, from the motion of its outboard hinge frame."""
     fixed = frame(hinge.child_position_m, hinge.child_quaternion).inverse()
@@ -232,21 +232,21 @@ def _cross(shape: NodeShape) -> list[Real]:
     return found
 
 
-def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> Port:
+def _port(shop: Workshop, parent: Placed, node: str, offset: Frame) -> HingePort:
     """An inboard hinge frame at a node of a placed body plus an offset; on a section carrier where the node deforms."""
     shape = parent.shape(node)
     zero = shape.rotation @ offset.rotation
     at_node = _exudyn_motion(parent).node(shape, parent.eta, parent.rate)
     motion = at_node.offset(offset.position, offset.rotation)
     if not shape.deforms:
-        return Port(parent.carrier, shape.position + shape.rotation @ offset.position, zero, motion)
+        return HingePort(parent.carrier, shape.position + shape.rotation @ offset.position, zero, motion)
     section = shop.rigid(at_node, shape.rotation, None)
     markers = [_section_marker(shop, parent, node), shop.marker(section, np.zeros(3))]
     shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
-    return Port(section, shape.rotation @ offset.position, zero, motion)
+    return HingePort(section, shape.rotation @ offset.position, zero, motion)
 
 
-def _exudyn_motion(parent: Placed) -> Motion:
+def _exudyn_motion(parent: Placed) -> FrameMotion:
     """Motion of the body's Exudyn axes."""
     return parent.motion.offset(np.zeros(3), parent.carrier.zero.T)
 
@@ -259,20 +259,20 @@ def _section_marker(shop: Workshop, parent: Placed, node: str) -> int:
     )
 
 
-def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> Link:
+def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> ExudynLink:
     """A joint between two frames that exist already."""
     a = frame(closure.position_a_m, closure.quaternion_a)
     b = frame(closure.position_b_m, closure.quaternion_b)
     ports = []
     for body, node, own in ((closure.body_a, closure.node_a, a), (closure.body_b, closure.node_b, b)):
         if body == GROUND:
-            ports.append(Port(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation)))
+            ports.append(HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation)))
         else:
             ports.append(_port(shop, placed[body], node, own))
     return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
 
 
-def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[Link, Carrier]:
+def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[ExudynLink, Carrier]:
     """A wheel as a body of its own on a revolute joint; friction and motor between it and its node."""
     axis = _unit(wheel.axis)
     port = _port(shop, parent, wheel.node, Frame(np.array(wheel.offset_m), np.eye(3)))
@@ -288,7 +288,7 @@ def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[Link, Carrier]
     )
 
 
-def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Link, Carrier]:
+def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[ExudynLink, Carrier]:
     """A rigid body without rotary inertia, guided along the point mass's directions."""
     port = _port(shop, parent, mass.node, Frame(np.array(mass.offset_m), np.eye(3)))
     inertia = Inertia(mass.mass_kg, np.zeros(3), np.zeros((3, 3)))
@@ -297,7 +297,7 @@ def _point_mass(shop: Workshop, parent: Placed, mass: PointMass) -> tuple[Link, 
         for direction, each in zip(mass.directions, coordinates(mass), strict=True)
     ]
 
-    def make(motion: Motion) -> Carrier:
+    def make(motion: FrameMotion) -> Carrier:
         return shop.rigid(motion, port.zero, inertia)
 
     if not steps:

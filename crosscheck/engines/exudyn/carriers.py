@@ -15,8 +15,8 @@ from scipy.spatial.transform import Rotation
 
 from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.exudyn.library import load, matrix
-from crosscheck.engines.exudyn.modal import ModalIntegrals, gravity_force
-from crosscheck.engines.exudyn.motion import Motion
+from crosscheck.engines.exudyn.modal import PointIntegrals, gravity_force
+from crosscheck.engines.exudyn.motion import FrameMotion
 from crosscheck.engines.exudyn.rotations import exponential, local_rate_map, turn_and_rate_map
 from flexmb.surrogate.lumping import Inertia, steiner
 from flexmb.typing import Real
@@ -36,7 +36,7 @@ class Carrier:
     inertia: Inertia | None = None
     flexible: int | None = None
     modes: int | None = None
-    data: ModalIntegrals | None = None
+    data: PointIntegrals | None = None
 
     @property
     def key(self) -> int:
@@ -69,7 +69,7 @@ class Workshop:
             self.items.MarkerNodeCoordinate(nodeNumber=self.mbs.AddNode(self.items.NodePointGround()), coordinate=0)
         )
 
-    def rigid(self, motion: Motion, zero: Real, inertia: Inertia | None) -> Carrier:
+    def rigid(self, motion: FrameMotion, zero: Real, inertia: Inertia | None) -> Carrier:
         """A rigid body, or a massless frame; `motion` of its scene frame, `inertia` in scene body axes."""
         node = self._node(motion, zero)
         if inertia is None:
@@ -88,7 +88,7 @@ class Workshop:
         return Carrier(item, node, zero, own)
 
     def flexible(
-        self, motion: Motion, zero: Real, data: ModalIntegrals, eta: Real, rate: Real, crosses: list[Real]
+        self, motion: FrameMotion, zero: Real, data: PointIntegrals, eta: Real, rate: Real, crosses: list[Real]
     ) -> Carrier:
         """A floating frame with modal coordinates, and a massless rigid body on the same node for joints to hold.
 
@@ -131,7 +131,7 @@ class Workshop:
             self.items.NodeGenericData(initialCoordinates=[angle], numberOfDataCoordinates=1)
         )
 
-    def _node(self, motion: Motion, zero: Real) -> int:
+    def _node(self, motion: FrameMotion, zero: Real) -> int:
         A = motion.rotation @ zero.T
         local = A.T @ motion.angular
         if self.explicit:
@@ -150,7 +150,7 @@ class Workshop:
             )
         )
 
-    def _weight(self, data: ModalIntegrals, node: int):
+    def _weight(self, data: PointIntegrals, node: int):
         """The user function with the weight of a flexible body, or 0 without gravity."""
         if not self.gravity.any():
             return 0

@@ -12,24 +12,24 @@ from dataclasses import dataclass
 import numpy as np
 
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.motion import Motion, across, across_quaternion, initial
+from crosscheck.engines.exudyn.motion import FrameMotion, across, across_quaternion, initial
 from crosscheck.engines.functions_of_time import Profile, profile
 from flexmb.scene.hinges import AngularCoordinate, LinearCoordinate, Spherical
 from flexmb.typing import Real
 
 Coordinate = AngularCoordinate | LinearCoordinate
-Outboard = Callable[[Motion], Carrier]
+Outboard = Callable[[FrameMotion], Carrier]
 """Makes the carrier beyond a link, given the motion of the outboard hinge frame."""
 
 
 @dataclass(frozen=True)
-class Port:
+class HingePort:
     """An inboard hinge frame: `position` (3,) on its carrier in Exudyn axes, `zero` (3,3) hinge -> Exudyn axes."""
 
     carrier: Carrier
     position: Real
     zero: Real
-    motion: Motion
+    motion: FrameMotion
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class Stage:
 
 
 @dataclass(frozen=True)
-class Link:
+class ExudynLink:
     """All that joins an outboard body to its inboard one, acting on its `marker` at the hinge point.
 
     `connectors`: Exudyn objects and whether each is a constraint (with multipliers) or a spring-damper.
@@ -74,20 +74,22 @@ class Link:
     spherical: tuple[Spherical, Carrier, Carrier] | None = None
 
 
-def free(name: str) -> Link:
+def free(name: str) -> ExudynLink:
     """No connection."""
-    return Link(name, (), (), None)
+    return ExudynLink(name, (), (), None)
 
 
-def weld(shop: Workshop, name: str, port: Port, make: Outboard, point: Real) -> tuple[Link, Carrier]:
+def weld(shop: Workshop, name: str, port: HingePort, make: Outboard, point: Real) -> tuple[ExudynLink, Carrier]:
     """Rigid connection; `point` (3,) is the hinge point on the outboard carrier, in Exudyn axes."""
     carrier = make(port.motion)
     markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
     joint = shop.mbs.AddObject(shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=[1] * 6))
-    return Link(name, (), ((joint, True),), markers[1]), carrier
+    return ExudynLink(name, (), ((joint, True),), markers[1]), carrier
 
 
-def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, point: Real) -> tuple[Link, Carrier]:
+def spherical(
+    shop: Workshop, hinge: Spherical, port: HingePort, make: Outboard, point: Real
+) -> tuple[ExudynLink, Carrier]:
     """Ball joint, with the isotropic spring and damper of the scene."""
     carrier = make(across_quaternion(port.motion, hinge))
     markers = [shop.marker(port.carrier, port.position), shop.marker(carrier, point)]
@@ -99,7 +101,7 @@ def spherical(shop: Workshop, hinge: Spherical, port: Port, make: Outboard, poin
             damping=hinge.damping_Nms_rad * turning, useIntrinsicFormulation=True,
         )  # fmt: skip
         connectors.append((shop.mbs.AddObject(spring), False))
-    return Link(hinge.name, (), tuple(connectors), markers[1], (hinge, port.carrier, carrier)), carrier
+    return ExudynLink(hinge.name, (), tuple(connectors), markers[1], (hinge, port.carrier, carrier)), carrier
 
 
 CONSTRAINED = {
@@ -114,7 +116,7 @@ CONSTRAINED = {
 """Displacements along and turns about x, y, z of frame A that a closure's joint suppresses, z being its axis."""
 
 
-def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: Real) -> Link:
+def closure(shop: Workshop, name: str, kind: str, ports: Sequence[HingePort], axis: Real) -> ExudynLink:
     """A joint of some kind between two ports; `axis` (3,) has the same components in both frames."""
     turn = np.eye(3) if kind in ("universal", "planar", "weld", "spherical") else _axes_with(axis, 2)
     markers = [shop.marker(port.carrier, port.position, port.zero @ turn) for port in ports]
@@ -125,12 +127,12 @@ def closure(shop: Workshop, name: str, kind: str, ports: Sequence[Port], axis: R
             joint = shop.items.SphericalJoint(markerNumbers=markers)
         case _:
             joint = shop.items.GenericJoint(markerNumbers=markers, constrainedAxes=CONSTRAINED[kind])
-    return Link(name, (), ((shop.mbs.AddObject(joint), True),), markers[1])
+    return ExudynLink(name, (), ((shop.mbs.AddObject(joint), True),), markers[1])
 
 
 def chain(
-    shop: Workshop, name: str, port: Port, steps: Sequence[tuple[Real, Coordinate]], make: Outboard, point: Real
-) -> tuple[Link, Carrier]:
+    shop: Workshop, name: str, port: HingePort, steps: Sequence[tuple[Real, Coordinate]], make: Outboard, point: Real
+) -> tuple[ExudynLink, Carrier]:
     """One joint for each (axis in the hinge frame, coordinate), in order from the inboard side."""
     stages, connectors, markers = [], [], [0, 0]
     inboard, position, motion = port.carrier, port.position, port.motion
@@ -152,7 +154,7 @@ def chain(
             )
         )  # fmt: skip
         inboard, position = outboard, arrival
-    return Link(name, tuple(stages), tuple(connectors), markers[1]), inboard
+    return ExudynLink(name, tuple(stages), tuple(connectors), markers[1]), inboard
 
 
 def _markers(shop: Workshop, a: Carrier, p: Real, b: Carrier, q: Real, axis: Real, coordinate: Coordinate) -> list:

@@ -42,7 +42,7 @@ def node_shape(body: ModalBody, name: str, axes: Real) -> NodeShape:
 
 
 @dataclass(frozen=True)
-class ModalIntegrals:
+class PointIntegrals:
     """Inertia integrals over the points (position r, modes Phi (3,m)) of one body, about the frame origin, in its axes.
 
     With ~ the cross matrix and [Phi~] the (3, 3m) row of cross matrices of the mode columns:
@@ -65,7 +65,7 @@ class ModalIntegrals:
     damping: Real
 
 
-def integrals(body: ModalBody, axes: Real) -> ModalIntegrals:
+def integrals(body: ModalBody, axes: Real) -> PointIntegrals:
     """Integrals of a body without rotary inertia of its points, in the axes `axes` @ (body axes)."""
     arrays = modal_arrays(body)
     m, r = arrays.mass, arrays.position @ axes.T
@@ -78,7 +78,7 @@ def integrals(body: ModalBody, axes: Real) -> ModalIntegrals:
         """sum m a'b."""
         return np.einsum("p,pki,pkj->ij", m, a, b)
 
-    return ModalIntegrals(
+    return PointIntegrals(
         mass=float(m.sum()), first=m @ r, inertia=total(r_cross, r_cross),
         shape=np.einsum("p,pkn->kn", m, Phi), shape_cross=np.einsum("p,pkn->kn", m, row),
         position_shape=total(r_cross, Phi), position_cross=total(r_cross, row),
@@ -87,7 +87,7 @@ def integrals(body: ModalBody, axes: Real) -> ModalIntegrals:
     )  # fmt: skip
 
 
-def gravity_force(data: ModalIntegrals, g: Real, A: Real, rate_map: Real, eta: Real) -> Real:
+def gravity_force(data: PointIntegrals, g: Real, A: Real, rate_map: Real, eta: Real) -> Real:
     """Generalised weight [World force; rotation coordinates; modes] of the deformed body.
 
     Exudyn's own mass-proportional load leaves out the moment of the deformation, A skew(shape eta) G, so that energy

@@ -15,7 +15,7 @@ from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
-class Motion:
+class FrameMotion:
     """A frame in World: `position` (3,) m, `rotation` (3,3) to World; `angular` rad/s, `linear` m/s in World axes."""
 
     position: Real
@@ -23,47 +23,47 @@ class Motion:
     angular: Real
     linear: Real
 
-    def offset(self, position: Real, rotation: Real) -> Motion:
+    def offset(self, position: Real, rotation: Real) -> FrameMotion:
         """A frame fixed in this one."""
         arm = self.rotation @ position
-        return Motion(
+        return FrameMotion(
             self.position + arm, self.rotation @ rotation, self.angular, self.linear + np.cross(self.angular, arm)
         )
 
-    def turned(self, axis: Real, angle: float, rate: float) -> Motion:
+    def turned(self, axis: Real, angle: float, rate: float) -> FrameMotion:
         """This frame turned about its own unit `axis`."""
         spin = rate * (self.rotation @ axis)
-        return Motion(self.position, self.rotation @ axis_rotation(axis, angle), self.angular + spin, self.linear)
+        return FrameMotion(self.position, self.rotation @ axis_rotation(axis, angle), self.angular + spin, self.linear)
 
-    def moved(self, displacement: Real, rate: Real) -> Motion:
+    def moved(self, displacement: Real, rate: Real) -> FrameMotion:
         """This frame displaced by a vector in its own axes that changes at `rate`."""
         arm = self.rotation @ displacement
         velocity = self.linear + np.cross(self.angular, arm) + self.rotation @ rate
-        return Motion(self.position + arm, self.rotation, self.angular, velocity)
+        return FrameMotion(self.position + arm, self.rotation, self.angular, velocity)
 
-    def spherical(self, quaternion: Real, rate: Real) -> Motion:
+    def spherical(self, quaternion: Real, rate: Real) -> FrameMotion:
         """This frame turned by `quaternion`, with the relative angular velocity `rate` in the turned axes."""
         rotation = self.rotation @ rotation_matrix(quaternion)
-        return Motion(self.position, rotation, self.angular + rotation @ rate, self.linear)
+        return FrameMotion(self.position, rotation, self.angular + rotation @ rate, self.linear)
 
-    def node(self, shape: NodeShape, eta: Real, rate: Real) -> Motion:
+    def node(self, shape: NodeShape, eta: Real, rate: Real) -> FrameMotion:
         """A node of a flexible body whose frame this is; the node turns by exp(rotation_modes eta)."""
         theta, theta_rate = shape.rotation_modes @ eta, shape.rotation_modes @ rate
         moved = self.moved(shape.position + shape.translation @ eta, shape.translation @ rate)
         rotation = self.rotation @ exponential(theta) @ shape.rotation
         spin = self.rotation @ left_jacobian(theta) @ theta_rate
-        return Motion(moved.position, rotation, self.angular + spin, moved.linear)
+        return FrameMotion(moved.position, rotation, self.angular + spin, moved.linear)
 
-    def body_of(self, node: Motion) -> Motion:
+    def body_of(self, node: FrameMotion) -> FrameMotion:
         """The body frame, where this is a node's motion and `node` the node's motion seen from the body frame."""
         rotation = self.rotation @ node.rotation.T
         angular = self.angular - rotation @ node.angular
         arm = rotation @ node.position
         linear = self.linear - np.cross(angular, arm) - rotation @ node.linear
-        return Motion(self.position - arm, rotation, angular, linear)
+        return FrameMotion(self.position - arm, rotation, angular, linear)
 
 
-AT_REST = Motion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+AT_REST = FrameMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
 
 
 def initial(coordinate: AngularCoordinate | LinearCoordinate) -> tuple[float, float]:
@@ -78,7 +78,7 @@ def initial(coordinate: AngularCoordinate | LinearCoordinate) -> tuple[float, fl
             return start.value, start.rate
 
 
-def across(inboard: Motion, axis: Real, coordinate: AngularCoordinate | LinearCoordinate) -> Motion:
+def across(inboard: FrameMotion, axis: Real, coordinate: AngularCoordinate | LinearCoordinate) -> FrameMotion:
     """The frame beyond one scalar coordinate about or along `axis` (in the inboard frame)."""
     value, rate = initial(coordinate)
     if isinstance(coordinate, AngularCoordinate):
@@ -86,7 +86,7 @@ def across(inboard: Motion, axis: Real, coordinate: AngularCoordinate | LinearCo
     return inboard.moved(value * axis, rate * axis)
 
 
-def across_quaternion(inboard: Motion, hinge: Spherical | Free) -> Motion:
+def across_quaternion(inboard: FrameMotion, hinge: Spherical | Free) -> FrameMotion:
     """The frame beyond a hinge with a quaternion; a free hinge's velocity is in the outboard axes."""
     rate = np.array(hinge.angular_velocity_rad_s)
     if isinstance(hinge, Spherical):

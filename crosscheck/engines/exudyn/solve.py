@@ -37,7 +37,7 @@ From a first step that is far too long Exudyn falls to the smallest one and acce
 
 
 @dataclass(frozen=True)
-class Solution:
+class ExudynSolution:
     """What a run left behind, cut to its good samples."""
 
     states: States
@@ -71,7 +71,7 @@ class Recorder:
         return States(times, q, v, None, multipliers.reshape(count, -1), stored.reshape(count, -1))
 
 
-def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> Solution:
+def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> ExudynSolution:
     """Integrate from 0 through `times`; uniform sampling for the implicit solvers."""
     run = _fixed if effort.method in IMPLICIT + FIXED_EXPLICIT else _explicit
     start = perf_counter()
@@ -79,9 +79,9 @@ def integrate(assembly: Assembly | PlanarBeam, times: Real, effort: Effort) -> S
     wall = perf_counter() - start
     good = _good_samples(assembly, states, times)
     if good == len(times):
-        return Solution(states, "finished", "", wall, evaluations)
+        return ExudynSolution(states, "finished", "", wall, evaluations)
     last = f"last good output at t = {times[good - 1]:g} s of {times[-1]:g} s"
-    return Solution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations)
+    return ExudynSolution(states.cut(good), "diverged", f"{effort.label}: {last}", wall, evaluations)
 
 
 def _settings(assembly: Assembly | PlanarBeam):

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.engines.exudyn.assembly import Assembly
-from crosscheck.engines.exudyn.joints import Link, Stage
+from crosscheck.engines.exudyn.joints import ExudynLink, Stage
 from crosscheck.engines.exudyn.state import CarrierPath, States, set_state
 from flexmb.typing import Real
 
@@ -42,7 +42,7 @@ def drives(assembly: Assembly, states: States) -> dict[str, Real]:
     return found
 
 
-def _connector_wrench(assembly: Assembly, link: Link) -> Real:
+def _connector_wrench(assembly: Assembly, link: ExudynLink) -> Real:
     """[torque; force] at the link's outboard marker: least-squares solution of J' [force; torque] = -C' multiplier."""
     mbs, kinds = assembly.shop.mbs, assembly.shop.exu.ComputeItemType
     J = np.vstack(

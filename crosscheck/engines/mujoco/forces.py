@@ -11,7 +11,7 @@ import numpy as np
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
-from crosscheck.engines.mujoco.tree import ARMATURE, Slot, Tree
+from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -23,13 +23,13 @@ class Forces:
     time seen by the functions, so that the last stage before a jump sees the limit from the left.
     """
 
-    def __init__(self, tree: Tree, scene: Scene) -> None:
+    def __init__(self, tree: MujocoTree, scene: Scene) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
-        self.driven: list[Slot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
+        self.driven: list[MujocoSlot] = [slot for slot in scalars if slot.freedom.prescribed is not None]
         self._tree = tree
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
-        self._loads = [_NodeLoad(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
+        self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
         self.before_end = np.inf
 
     @contextmanager
@@ -71,10 +71,10 @@ class Forces:
                 load.add(t, data)
 
 
-class _NodeLoad:
+class _BodyWrench:
     """A force or torque at a node, handed to MuJoCo as a wrench [force; torque] at the mass centre in World axes."""
 
-    def __init__(self, tree: Tree, at: Attachment, load: Load) -> None:
+    def __init__(self, tree: MujocoTree, at: Attachment, load: Load) -> None:
         self._body = int(tree.bodies[at.link])
         self._arm = at.frame.position - tree.links[at.link].inertia.com
         self._in_world = load.frame == "world"

@@ -17,8 +17,8 @@ from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajector
 from crosscheck.engines.functions_of_time import breaks_between, fastest_rate, scene_functions
 from crosscheck.engines.links import Ball, Floating, Scalar, closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.observer import Observer
-from crosscheck.engines.mujoco.tree import Closed, build_tree, initial_state
+from crosscheck.engines.mujoco.observer import MujocoObserver
+from crosscheck.engines.mujoco.tree import MujocoClosure, build_tree, initial_state
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -42,11 +42,11 @@ class MujocoModel:
     def __init__(self, scene: Scene) -> None:
         chain = links(scene)
         closures = tuple(
-            Closed(closure.name, *closed_frames(scene, chain, closure)) for closure in scene.closures
+            MujocoClosure(closure.name, *closed_frames(scene, chain, closure)) for closure in scene.closures
         )
         self._tree = build_tree(chain, np.array(scene.gravity_m_s2, dtype=float), closures)
         self._forces = Forces(self._tree, scene)
-        self._observer = Observer(self._tree, self._forces, scene, closures)
+        self._observer = MujocoObserver(self._tree, self._forces, scene, closures)
         self._functions = scene_functions(scene)
 
     def warm_up(self) -> None:

@@ -10,12 +10,12 @@ from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of, shift_wrench
 from crosscheck.engines.links import Attachment, attachment
 from crosscheck.engines.mujoco.forces import Forces
-from crosscheck.engines.mujoco.tree import Closed, Tree
+from crosscheck.engines.mujoco.tree import MujocoClosure, MujocoTree
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
-class Observer:
+class MujocoObserver:
     """Reads `data` after `mj_forward` and `mj_rnePostConstraint`.
 
     MuJoCo's spatial vectors (`cvel`, `cacc`, `cfrc_int`) are [angular; linear] in World axes about the mass centre of
@@ -23,7 +23,9 @@ class Observer:
     on the body.
     """
 
-    def __init__(self, tree: Tree, forces: Forces, scene: Scene, closures: tuple[Closed, ...] = ()) -> None:
+    def __init__(
+        self, tree: MujocoTree, forces: Forces, scene: Scene, closures: tuple[MujocoClosure, ...] = ()
+    ) -> None:
         self._tree = tree
         self._forces = forces
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)

@@ -27,7 +27,7 @@ LEAST_INERTIA = 1e-14
 
 
 @dataclass(frozen=True)
-class Closed:
+class MujocoClosure:
     """A ball joint that closes a loop between frames `a` and `b`, as soft as MuJoCo's defaults make it."""
 
     name: str
@@ -36,7 +36,7 @@ class Closed:
 
 
 @dataclass(frozen=True)
-class Slot:
+class MujocoSlot:
     """A freedom and where its coordinates `q` and speeds `v` start; `joint` is the id of its first MuJoCo joint."""
 
     freedom: Freedom
@@ -48,16 +48,16 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Tree:
+class MujocoTree:
     """`bodies[i]` is the MuJoCo body of link i."""
 
     model: mujoco.MjModel
     links: tuple[Link, ...]
     bodies: NDArray[np.intp]
-    slots: tuple[Slot, ...]
+    slots: tuple[MujocoSlot, ...]
 
 
-def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[Closed, ...] = ()) -> Tree:
+def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[MujocoClosure, ...] = ()) -> MujocoTree:
     spec = mujoco.MjSpec()
     spec.compiler.degree = False
     spec.option.gravity = gravity
@@ -82,10 +82,10 @@ def build_tree(links: tuple[Link, ...], gravity: Real, closures: tuple[Closed, .
         _close(spec, bodies, closed, i)
     model = spec.compile()
     ids = np.array([model.body(_body_name(link)).id for link in links], dtype=np.intp)
-    return Tree(model, links, ids, _slots(model, links, ids))
+    return MujocoTree(model, links, ids, _slots(model, links, ids))
 
 
-def initial_state(tree: Tree) -> tuple[Real, Real]:
+def initial_state(tree: MujocoTree) -> tuple[Real, Real]:
     """qpos and qvel at t = 0."""
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:
@@ -104,7 +104,7 @@ def initial_state(tree: Tree) -> tuple[Real, Real]:
     return q, v
 
 
-def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: Closed, number: int) -> None:
+def _close(spec: mujoco.MjSpec, bodies: list[mujoco.MjsBody], closed: MujocoClosure, number: int) -> None:
     """An equality constraint between two sites: with a body and an anchor it would close where coordinates are zero."""
     names = []
     for side, at in zip("ab", (closed.a, closed.b), strict=True):
@@ -138,13 +138,13 @@ def _add_joints(body: mujoco.MjsBody, freedom: Freedom, name: str) -> None:
             body.add_joint(name=name, type=kinds.mjJNT_BALL)
 
 
-def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.intp]) -> tuple[Slot, ...]:
+def _slots(model: mujoco.MjModel, links: tuple[Link, ...], bodies: NDArray[np.intp]) -> tuple[MujocoSlot, ...]:
     slots = []
     for link, body in zip(links, bodies, strict=True):
         joint = int(model.body_jntadr[body])
         for freedom in link.freedoms:
             q, v = int(model.jnt_qposadr[joint]), int(model.jnt_dofadr[joint])
-            slots.append(Slot(freedom, link, int(body), joint, q, v))
+            slots.append(MujocoSlot(freedom, link, int(body), joint, q, v))
             joint += 4 if isinstance(freedom, Floating) else 1
     return tuple(slots)
 

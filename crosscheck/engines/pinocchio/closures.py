@@ -7,7 +7,7 @@ import pinocchio as pin
 
 from crosscheck.engines.conventions import cross
 from crosscheck.engines.links import closed_frames
-from crosscheck.engines.pinocchio.tree import Tree, placement
+from crosscheck.engines.pinocchio.tree import PinocchioTree, placement
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -16,10 +16,10 @@ from flexmb.typing import Real
 _PROXIMAL = (1e-15, 1e-15, 1e-12, 100)
 
 
-class Closures:
+class PinocchioClosures:
     """The closures of a scene on its tree. `solve` leaves their loads for `loads` and `on_joints`."""
 
-    def __init__(self, tree: Tree, scene: Scene) -> None:
+    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
         self._model, self._names = tree.model, [closure.name for closure in scene.closures]
         self._constraints = pin.StdVec_RigidConstraintModel()
         self._sides: list[tuple[int, int]] = []

@@ -15,9 +15,9 @@ import pinocchio as pin
 from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar_last
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
-from crosscheck.engines.pinocchio.closures import Closures
+from crosscheck.engines.pinocchio.closures import PinocchioClosures
 from crosscheck.engines.pinocchio.forces import JointForces, NodeLoads
-from crosscheck.engines.pinocchio.tree import Slot, Tree, initial_state
+from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -25,7 +25,7 @@ BALLAST = 1e20
 """kg m^2 or kg: so large that drive loads of any scene, divided by it, are below round-off of the accelerations."""
 
 
-class Solution(NamedTuple):
+class PinocchioSolution(NamedTuple):
     """Accelerations (nv,), loads of the driven coordinates (d,), power of drives, motors, dampers and loads (W)."""
 
     acceleration: Real
@@ -33,7 +33,7 @@ class Solution(NamedTuple):
     power: float
 
 
-class State(NamedTuple):
+class PinocchioState(NamedTuple):
     """q (nq,) with unit quaternions, v (nv,), driven accelerations (d,)."""
 
     q: Real
@@ -42,13 +42,13 @@ class State(NamedTuple):
 
 
 class Dynamics:
-    def __init__(self, tree: Tree, scene: Scene) -> None:
+    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
         self.tree = tree
         self.data = tree.model.createData()
         self.forces = JointForces(tree)
         self.loads = NodeLoads(tree, scene)
-        self.closures = Closures(tree, scene)
-        self.driven: list[Slot] = [slot for slot in tree.slots if _is_driven(slot)]
+        self.closures = PinocchioClosures(tree, scene)
+        self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         self._driven_q = np.array([slot.q for slot in self.driven], dtype=np.intp)
         self._driven_v = np.array([slot.v for slot in self.driven], dtype=np.intp)
@@ -66,7 +66,7 @@ class Dynamics:
         q, v = initial_state(self.tree)
         return np.concatenate([q[self._free_q], v[self._free_v], [0.0]])
 
-    def state(self, t: float, y: Real) -> State:
+    def state(self, t: float, y: Real) -> PinocchioState:
         q, v = np.empty(self.tree.model.nq), np.empty(self.tree.model.nv)
         split = len(self._free_q)
         q[self._free_q], v[self._free_v] = y[:split], y[split:-1]
@@ -75,9 +75,9 @@ class Dynamics:
         for slot in self._turning:
             quaternion = q[(start := _quaternion_start(slot)) : start + 4]
             quaternion /= np.sqrt(quaternion @ quaternion)
-        return State(q, v, motion[:, 2])
+        return PinocchioState(q, v, motion[:, 2])
 
-    def solve(self, t: float, state: State) -> Solution:
+    def solve(self, t: float, state: PinocchioState) -> PinocchioSolution:
         """Articulated-body accelerations, or constrained ones where loops are closed, and drive loads.
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
@@ -89,7 +89,7 @@ class Dynamics:
         tau = self.forces.springs(state.q) + lost
         if self.closures:
             a = self.closures.solve(state.q, state.v, tau)
-            return Solution(a, np.zeros(0), float(lost @ state.v))
+            return PinocchioSolution(a, np.zeros(0), float(lost @ state.v))
         wrenches = self._wrenches(t, state)
         extra = () if wrenches is None else (wrenches,)
         D = self._driven_v
@@ -100,14 +100,14 @@ class Dynamics:
         power = lost @ state.v + drive @ state.v[D]
         if self.loads:
             power += self.loads.power(t, self.data)
-        return Solution(a, drive, float(power))
+        return PinocchioSolution(a, drive, float(power))
 
-    def inverse(self, state: State, acceleration: Real, wrenches: pin.StdVec_Force | None) -> Real:
+    def inverse(self, state: PinocchioState, acceleration: Real, wrenches: pin.StdVec_Force | None) -> Real:
         """Generalised forces of the whole motion; leaves the joint wrenches in `data.f`."""
         extra = () if wrenches is None else (wrenches,)
         return pin.rnea(self.tree.model, self.data, state.q, state.v, acceleration, *extra)
 
-    def resolve_loads(self, t: float, state: State, acceleration: Real) -> None:
+    def resolve_loads(self, t: float, state: PinocchioState, acceleration: Real) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
         wrenches = self.closures.on_joints() if self.closures else self._wrenches(t, state)
         self.inverse(state, acceleration, wrenches)
@@ -122,7 +122,7 @@ class Dynamics:
             self._turning_rate(slot, y, state, qdot)
         return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
 
-    def _turning_rate(self, slot: Slot, y: Real, state: State, qdot: Real) -> None:
+    def _turning_rate(self, slot: PinocchioSlot, y: Real, state: PinocchioState, qdot: Real) -> None:
         """Rates of ball and free-flyer coordinates; the quaternion's own (not normalised) value enters its rate."""
         start = _quaternion_start(slot)
         own = y[np.searchsorted(self._free_q, start) :][:4]
@@ -133,16 +133,16 @@ class Dynamics:
             omega = state.v[slot.v : slot.v + 3]
         qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own), omega))
 
-    def _wrenches(self, t: float, state: State) -> pin.StdVec_Force | None:
+    def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
         if not self.loads:
             return None
         pin.forwardKinematics(self.tree.model, self.data, state.q, state.v)
         return self.loads.wrenches(t, self.data)
 
 
-def _is_driven(slot: Slot) -> bool:
+def _is_driven(slot: PinocchioSlot) -> bool:
     return isinstance(slot.freedom, Scalar) and slot.freedom.prescribed is not None
 
 
-def _quaternion_start(slot: Slot) -> int:
+def _quaternion_start(slot: PinocchioSlot) -> int:
     return slot.q if isinstance(slot.freedom, Ball) else slot.q + 3

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from crosscheck.engines.conventions import rotation_vector, scalar_first
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Scalar, attachment
-from crosscheck.engines.pinocchio.tree import Slot, Tree
+from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
@@ -17,7 +17,7 @@ from flexmb.typing import Real
 class JointForces:
     """Generalised forces (nv,) of springs, of dampers and of motors."""
 
-    def __init__(self, tree: Tree) -> None:
+    def __init__(self, tree: PinocchioTree) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
         sprung = [slot for slot in scalars if slot.freedom.stiffness]
         damped = [slot for slot in scalars if slot.freedom.damping]
@@ -61,8 +61,8 @@ class JointForces:
 class NodeLoads:
     """Loads at nodes as wrenches on the joints, in joint axes; needs the kinematics of `data` to be up to date."""
 
-    def __init__(self, tree: Tree, scene: Scene) -> None:
-        self._loads = [_NodeLoad(tree, scene, load) for load in scene.loads]
+    def __init__(self, tree: PinocchioTree, scene: Scene) -> None:
+        self._loads = [_JointWrench(tree, scene, load) for load in scene.loads]
         self._joints = tree.model.njoints
 
     def __bool__(self) -> bool:
@@ -79,8 +79,8 @@ class NodeLoads:
         return sum(load.wrench(t, data).dot(data.v[load.joint]) for load in self._loads)
 
 
-class _NodeLoad:
-    def __init__(self, tree: Tree, scene: Scene, load: Load) -> None:
+class _JointWrench:
+    def __init__(self, tree: PinocchioTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self.joint = tree.joints[at.link]
         self._point = at.frame.position
@@ -98,9 +98,9 @@ class _NodeLoad:
         return pin.Force(np.zeros(3), vector)
 
 
-def _indices(slots: list[Slot]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def _indices(slots: list[PinocchioSlot]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
     return np.array([slot.q for slot in slots], dtype=np.intp), np.array([slot.v for slot in slots], dtype=np.intp)
 
 
-def _turn(slot: Slot, q: Real) -> Real:
+def _turn(slot: PinocchioSlot, q: Real) -> Real:
     return rotation_vector(scalar_first(q[slot.q : slot.q + 4]))

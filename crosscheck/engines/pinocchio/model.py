@@ -12,7 +12,7 @@ from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajector
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
 from crosscheck.engines.links import links
 from crosscheck.engines.pinocchio.dynamics import Dynamics
-from crosscheck.engines.pinocchio.observer import Observer
+from crosscheck.engines.pinocchio.observer import PinocchioObserver
 from crosscheck.engines.pinocchio.tree import build_tree
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
@@ -28,7 +28,7 @@ class PinocchioModel:
     def __init__(self, scene: Scene) -> None:
         tree = build_tree(links(scene), np.array(scene.gravity_m_s2, dtype=float))
         self._dynamics = Dynamics(tree, scene)
-        self._observer = Observer(self._dynamics, scene)
+        self._observer = PinocchioObserver(self._dynamics, scene)
         self._functions = scene_functions(scene)
 
     def warm_up(self) -> None:

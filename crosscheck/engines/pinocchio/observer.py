@@ -8,13 +8,13 @@ import pinocchio as pin
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import angular_first, cross, quaternion_of, rotate_spatial
 from crosscheck.engines.links import attachment
-from crosscheck.engines.pinocchio.dynamics import Dynamics, State
+from crosscheck.engines.pinocchio.dynamics import Dynamics, PinocchioState
 from crosscheck.engines.pinocchio.tree import placement
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 
-class Observer:
+class PinocchioObserver:
     """Adds the markers to the model as operational frames, so it must exist before the model's data do."""
 
     def __init__(self, dynamics: Dynamics, scene: Scene) -> None:
@@ -28,7 +28,7 @@ class Observer:
             self._frames[marker.name] = tree.model.addFrame(frame)
         dynamics.data = tree.model.createData()
 
-    def observe(self, t: float, state: State) -> Snapshot:
+    def observe(self, t: float, state: PinocchioState) -> Snapshot:
         dynamics = self._dynamics
         model, data, links = dynamics.tree.model, dynamics.data, dynamics.tree.links
         acceleration, drive, _ = dynamics.solve(t, state)

@@ -21,7 +21,7 @@ _HELD = Scalar(True, np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0, 0.0, 0.0, None, C
 
 
 @dataclass(frozen=True)
-class Slot:
+class PinocchioSlot:
     """A freedom and where its coordinates `q` and speeds `v` start; `held`: it stands for a weld."""
 
     freedom: Freedom
@@ -32,41 +32,42 @@ class Slot:
 
 
 @dataclass(frozen=True)
-class Tree:
+class PinocchioTree:
     """`joints[i]`: the joint whose frame is link i. `slots` follow the order of the coordinates."""
 
     model: pin.Model
     links: tuple[Link, ...]
     joints: tuple[int, ...]
-    slots: tuple[Slot, ...]
+    slots: tuple[PinocchioSlot, ...]
 
 
 def placement(frame: Frame) -> pin.SE3:
     return pin.SE3(frame.rotation, frame.position)
 
 
-def build_tree(links: tuple[Link, ...], gravity: Real) -> Tree:
+def build_tree(links: tuple[Link, ...], gravity: Real) -> PinocchioTree:
     """Links come depth-first, as Pinocchio needs them: `crba` is silently wrong otherwise, hence the check."""
     model = pin.Model()
     model.gravity.linear = gravity
     joints: list[int] = []
-    slots: list[Slot] = []
+    slots: list[PinocchioSlot] = []
     for link in links:
         joint = joints[link.parent] if link.parent >= 0 else 0
         at = placement(link.inboard)
         for k, freedom in enumerate(link.freedoms or (_HELD,)):
             joint = model.addJoint(joint, _joint(freedom), at, f"{link.joint}.{k}")
             at = pin.SE3.Identity()
-            slots.append(Slot(freedom, link, model.joints[joint].idx_q, model.joints[joint].idx_v, not link.freedoms))
+            made = model.joints[joint]
+            slots.append(PinocchioSlot(freedom, link, made.idx_q, made.idx_v, not link.freedoms))
         own = link.inertia
         model.appendBodyToJoint(joint, pin.Inertia(own.mass, own.com, own.inertia), pin.SE3.Identity())
         joints.append(joint)
     if not model.check(model.createData()):
         raise RuntimeError("Pinocchio refuses the order of the joints: links must come depth-first")
-    return Tree(model, links, tuple(joints), tuple(slots))
+    return PinocchioTree(model, links, tuple(joints), tuple(slots))
 
 
-def initial_state(tree: Tree) -> tuple[Real, Real]:
+def initial_state(tree: PinocchioTree) -> tuple[Real, Real]:
     """Coordinates (nq,) and speeds (nv,) at t = 0."""
     q, v = np.zeros(tree.model.nq), np.zeros(tree.model.nv)
     for slot in tree.slots:

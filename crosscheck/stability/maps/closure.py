@@ -8,7 +8,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds, growth_kinds
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -60,18 +60,18 @@ def system() -> ClosedSystem:
     return found
 
 
-def gap(step: float, time: float, rate: float) -> Outcome:
+def gap(step: float, time: float, rate: float) -> Measurement:
     """`opening` of a run of flexmb with RK4; with `rate` 0 it projects."""
     done = simulate(system(), time, "rk4", step=step, samples=np.linspace(0.0, time, SAMPLES), stabilise=rate)
     if not done.finished:
-        return Outcome(status="failed", message=done.message)
+        return Measurement(status="failed", message=done.message)
     return opening(done.markers["a"].position, done.markers["b"].position)
 
 
-def opening(a: Real, b: Real) -> Outcome:
+def opening(a: Real, b: Real) -> Measurement:
     """log10 of the largest distance of the joined points over the size of the loop, in the second half of a run."""
     distance = np.linalg.norm(a - b, axis=1)[SAMPLES // 2 :]
-    return Outcome(float(np.log10(np.max(distance) / SIZE + LEAST)))
+    return Measurement(float(np.log10(np.max(distance) / SIZE + LEAST)))
 
 
 # ---- Where stabilisation is stable
@@ -79,7 +79,7 @@ def opening(a: Real, b: Real) -> Outcome:
 STEPS = 512
 
 
-def measure_stability(scene: Scene, step: float, rate: float) -> Outcome:
+def measure_stability(scene: Scene, step: float, rate: float) -> Measurement:
     """The opening after `STEPS` steps."""
     return gap(step, STEPS * step, rate)
 
@@ -120,7 +120,7 @@ ANCHOR = 1e-3  # s
 LEVELS = (-12.0, -9.0, -7.0, -4.0)
 
 
-def measure_drift(scene: Scene, step: float, kept: float) -> Outcome:
+def measure_drift(scene: Scene, step: float, kept: float) -> Measurement:
     """The opening within `SPAN`."""
     match KEPT[round(kept)]:
         case "projection":
@@ -131,7 +131,7 @@ def measure_drift(scene: Scene, step: float, kept: float) -> Outcome:
     mujoco.version()  # says how to install it where it is missing
     found = mujoco.compile(scene).simulate(Run(np.linspace(0.0, SPAN, SAMPLES)), Effort("step", step, "RK4"))
     if found.status != "finished":
-        return Outcome(status="failed", message=found.message)
+        return Measurement(status="failed", message=found.message)
     return opening(found.markers["a"].position, found.markers["b"].position)
 
 

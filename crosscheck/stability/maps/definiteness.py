@@ -8,7 +8,7 @@ import msgspec
 import numpy as np
 from scipy.linalg import eigh
 
-from crosscheck.stability.map import STABLE, UNSTABLE, Axis, Kind, Outcome, Overlay, StabilityMap
+from crosscheck.stability.map import STABLE, UNSTABLE, Axis, Kind, Measurement, Overlay, StabilityMap
 from flexmb.dense import DenseSystem
 from flexmb.modal.flexible import beam_model
 from flexmb.scene.bodies import BeamBody
@@ -44,7 +44,7 @@ def scene(deflection: float, gyration: float) -> Scene:
     return msgspec.structs.replace(straight, modal_states=(ModalState(body="beam", coordinates=(amplitude, 0.0)),))
 
 
-def measure(scene: Scene, deflection: float, gyration: float) -> Outcome:
+def measure(scene: Scene, deflection: float, gyration: float) -> Measurement:
     """Smallest eigenvalue of the mass matrix by composite bodies, scaled to a unit diagonal, with its sign changed.
 
     The recursion must refuse exactly the states where it is not positive; otherwise the cell has failed.
@@ -60,8 +60,9 @@ def measure(scene: Scene, deflection: float, gyration: float) -> Outcome:
     except DynamicsError:
         refused = True
     if refused != (smallest <= 0.0):
-        return Outcome(status="failed", message=f"refused: {refused}, but the smallest eigenvalue is {smallest:.3g}")
-    return Outcome(-smallest)
+        message = f"refused: {refused}, but the smallest eigenvalue is {smallest:.3g}"
+        return Measurement(status="failed", message=message)
+    return Measurement(-smallest)
 
 
 @cache

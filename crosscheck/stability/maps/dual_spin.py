@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.schema import Scene
@@ -44,14 +44,14 @@ def scene(inertia: float, momentum: float) -> Scene:
     return builder.scene()
 
 
-def measure(scene: Scene, inertia: float, momentum: float) -> Outcome:
+def measure(scene: Scene, inertia: float, momentum: float) -> Measurement:
     """Growth rate over spin of disturbances of the transverse rates and of the dampers."""
     system = compile(scene)
     start = system.nq + system.speed("centre").start
     places = [start, start + 1]
     for mass in scene.point_masses:
         places += [system.coordinate(mass.name).start, system.nq + system.speed(mass.name).start]
-    return Outcome(growth_rate(system, places) / SPIN)
+    return Measurement(growth_rate(system, places) / SPIN)
 
 
 def energy_sink(inertia: Real, momentum: Real) -> Real:

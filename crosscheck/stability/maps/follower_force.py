@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 from scipy.linalg import eigvals
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
@@ -44,10 +44,10 @@ def column(load: float, tip_mass: float = 0.0, damping: float = 0.0) -> Scene:
     )
 
 
-def measure(scene: Scene, load: float, other: float) -> Outcome:
+def measure(scene: Scene, load: float, other: float) -> Measurement:
     """Growth rate (1/s) of the straight column's bending."""
     system = compile(scene)
-    return Outcome(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])))
+    return Measurement(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])))
 
 
 # ---- The overlay: beam elements of its own, nothing of flexmb's

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -23,11 +23,11 @@ def scene(first: float, second: float) -> Scene:
     )
 
 
-def measure(scene: Scene, first: float, second: float) -> Outcome:
+def measure(scene: Scene, first: float, second: float) -> Measurement:
     """Growth rate over spin of disturbances of the two transverse rates."""
     system = compile(scene)
     start = system.nq + system.speed("base").start
-    return Outcome(growth_rate(system, [start, start + 1]) / SPIN)
+    return Measurement(growth_rate(system, [start, start + 1]) / SPIN)
 
 
 def intermediate(first: Real, second: Real) -> Real:

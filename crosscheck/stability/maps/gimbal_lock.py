@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.schema import Scene
 from flexmb.system.system import compile
@@ -52,7 +52,7 @@ def scene(distance: float, hinge: float) -> Scene:
     )
 
 
-def measure(scene: Scene, distance: float, hinge: float) -> Outcome:
+def measure(scene: Scene, distance: float, hinge: float) -> Measurement:
     """Largest relative error of the angular acceleration in body axes, against Euler's equations."""
     system, name = compile(scene), HINGES[round(hinge)]
     errors = []
@@ -61,11 +61,11 @@ def measure(scene: Scene, distance: float, hinge: float) -> Outcome:
         try:
             motion = system.evaluate(0.0, q, u).markers["body"]
         except DynamicsError as error:
-            return Outcome(status="failed", message=str(error))
+            return Measurement(status="failed", message=str(error))
         spin, found = motion.rotation.T @ motion.velocity[:3], motion.rotation.T @ motion.acceleration[:3]
         exact = -np.linalg.solve(INERTIA, np.cross(spin, INERTIA @ spin))
         errors.append(np.linalg.norm(found - exact) / np.linalg.norm(exact))
-    return Outcome(float(np.log10(max(max(errors), ROUNDING))))
+    return Measurement(float(np.log10(max(max(errors), ROUNDING))))
 
 
 def _coordinates(name: str, distance: float, body: Body) -> tuple[Real, Real]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, Run
 from crosscheck.engines.registry import engine
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from flexmb.integrate.integrator import Method as MethodName
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
@@ -29,7 +29,7 @@ Signals = tuple[Real, Real, str]  # displacement and velocity of the fast mass (
 
 
 @dataclass(frozen=True)
-class Method:
+class Stepper:
     """An integrator of an engine; `limit` is the largest stable step x frequency of an undamped motion."""
 
     engine: str
@@ -89,20 +89,20 @@ def breathing_body(step: float, frequency: float) -> Scene:
     )
 
 
-def growth(signals: Signals, frequency: float, steps: int) -> Outcome:
+def growth(signals: Signals, frequency: float, steps: int) -> Measurement:
     """Growth of the logarithm of the amplitude in a step, from the largest amplitudes of the two halves of a run."""
     x, v, why = signals
     if why:
-        return Outcome(status="failed", message=why)
+        return Measurement(status="failed", message=why)
     amplitude = np.hypot(x, v / frequency)
     halves = np.max(amplitude[: PARTS // 2]), np.max(amplitude[PARTS // 2 :])
-    return Outcome(float(np.log(halves[1] / halves[0]) / (steps / 2)) if halves[1] > 0.0 else -1.0)
+    return Measurement(float(np.log(halves[1] / halves[0]) / (steps / 2)) if halves[1] > 0.0 else -1.0)
 
 
-def step_map(method: Method) -> StabilityMap:
+def step_map(method: Stepper) -> StabilityMap:
     """The map of one integrator."""
 
-    def measure(scene: Scene, step: float, frequency: float) -> Outcome:
+    def measure(scene: Scene, step: float, frequency: float) -> Measurement:
         return growth(method.run(scene, step, STEPS), frequency, STEPS)
 
     limit = "no step is stable" if method.limit == NEVER else "every step is stable"
@@ -137,15 +137,15 @@ HAIRER = "Hairer, Wanner, Solving Ordinary Differential Equations II, IV.2: the 
 SYMPLECTIC = "semi-implicit Euler: Hairer, Lubich, Wanner, Geometric Numerical Integration, I.1"
 CHUNG = "Chung, Hulbert 1993: unconditionally stable"
 METHODS = (
-    Method("flexmb", "rk4", IMAGINARY_RK4, HAIRER, slides),
-    Method("flexmb", "generalised_alpha", UNLIMITED, CHUNG, slides),
-    Method("mujoco", "RK4", IMAGINARY_RK4, HAIRER, slides),
-    Method("mujoco", "Euler", 2.0, SYMPLECTIC, slides),
-    Method("mujoco", "implicit", 2.0, "MuJoCo documentation, Computation: implicit in velocities only", slides),
-    Method("exudyn", "GeneralizedAlpha", UNLIMITED, CHUNG, slides),
-    Method("exudyn", "TrapezoidalIndex2", UNLIMITED, "the trapezoidal rule is A-stable (Dahlquist 1963)", slides),
-    Method("exudyn", "RK44", IMAGINARY_RK4, HAIRER, breathing_body),
-    Method("exudyn", "ExplicitEuler", NEVER, HAIRER + ", of which Euler's method has only the origin", breathing_body),
+    Stepper("flexmb", "rk4", IMAGINARY_RK4, HAIRER, slides),
+    Stepper("flexmb", "generalised_alpha", UNLIMITED, CHUNG, slides),
+    Stepper("mujoco", "RK4", IMAGINARY_RK4, HAIRER, slides),
+    Stepper("mujoco", "Euler", 2.0, SYMPLECTIC, slides),
+    Stepper("mujoco", "implicit", 2.0, "MuJoCo documentation, Computation: implicit in velocities only", slides),
+    Stepper("exudyn", "GeneralizedAlpha", UNLIMITED, CHUNG, slides),
+    Stepper("exudyn", "TrapezoidalIndex2", UNLIMITED, "the trapezoidal rule is A-stable (Dahlquist 1963)", slides),
+    Stepper("exudyn", "RK44", IMAGINARY_RK4, HAIRER, breathing_body),
+    Stepper("exudyn", "ExplicitEuler", NEVER, HAIRER + ", of which Euler's method has only the origin", breathing_body),
 )
 
 
@@ -163,15 +163,15 @@ ADAPTIVE: dict[MethodName, str] = {
 def tolerance_map(name: MethodName, source: str) -> StabilityMap:
     """The map of one method with error control."""
 
-    def measure(scene: Scene, tolerance: float, frequency: float) -> Outcome:
+    def measure(scene: Scene, tolerance: float, frequency: float) -> Measurement:
         span = PERIODS * 2.0 * np.pi / frequency
         times = np.linspace(0.0, span, 257)
         done = simulate(scene, span, name, rtol=tolerance, atol=0.01 * tolerance * START, samples=times)
         if not done.finished:
             unfinished = done.status is Status.MAX_STEPS
-            return Outcome(status="did not finish" if unfinished else "failed", message=done.message)
+            return Measurement(status="did not finish" if unfinished else "failed", message=done.message)
         path = done.markers["fast"]
-        return Outcome(float(np.max(np.hypot(path.position[:, 0], path.velocity[:, 3] / frequency)) / START))
+        return Measurement(float(np.max(np.hypot(path.position[:, 0], path.velocity[:, 3] / frequency)) / START))
 
     return StabilityMap(
         name=f"integrator_flexmb_{name}",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
@@ -39,18 +39,18 @@ def scene(bodies: float, algorithm: float) -> Scene:
     return builder.scene()
 
 
-def measure(scene: Scene, bodies: float, algorithm: float) -> Outcome:
+def measure(scene: Scene, bodies: float, algorithm: float) -> Measurement:
     """log10 of the backward error: the residual of inverse dynamics over the size of its terms."""
     name = ALGORITHMS[round(algorithm)]
     if bodies > MOST[name]:
-        return Outcome(status="did not finish", message=f"{name} was not run with more than {MOST[name]} bodies")
+        return Measurement(status="did not finish", message=f"{name} was not run with more than {MOST[name]} bodies")
     system = compile(scene)
     state = system.initial_state
     rates = system.accelerations(state, name)
     residual = system.inverse_dynamics(state, rates) - system.applied(state)
     terms = np.abs(system.bias(state)) + np.abs(system.inverse_dynamics(state, rates) - system.bias(state))
     error = np.linalg.norm(residual, np.inf) / np.linalg.norm(terms, np.inf)
-    return Outcome(float(np.log10(max(error, ROUNDING))))
+    return Measurement(float(np.log10(max(error, ROUNDING))))
 
 
 def rounding(bodies: Real, algorithm: Real) -> Real:

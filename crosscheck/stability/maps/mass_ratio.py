@@ -8,7 +8,7 @@ from typing import NamedTuple, cast
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, digit_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
@@ -77,7 +77,7 @@ def _fraction(x: np.longdouble) -> Fraction:
     return Fraction(*x.as_integer_ratio())
 
 
-def measure(algorithm: Algorithm, ratio: float, slender: float) -> Outcome:
+def measure(algorithm: Algorithm, ratio: float, slender: float) -> Measurement:
     """log10 of the largest error of the accelerations over their size, both weighed with sqrt(diag M)."""
     errors = []
     for factor in FACTORS:
@@ -88,10 +88,10 @@ def measure(algorithm: Algorithm, ratio: float, slender: float) -> Outcome:
             try:
                 found = system.accelerations(system.state(at.angles, at.rates), algorithm)
             except DynamicsError as error:
-                return Outcome(status="failed", message=str(error))
+                return Measurement(status="failed", message=str(error))
             weights = np.sqrt(np.diag(M))
             errors.append(np.linalg.norm(weights * (found - wanted)) / np.linalg.norm(weights * wanted))
-    return Outcome(float(np.log10(max(max(errors), ROUNDING))))
+    return Measurement(float(np.log10(max(max(errors), ROUNDING))))
 
 
 def left_over(ratio: Real, slender: Real) -> tuple[Real, Real]:
@@ -131,7 +131,7 @@ CANCELLING = Overlay(
 def digits_map(algorithm: Algorithm) -> StabilityMap:
     """The map of one algorithm."""
 
-    def measured(member: Scene, ratio: float, slender: float) -> Outcome:
+    def measured(member: Scene, ratio: float, slender: float) -> Measurement:
         return measure(algorithm, ratio, slender)
 
     overlay = SCALED if algorithm != "articulated" else CANCELLING

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
@@ -39,7 +39,7 @@ def scene(speed: float, ratio: float) -> Scene:
     )
 
 
-def measure(scene: Scene, speed: float, ratio: float) -> Outcome:
+def measure(scene: Scene, speed: float, ratio: float) -> Measurement:
     """Growth rate over critical speed, in one turn, of disturbances of the disc and of the speed of the surroundings.
 
     Turning and fixed axes are mixed, so the coefficients repeat with every turn (Floquet).
@@ -47,7 +47,7 @@ def measure(scene: Scene, speed: float, ratio: float) -> Outcome:
     system = compile(scene)
     q, u = system.coordinate("bending").start, system.nq + system.speed("bending").start
     drag = system.nq + system.speed("drag").start
-    return Outcome(growth_rate(system, [q, q + 1, u, u + 1, drag, drag + 1], 2.0 * np.pi / (speed * OMEGA)) / OMEGA)
+    return Measurement(growth_rate(system, [q, q + 1, u, u + 1, drag, drag + 1], 2.0 * np.pi / (speed * OMEGA)) / OMEGA)
 
 
 def excess(speed: Real, ratio: Real) -> Real:

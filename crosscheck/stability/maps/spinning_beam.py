@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Ramp
@@ -34,10 +34,10 @@ def scene(spin: float, level: float) -> Scene:
     )
 
 
-def measure(scene: Scene, spin: float, level: float) -> Outcome:
+def measure(scene: Scene, spin: float, level: float) -> Measurement:
     """Growth rate over omega_1 of disturbances of the modes in the plane of rotation."""
     system = compile(scene)
-    return Outcome(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])) / OMEGA_1)
+    return Measurement(growth_rate(system, states_of(system, ["beam.modes"], ["beam.modes"])) / OMEGA_1)
 
 
 def softening(spin: Real, level: Real) -> Real:

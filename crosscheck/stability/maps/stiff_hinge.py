@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
@@ -48,13 +48,13 @@ def scene(step: float, stiffness: float) -> Scene:
     )
 
 
-def measure(scene: Scene, step: float, stiffness: float) -> Outcome:
+def measure(scene: Scene, step: float, stiffness: float) -> Measurement:
     """Growth of the logarithm of the hinge angles' size in a step, from the largest in each half of a run."""
     done = simulate(scene, step * STEPS, "rk4", step=step, samples=step * STEPS / PARTS * np.arange(PARTS + 1))
     if not done.finished:
-        return Outcome(status="failed", message=done.message)
+        return Measurement(status="failed", message=done.message)
     size = np.max(np.abs(done.q), axis=1)
-    return Outcome(float(np.log(np.max(size[PARTS // 2 :]) / np.max(size[: PARTS // 2])) / (STEPS / 2)))
+    return Measurement(float(np.log(np.max(size[PARTS // 2 :]) / np.max(size[: PARTS // 2])) / (STEPS / 2)))
 
 
 def amplification(step: Real, stiffness: Real) -> Real:

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.special import mathieu_a, mathieu_b
 
 from crosscheck.stability.flow import growth_rate
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from crosscheck.stability.spectrum import states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
@@ -32,12 +32,12 @@ def scene(frequency: float, amplitude: float) -> Scene:
     )
 
 
-def measure(scene: Scene, frequency: float, amplitude: float) -> Outcome:
+def measure(scene: Scene, frequency: float, amplitude: float) -> Measurement:
     """Growth rate over the drive's frequency, from the multipliers of one period (Floquet)."""
     system = compile(scene)
     places = states_of(system, ["pivot"], ["pivot"])
     drive = frequency * OMEGA_0
-    return Outcome(growth_rate(system, places, 2.0 * np.pi / drive) / drive)
+    return Measurement(growth_rate(system, places, 2.0 * np.pi / drive) / drive)
 
 
 def outside_mathieu(frequency: Real, amplitude: Real) -> Real:

@@ -12,9 +12,10 @@ import pytest
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.records.records import RunRecord, read
-from crosscheck.running.engine_list import describe_engines
-from crosscheck.running.pool import Event
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import RunRecord
+from crosscheck.running.installed import describe_engines
+from crosscheck.running.pool import Event, Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.engines.bad_engines import (
     ANSWERS,
@@ -56,7 +57,9 @@ def install(folder: Path, names: tuple[str, ...]) -> None:
 class Ran:
     """A session of `fine` against each of some engines: its exit code, records and verdicts."""
 
-    def __init__(self, folder: Path, names: tuple[str, ...], patch: pytest.MonkeyPatch, **limits: float) -> None:
+    def __init__(
+        self, folder: Path, names: tuple[str, ...], patch: pytest.MonkeyPatch, limits: Limits | None = None
+    ) -> None:
         plugs = folder / "plugs"
         plugs.mkdir(parents=True)
         install(plugs, (*SOUND, *names))
@@ -70,7 +73,7 @@ class Ran:
             inner.syspath_prepend(plugs)
             inner.setenv("CHILDREN", str(folder / "children"))
             if limits:
-                inner.setattr(cli, "sweep", lambda *words, **more: sweep(*words, **(more | limits)))
+                inner.setattr(cli, "sweep", lambda *words, **more: sweep(*words, **(more | {"limits": limits})))
             result = CliRunner().invoke(cli.app, ["run", str(case), "--out", str(folder / "out"), "--jobs", "2"])
         assert result.exception is None or isinstance(result.exception, SystemExit), result.output
         self.code, self.folder = result.exit_code, folder
@@ -114,12 +117,12 @@ def hard(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) ->
 
 @pytest.fixture(scope="module")
 def late(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
-    return Ran(tmp_path_factory.mktemp("late"), LATE, patch, time_limit_s=LIMIT_S)
+    return Ran(tmp_path_factory.mktemp("late"), LATE, patch, Limits(workers=2, time_s=LIMIT_S))
 
 
 @pytest.fixture(scope="module")
 def hungry(tmp_path_factory: pytest.TempPathFactory, patch: pytest.MonkeyPatch) -> Ran:
-    return Ran(tmp_path_factory.mktemp("hungry"), tuple(HUNGRY), patch, memory_limit_bytes=LIMIT_BYTES)
+    return Ran(tmp_path_factory.mktemp("hungry"), tuple(HUNGRY), patch, Limits(workers=2, memory_bytes=LIMIT_BYTES))
 
 
 def of(name: str, request: pytest.FixtureRequest) -> Ran:

@@ -10,7 +10,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.engines.contract import EngineMissing
-from crosscheck.stability.map import Axis, Outcome, Overlay, StabilityMap, growth_kinds
+from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, growth_kinds
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -33,33 +33,33 @@ def circle(x: Real, y: Real) -> Real:
     return np.asarray(np.hypot(x, y) - RADIUS)
 
 
-def measure(scene: Scene, x: float, y: float) -> Outcome:
+def measure(scene: Scene, x: float, y: float) -> Measurement:
     """The circle's own distance."""
-    return Outcome(float(circle(np.asarray(x), np.asarray(y))))
+    return Measurement(float(circle(np.asarray(x), np.asarray(y))))
 
 
-def with_bad_corner(scene: Scene, x: float, y: float) -> Outcome:
+def with_bad_corner(scene: Scene, x: float, y: float) -> Measurement:
     """Raises right of `CORNER`, does not finish above it; missing or dead where both are."""
     if x > CORNER and y > CORNER:
         os._exit(3)
     if x > CORNER:
         raise ArithmeticError("no such state")
-    return Outcome(status="did not finish", message="too long") if y > CORNER else measure(scene, x, y)
+    return Measurement(status="did not finish", message="too long") if y > CORNER else measure(scene, x, y)
 
 
-def with_slow_place(scene: Scene, x: float, y: float) -> Outcome:
+def with_slow_place(scene: Scene, x: float, y: float) -> Measurement:
     """Takes for ever in one corner."""
     if x > CORNER and y > CORNER:
         time.sleep(3600.0)
     return measure(scene, x, y)
 
 
-def without_end(scene: Scene, x: float, y: float) -> Outcome:
+def without_end(scene: Scene, x: float, y: float) -> Measurement:
     """Says nowhere anything."""
-    return Outcome(status="did not finish", message="too long")
+    return Measurement(status="did not finish", message="too long")
 
 
-def without_library(scene: Scene, x: float, y: float) -> Outcome:
+def without_library(scene: Scene, x: float, y: float) -> Measurement:
     """What an engine says that is not installed."""
     raise EngineMissing("pip install it")
 

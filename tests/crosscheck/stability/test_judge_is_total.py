@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from crosscheck.stability.judge import judge
+from crosscheck.stability.boundary import judge
 from crosscheck.stability.map import Axis, Overlay, StabilityMap
-from crosscheck.stability.records import CellRecord
-from crosscheck.stability.refine import Cell, Mesh
+from crosscheck.stability.map_records import CellRecord
+from crosscheck.stability.refine import Cell, CellMesh
 from tests.crosscheck.stability.synthetic import CIRCLE
 
 SQUARE = replace(CIRCLE, x=Axis("x", "m", -1.0, 1.0, 2), y=Axis("y", "m", -1.0, 1.0, 2), depth=0)
@@ -19,7 +19,7 @@ SQUARE = replace(CIRCLE, x=Axis("x", "m", -1.0, 1.0, 2), y=Axis("y", "m", -1.0, 
 
 def status(what: StabilityMap, value: float | None) -> str:
     """The verdict on a map of four cells, all of which were found to have that value."""
-    mesh = Mesh(what.x, what.y, 0)
+    mesh = CellMesh(what.x, what.y, 0)
     records = {cell: record(cell, value) for cell in mesh.waiting}
     mesh.settle((cell, "any") for cell in sorted(mesh.waiting))
     return judge(what, mesh, records).status

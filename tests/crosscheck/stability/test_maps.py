@@ -10,9 +10,9 @@ import msgspec
 import numpy as np
 import pytest
 
+from crosscheck.stability.boundary import judge
 from crosscheck.stability.catalogue import stability_maps
 from crosscheck.stability.flow import flow
-from crosscheck.stability.judge import judge
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
 from crosscheck.stability.run import Finished, run_here, run_map

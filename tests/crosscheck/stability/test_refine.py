@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from crosscheck.stability.map import Axis
-from crosscheck.stability.refine import Cell, Mesh
+from crosscheck.stability.refine import Cell, CellMesh
 from tests.crosscheck.stability.synthetic import RADIUS
 
 X, Y = Axis("x", "", -1.0, 1.0, 8), Axis("y", "", -1.0, 1.0, 8)
 
 
-def refined(depth: int, label, x: Axis = X, y: Axis = Y) -> tuple[Mesh, int]:
+def refined(depth: int, label, x: Axis = X, y: Axis = Y) -> tuple[CellMesh, int]:
     """The mesh of a labelling of places, and how many cells were asked for."""
-    mesh, asked = Mesh(x, y, depth), 0
+    mesh, asked = CellMesh(x, y, depth), 0
     cells = sorted(mesh.waiting)
     while cells:
         asked += len(cells)
@@ -67,4 +67,4 @@ def test_logarithmic_axes_have_cells_of_equal_ratio() -> None:
     axis = Axis("step", "s", 1e-3, 1e-1, 4, log=True)
     assert axis.edges(0) == pytest.approx(10.0 ** np.linspace(-3, -1, 5))
     assert axis.centres(1) == pytest.approx(np.sqrt(axis.edges(1)[1:] * axis.edges(1)[:-1]))
-    assert Mesh(axis, axis, 0).centre(Cell(0, 3, 0)) == pytest.approx((10**-1.25, 10**-2.75))
+    assert CellMesh(axis, axis, 0).centre(Cell(0, 3, 0)) == pytest.approx((10**-1.25, 10**-2.75))

@@ -12,13 +12,16 @@ from matplotlib.image import imread
 from typer.testing import CliRunner
 
 from crosscheck import cli
-from crosscheck.records.records import made_by
-from crosscheck.stability import console, run
+from crosscheck.records import made_by
+from crosscheck.running.pool import Limits
+from crosscheck.stability import run
+from crosscheck.stability.boundary import judge
 from crosscheck.stability.catalogue import stability_maps
-from crosscheck.stability.judge import judge
+from crosscheck.stability.map_records import CellRecord, cells_of, identity, read
 from crosscheck.stability.picture import STATUSES, draw
-from crosscheck.stability.records import CellRecord, cells_of, identity, read
 from crosscheck.stability.run import Finished, run_here, run_map
+from crosscheck.stability.verdict_file import read_verdicts
+from crosscheck.terminal import map_runs
 from tests.crosscheck.stability import synthetic
 from tests.crosscheck.stability.synthetic import CIRCLE, PROVIDER, shifted
 
@@ -52,7 +55,7 @@ def test_a_bound_allows_better_and_refuses_worse(tmp_path: Path) -> None:
 
 def test_cells_that_fail_stop_or_die_are_colours_of_their_own(tmp_path: Path) -> None:
     """A death says nothing about the method: whatever a map takes failures for, it is never green."""
-    done = run_it("corner", tmp_path, scheduler=run.run_jobs, workers=2)
+    done = run_it("corner", tmp_path, scheduler=run.run_jobs, limits=Limits(workers=2))
     found = {record.status for record in done.records.values()}
     assert found == {"measured", "failed", "did not finish", "did not run"}
     died = {cell: record for cell, record in done.records.items() if record.x > 0.8 and record.y > 0.8}
@@ -81,7 +84,7 @@ def test_what_did_not_run_is_never_green_and_asked_for_again(tmp_path: Path) -> 
 
 def test_cells_that_exceed_a_limit_did_not_run_and_are_asked_for_again(tmp_path: Path) -> None:
     """Whatever the machine could not do says nothing about the map."""
-    done = run_it("slow", tmp_path, scheduler=run.run_jobs, workers=2, time_limit_s=1.0)
+    done = run_it("slow", tmp_path, scheduler=run.run_jobs, limits=Limits(workers=2, time_s=1.0))
     stopped = [record for record in done.records.values() if record.status != "measured"]
     assert stopped and {record.status for record in stopped} == {"did not run"}
     assert all("stopped at its limit of 1 s" in record.message for record in stopped)
@@ -139,7 +142,7 @@ def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch:
 
 def test_the_command_writes_pictures_records_and_verdicts(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(run, "PROVIDER", PROVIDER)
-    monkeypatch.setattr(console, "run_map", functools.partial(run_map, provider=PROVIDER))
+    monkeypatch.setattr(map_runs, "run_map", functools.partial(run_map, provider=PROVIDER))
     runner, out = CliRunner(), tmp_path / "out"
     words = ["stability", "circle", "--depth", "2", "--jobs", "1", "--out", str(out)]
     result = runner.invoke(cli.app, words)
@@ -147,7 +150,7 @@ def test_the_command_writes_pictures_records_and_verdicts(tmp_path: Path, monkey
     assert {"circle.jsonl", "circle.svg", "maps.json"} <= {file.name for file in out.iterdir()}
     assert (out / "circle.svg").stat().st_size < 200_000
     assert runner.invoke(cli.app, ["stability", "wrong", "--jobs", "1", "--out", str(out)]).exit_code == 1
-    verdicts = {verdict.map: verdict.ok for verdict in console.read_verdicts(out / "maps.json")}
+    verdicts = {verdict.map: verdict.ok for verdict in read_verdicts(out / "maps.json")}
     assert verdicts == {"circle": True, "wrong": False}
     unknown = runner.invoke(cli.app, ["stability", "circel"])
     assert unknown.exit_code == 2 and 'did you mean "circle"?' in unknown.output

@@ -1,0 +1,264 @@
+"""An engine's answers are held against the contract before they are recorded; one that breaks it is a failed run.
+
+Every function returns the answer in plain types of our own (float64 copies, short clean text), so that nothing an
+engine keeps or changes later reaches a record.
+"""
+
+from __future__ import annotations
+
+import math
+import numbers
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import fields, replace
+from typing import Any, get_args
+
+import numpy as np
+
+from crosscheck.engines.contract import ENERGIES, OUTPUTS, Effort, MarkerPath, Model, Status, Support, Trajectory
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+RUNGS = 3
+LONGEST_TEXT = 4000
+LARGEST_COUNT = 2**63 - 1  # what a record can hold
+UNIT = 8 * float(np.finfo(np.float32).eps)
+"""How far from 1 the norm of a quaternion may be: the rounding of an engine in single precision; drift is more."""
+
+
+class BrokenContract(ValueError):
+    """An answer that the contract does not allow; the message says what was expected and what came."""
+
+
+def clean(text: str) -> str:
+    """Text that can be encoded and is not endless."""
+    cut = text[:LONGEST_TEXT]
+    more = f" ... ({len(text) - len(cut)} characters more)" if len(cut) < len(text) else ""
+    return cut.encode("utf-8", "backslashreplace").decode() + more
+
+
+def checked_version(found: Any) -> str:
+    """What `version` returned: text."""
+    text = _text(found, "version()")
+    _require(bool(text.strip()), "version() is empty: name the version of the library")
+    return text
+
+
+def checked_support(found: Any) -> Support:
+    """What `supports` returned."""
+    _instance(found, Support, "supports()")
+    _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
+    return Support(found.kind, _text(found.reason, "the reason of supports()"))
+
+
+def checked_ladder(found: Any) -> tuple[Effort, ...]:
+    """What `efforts` returned: at least three, from coarse to fine for each method."""
+    _require(isinstance(found, tuple | list), f"efforts() is {_named(found)}, not a tuple of efforts")
+    ladder = tuple(_effort(each, f"efforts()[{i}]") for i, each in enumerate(found))
+    _require(len(ladder) >= RUNGS, f"efforts() has {len(ladder)} efforts: an uncertainty needs at least {RUNGS}")
+    _require(len({each.label for each in ladder}) == len(ladder), "efforts() has the same effort twice")
+    finest: dict[tuple[str, str], float] = {}
+    for effort in ladder:
+        before = finest.setdefault((effort.kind, effort.method), math.inf)
+        _require(effort.value < before, f"efforts() are not from coarse to fine: {effort.label} comes after {before:g}")
+        finest[effort.kind, effort.method] = effort.value
+    return ladder
+
+
+def checked_model(found: Any) -> Model:
+    """What `compile` returned."""
+    _require(isinstance(found, Model), f"compile() returned {_named(found)}, which is no model")
+    return found
+
+
+def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
+    """What `simulate` returned for the sample times asked for; an unfinished run is cut to its finite samples."""
+    _instance(found, Trajectory, "simulate()")
+    _one_of(found.status, get_args(Status), "the status")
+    finished, message = found.status == "finished", _text(found.message, "message")
+    _require(finished or bool(message.strip()), f'a "{found.status}" run says in its message when and why')
+    count = _reached(found.times, times, finished)
+    known = _known(scene)
+    run = Trajectory(
+        status=found.status,
+        message=message,
+        times=times[:count].copy(),
+        markers={
+            name: _path(path, f"markers[{name!r}]", count)
+            for name, path in _named_by(found.markers, "markers", _names(scene.markers))
+        },
+        **{name: _output(getattr(found, name), name, count, known.get(name)) for name in OUTPUTS},
+        wall_s=_number(found.wall_s, "wall_s"),
+        evaluations=_count(found.evaluations),
+    )
+    good = _finite_samples(run, finished)
+    run = run if good == count else _cut(run, good)
+    for name, path in run.markers.items():
+        defect = np.abs(np.linalg.norm(path.quaternion, axis=1) - 1.0)
+        if np.any(defect > UNIT):
+            at = int(np.argmax(defect))
+            raise BrokenContract(
+                f"markers[{name!r}].quaternion at t = {times[at]:g} s has norm {1.0 + defect[at]:.9g} or its inverse: "
+                "rotations are unit quaternions"
+            )
+    return run
+
+
+def _reached(found: Any, times: Real, finished: bool) -> int:
+    """How many of the samples asked for are there. A clock that adds up T intervals is off by T roundings at most."""
+    _require(isinstance(found, np.ndarray) and found.ndim == 1, f"times is {_named(found)} and not an array (T,)")
+    taken = _array(found, "times", len(found))
+    _require(len(taken) <= len(times), f"times has {len(taken)} samples, more than the {len(times)} asked for")
+    off = ~(np.abs(taken - times[: len(taken)]) <= len(times) * np.finfo(float).eps * times[-1])
+    if np.any(off):
+        at = int(np.argmax(off))
+        raise BrokenContract(f"times[{at}] is {taken[at]:.17g} s where {times[at]:.17g} s was asked for")
+    if finished and len(taken) < len(times):
+        end = f"at t = {taken[-1]:g} s" if len(taken) else "before its first sample"
+        raise BrokenContract(f"ended {end} of {times[-1]:g} s and called it done")
+    return len(taken)
+
+
+def _path(found: Any, where: str, count: int) -> MarkerPath:
+    _instance(found, MarkerPath, where)
+    return MarkerPath(
+        position=_array(found.position, f"{where}.position", count, 3),
+        quaternion=_array(found.quaternion, f"{where}.quaternion", count, 4),
+        velocity=_array(found.velocity, f"{where}.velocity", count, 6),
+    )
+
+
+def _known(scene: Scene) -> dict[str, set[str]]:
+    """Who can have each of the outputs that several items have."""
+    hinges, wheels = _names(scene.hinges), _names(scene.wheels)
+    return {
+        "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
+        "wheel_loads": wheels,
+        "drives": hinges | wheels,
+        "energy": set(ENERGIES),
+    }
+
+
+def _output(found: Any, where: str, count: int, known: set[str] | None) -> Any:
+    """An output of a run in plain arrays: by name where `known` items can have it, else one array or None."""
+    columns = OUTPUTS[where]
+    if known is not None:
+        named = _named_by(found, where, known)
+        return {name: _array(values, f"{where}[{name!r}]", count, *columns) for name, values in named}
+    return None if found is None else _array(found, where, count, *columns)
+
+
+def _named_by(found: Any, where: str, known: set[str]) -> list[tuple[str, Any]]:
+    """The items of a mapping whose keys are names that are known."""
+    _require(isinstance(found, Mapping), f"{where} is {_named(found)}, not a mapping")
+    there = ", ".join(sorted(known)) or "none"
+    for name in found:
+        _require(isinstance(name, str) and name in known, f"{where} has {name!r}, and the scene has {there}")
+    return list(found.items())
+
+
+def _array(found: Any, where: str, count: int, *width: int | None) -> Real:
+    """A float64 copy of an array (count, *width) of real numbers; `None` leaves a width open."""
+    plain = isinstance(found, np.ndarray) and not isinstance(found, np.ma.MaskedArray)
+    _require(plain, f"{where} is {_named(found)}, not an array")
+    _require(found.dtype.kind in "fiu", f"{where} is of dtype {found.dtype}, not of real numbers")
+    shape = (count, *(n if n is not None else found.shape[-1] for n in width if found.ndim))
+    right = found.shape == shape and 0 not in shape[1:]
+    _require(right, f"{where} has shape {found.shape}; {_shape(count, width)} was expected")
+    return np.array(found, dtype=np.float64, order="C", subok=False)
+
+
+def _finite_samples(run: Trajectory, finished: bool) -> int:
+    """How many samples from the first are finite throughout; all must be where the run says that it finished."""
+    count = len(run.times)
+    for where, values in _signals(run):
+        good = np.all(np.isfinite(values), axis=tuple(range(1, values.ndim)))
+        first = int(np.argmin(np.append(good, False)))
+        if finished and first < len(run.times):
+            raise BrokenContract(f"{where} is not finite at t = {run.times[first]:g} s, and the status is finished")
+        count = min(count, first)
+    return count
+
+
+def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
+    for name, path in run.markers.items():
+        for part in fields(path):
+            yield f"markers[{name!r}].{part.name}", getattr(path, part.name)
+    for output in OUTPUTS:
+        found = getattr(run, output)
+        if isinstance(found, dict):
+            yield from ((f"{output}[{name!r}]", values) for name, values in found.items())
+        elif found is not None:
+            yield output, found
+
+
+def _cut(run: Trajectory, count: int) -> Trajectory:
+    """The first `count` samples."""
+    return replace(
+        run,
+        times=run.times[:count],
+        markers={
+            name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
+            for name, path in run.markers.items()
+        },
+        **{name: _first_samples(getattr(run, name), count) for name in OUTPUTS},
+    )
+
+
+def _first_samples(output: Any, count: int) -> Any:
+    if isinstance(output, dict):
+        return {name: values[:count] for name, values in output.items()}
+    return None if output is None else output[:count]
+
+
+def _effort(found: Any, where: str) -> Effort:
+    _instance(found, Effort, where)
+    _one_of(found.kind, ("tolerance", "step"), f"{where}.kind")
+    method = _text(found.method, f"{where}.method")
+    value = _number(found.value, f"{where}.value")
+    _require(value > 0.0, f"{where}.value is {value:g}: a tolerance or a step (s) is positive")
+    return Effort(found.kind, value, method)
+
+
+def _one_of(found: Any, words: tuple[str, ...], where: str) -> None:
+    right = isinstance(found, str) and found in words
+    _require(right, f"{where} is {found!r:.80}: it is one of {', '.join(words)}")
+
+
+def _text(found: Any, where: str) -> str:
+    _require(isinstance(found, str), f"{where} is {_named(found)}, not text")
+    return clean(found)
+
+
+def _number(found: Any, where: str) -> float:
+    is_number = isinstance(found, numbers.Real) and not isinstance(found, bool)
+    _require(is_number, f"{where} is {_named(found)}, not a number")
+    value = float(found)
+    _require(math.isfinite(value) and value >= 0.0, f"{where} is {value:g}: a finite number from 0 is expected")
+    return value
+
+
+def _count(found: Any) -> int:
+    whole = isinstance(found, numbers.Integral) and not isinstance(found, bool)
+    _require(whole and 0 <= found <= LARGEST_COUNT, f"evaluations is {found!r:.40}: a whole number from 0 is expected")
+    return int(found)
+
+
+def _instance(found: Any, kind: type, where: str) -> None:
+    _require(isinstance(found, kind), f"{where} returned {_named(found)}, not a {kind.__name__}")
+
+
+def _named(found: Any) -> str:
+    return "None" if found is None else f"a {type(found).__name__}"
+
+
+def _names(items: Iterable[Any]) -> set[str]:
+    return {item.name for item in items}
+
+
+def _shape(count: int, width: tuple[int | None, ...]) -> str:
+    return f"({', '.join('n' if n is None else str(n) for n in (count, *width))}{',' if not width else ''})"
+
+
+def _require(condition: bool, message: str) -> None:
+    if not condition:
+        raise BrokenContract(message)

@@ -1,0 +1,236 @@
+"""From results to verdicts: every channel of every comparison, control and conservation check of a case."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judging.expectation import outside
+from crosscheck.judging.figures import worse
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.verdict import GRAVITY, Finding, Status, Verdict, VerdictKind, compare, conserve
+from crosscheck.library.accepted import key
+from crosscheck.library.case import Comparison, ComparisonSide, Conservation, Control
+from crosscheck.library.channels import CONSERVED
+from crosscheck.library.patterns import most_specific
+from crosscheck.records.kinds import CaseRecord
+from flexmb.run.channels import matches, norms
+
+CLOCK = 1e-9  # relative difference of two clocks that show the same time: old records hold the engines' own
+TRUE_MODEL = "conservation law"
+
+
+def judge(case: CaseResults) -> list[Verdict]:
+    """All verdicts of a case, in the order of its run file."""
+    run = case.case.run
+    found: list[Verdict] = []
+    for comparison in run.comparisons:
+        found += _comparison(case, comparison)
+    for control in run.controls:
+        found += _control(case, control)
+    for conservation in run.conservations:
+        found += (_conservation(case, conservation, engine) for engine in conservation.engines)
+    return found
+
+
+@dataclass(frozen=True)
+class Question:
+    """What a case asks of two sides: which status it expects of every channel, and why if that is not agreement."""
+
+    case: CaseRecord
+    name: str
+    kind: VerdictKind
+    a: ComparisonSide
+    b: ComparisonSide
+    expected: Status
+    why: str
+
+    def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "") -> Verdict:
+        """The verdict on one channel; `beyond` says how a finding with the expected status is outside its bounds."""
+        place = key(channel, (self.a.engine, self.a.variant), (self.b.engine, self.b.variant))
+        accepted = self.case.accepted.get(self.name, {}).get(place) if self.kind != "control" else None
+        infos = self.case.variants
+        levels = dict.fromkeys(infos[side.variant].level for side in (self.a, self.b) if side.variant in infos)
+        return Verdict(
+            case=self.case.case,
+            comparison=self.name,
+            kind=self.kind,
+            channel=channel,
+            variant_a=self.a.variant,
+            engine_a=self.a.engine,
+            variant_b=self.b.variant,
+            engine_b=self.b.engine,
+            level=" / ".join(levels),
+            status=finding.status,
+            expected=self.expected,
+            E=finding.E,
+            U=finding.U,
+            goal=goal,
+            scale=finding.scale,
+            reason=f"{finding.reason}; {beyond}" if beyond and beyond != finding.reason else finding.reason,
+            expected_reason=self.why,
+            outside=beyond,
+            accepted=accepted,
+            worse=worse(accepted, finding.E, finding.U),
+        )
+
+
+def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
+    question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason)
+    a, b = (case.get(side.variant, side.engine) for side in item.sides)
+    across = question.a.variant != question.b.variant
+    for channel, goal, finding in _channels(item.goals, a, b):
+        if finding is None:
+            scale = _scale(item.scales, channel)
+            finding = compare(channel, a.signal(channel, across), b.signal(channel, across), goal, scale)
+        beyond = outside(item, channel, finding) if finding.status == item.expect else ""
+        yield question.verdict(channel, goal, finding, beyond)
+    if _missing(a, b) is None and _elsewhere(a, b) is None:
+        patterns: dict[str, Iterable[str]] = {"scale": item.scales, "band": item.band}
+        for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(question, item, a, b)):
+            yield question.verdict(pattern, 0.0, finding, finding.reason)
+
+
+def _unused(
+    goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
+) -> Iterator[tuple[str, Finding]]:
+    """Scales and bands whose pattern names no channel that is judged: a misspelt one must not be ignored silently."""
+    judged = [name for name in _union(a.channels, b.channels) if most_specific(goals, name) is not None]
+    for what, patterns in given.items():
+        for pattern in patterns if judged else ():
+            if not any(matches(pattern, name) for name in judged):
+                text = f'a {what} is given for "{pattern}", which is no channel judged here'
+                yield pattern, Finding("unresolved", text)
+
+
+def _vanished(question: Question, item: Comparison, a: Result, b: Result) -> Iterator[tuple[str, Finding]]:
+    """Channels with accepted figures that no engine offers any more, and energies that only one engine still offers."""
+    judged = {channel for channel, _, _ in _channels(item.goals, a, b)}
+    for place in question.case.accepted.get(item.name, {}):
+        channel = place.partition(" | ")[0]
+        ours = place == key(channel, (a.engine, a.variant), (b.engine, b.variant))
+        if ours and channel not in judged:
+            why = "it has accepted figures and is not judged any more: take them out of accepted.toml if that is meant"
+            yield channel, Finding("did not run", why)
+
+
+def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
+    """The faulty run takes its U from the same engine's true run: the same ladder on nearly the same scene."""
+    why = f"negative control ({item.mutation} of {item.target or 'the scene'}): the fault must be noticed"
+    question = Question(case.case, item.name, "control", item.a, item.b, "differ", why)
+    faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
+    twin, b = case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
+    across = item.a.variant != item.b.variant
+    for channel, goal, finding in _channels(item.goals, faulty, b):
+        if finding is None:
+            finding = _absent(twin, channel)
+        if finding is None:
+            signal = faulty.control_signal(channel, twin, across)
+            finding = compare(channel, signal, b.signal(channel, across), goal, _scale(item.scales, channel))
+        yield question.verdict(channel, goal, finding)
+    if _missing(faulty, b) is None and _elsewhere(faulty, b) is None:
+        for pattern, finding in _unused(item.goals, {"scale": item.scales}, faulty, b):
+            yield question.verdict(pattern, 0.0, finding)
+
+
+def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict:
+    name = f"{item.quantity.replace('_', ' ')} conserved"
+    side = ComparisonSide(variant=item.variant, engine=engine)
+    law = ComparisonSide(variant=item.variant, engine=TRUE_MODEL)
+    question = Question(case.case, name, "conservation", side, law, item.expect, item.reason)
+    result = case.get(item.variant, engine)
+    channel = CONSERVED[item.quantity]
+    finding = _absent(result, channel) or _drift(result, channel, item)
+    beyond = outside(item, channel, finding) if finding.status == item.expect else ""
+    return question.verdict(channel, item.limit, finding, beyond)
+
+
+def _drift(result: Result, channel: str, item: Conservation) -> Finding:
+    """Drift (SI): of the energy less the work done, or the change of the momentum vector."""
+    drift, scale = drift_of(result, channel)
+    return conserve(drift, item.scale if item.scale is not None else scale, item.limit)
+
+
+def drift_of(result: Result, channel: str) -> tuple[np.ndarray, float]:
+    """Drift (T,) in SI at every sample, and the largest magnitude: of the energy less the work, or of a momentum."""
+    if channel == "energy.total":
+        return _energy_drift(result)
+    values = result.values(channel)
+    return norms(values - values[:1]), float(np.max(norms(values), initial=0.0))
+
+
+def _energy_drift(result: Result) -> tuple[np.ndarray, float]:
+    """E(t) - E(0) - W(t) + W(0) (J), and the largest sum of magnitudes of the kinds of energy (J)."""
+    drift = result.values("energy.total")[:, 0]
+    if "work" in result.channels:
+        drift = drift - result.values("work")[:, 0]
+    kinds = [name for name in result.channels if name.startswith("energy.") and name != "energy.total"]
+    sizes = sum((np.abs(result.values(name)[:, 0]) for name in kinds), np.zeros(len(drift)))
+    return drift - drift[:1], float(np.max(sizes, initial=0.0))
+
+
+def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[str, float, Finding | None]]:
+    """Every channel to judge, with its goal, and with the finding where there is nothing to compare.
+
+    Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
+    is left out, any other channel that only one offers is a refusal of the other.
+    """
+    missing = _missing(a, b) or _elsewhere(a, b)
+    for pattern, goal in goals.items():
+        if missing is not None:
+            yield pattern, goal, missing
+            continue
+        offered = [name for name in _union(a.channels, b.channels) if _belongs(name, pattern, goals)]
+        if pattern not in offered:
+            shared = set(a.channels) & set(b.channels)
+            offered = [name for name in offered if name in shared or not name.startswith("energy.")]
+        if not offered:
+            text = f'neither {a.engine} nor {b.engine} has a channel "{pattern}"'
+            yield pattern, goal, Finding("did not run", text)
+        for name in offered:
+            yield name, goal, _absent(a, name) or _absent(b, name)
+
+
+def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:
+    """Whether `pattern` is the most specific (longest) of the patterns that name the channel."""
+    return most_specific(goals, channel) == pattern
+
+
+def _missing(*results: Result) -> Finding | None:
+    """The gravest of missing results, so that an expected refusal of one cannot hide that the other crashed."""
+    endings = [result.ending for result in results if result.status != "finished"]
+    if not endings:
+        return None
+    worst = min(endings, key=lambda ending: GRAVITY.index(ending.status))
+    return Finding(worst.status, worst.reason, endings=tuple(each for each in endings if each.status == worst.status))
+
+
+def _elsewhere(a: Result, b: Result) -> Finding | None:
+    """The finding where two results have other times, or are of one variant and have other scenes; else None."""
+    if a.times.shape != b.times.shape or not np.allclose(a.times, b.times, rtol=CLOCK, atol=0.0):
+        text = f"the results are at other times: {len(a.times)} samples to {a.times[-1]:g} s"
+        return Finding("failed", f"{text}, and {len(b.times)} to {b.times[-1]:g} s")
+    same = a.variant == b.variant and a.finest.role == b.finest.role
+    if same and a.finest.scene != b.finest.scene:
+        return Finding("failed", f"{a.engine} and {b.engine} ran different scenes as {a.variant}: run both again")
+    return None
+
+
+def _absent(result: Result, channel: str) -> Finding | None:
+    """The finding where a result lacks the channel; None where it has it."""
+    if result.status != "finished":
+        return _missing(result)
+    if channel not in result.channels:
+        return Finding("refused", f"{result.engine} does not offer {channel}")
+    return None
+
+
+def _scale(scales: dict[str, float], channel: str) -> float | None:
+    pattern = most_specific(scales, channel)
+    return scales[pattern] if pattern is not None else None
+
+
+def _union(first: Iterable[str], second: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys((*first, *second)))

@@ -1,0 +1,59 @@
+"""Accepted figures: the E and U that each comparison of a case once reached, in `accepted.toml` beside its run file.
+
+Goals say what is good enough; these figures say what was reached. `crosscheck run --accept` writes them, and they are
+reviewed like code. `crosscheck.judging.figures` says when a later figure counts as *worse than recorded*.
+
+The file::
+
+    ["rigid, all engines"]            # the comparison, or for conserved quantities e.g. "energy conserved"
+    "energy.total | native (rigid) | mujoco (rigid)" = { E = 1.2e-13, U = 4.5e-12 }
+
+Only the library's own engines have accepted figures: a user's engine is no part of a shipped case.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+
+import msgspec
+
+FILE = "accepted.toml"
+HEADER = "# The figures this case has reached. Written by `crosscheck run --accept`; review changes like code.\n"
+
+
+class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
+    """What a comparison reached on one channel, relative to its range; a conserved quantity's drift has no U."""
+
+    E: float
+    U: float = 0.0
+
+
+Accepted = dict[str, dict[str, Figure]]  # comparison -> channel and sides -> figure
+
+
+def key(channel: str, a: tuple[str, str], b: tuple[str, str]) -> str:
+    """How the file names a channel of two sides, each (engine, variant)."""
+    return " | ".join([channel, *(f"{engine} ({variant})" for engine, variant in (a, b))])
+
+
+def merged(before: Accepted, now: Accepted) -> Accepted:
+    """The figures `now` of a run of some engines only, together with the figures `before` of the other engines."""
+    return {name: before.get(name, {}) | now.get(name, {}) for name in (*before, *now)}
+
+
+def dumps(accepted: Mapping[str, Mapping[str, Figure]]) -> str:
+    """The text of the file: sorted, a line a figure."""
+    lines = [HEADER]
+    for name, table in sorted(accepted.items()):
+        lines.append(f"[{_quoted(name)}]")
+        for place, figure in sorted(table.items()):
+            doubt = f", U = {figure.U:.1e}" if figure.U else ""
+            lines.append(f"{_quoted(place)} = {{ E = {figure.E:.1e}{doubt} }}")
+        lines.append("")
+    return "\n".join(lines)
+
+
+def _quoted(text: str) -> str:
+    """A basic TOML string on one line: JSON's escapes are TOML's, but for DEL."""
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")

@@ -1,0 +1,94 @@
+"""The kinds of channels in one table: patterns, records, reports and `crosscheck verify` take what they need from it.
+
+A channel is named `<kind>:<item>.<part>` where an item of the scene has it (`load:elbow.torque`, `drive:elbow`), else
+`<kind>.<part>` (`energy.total`) or just `<kind>` (`work`). `flexmb.run.channels` takes the channels out of a
+trajectory; a test holds this table against it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from crosscheck.engines.contract import ENERGIES
+
+
+@dataclass(frozen=True)
+class Part:
+    """One signal of a kind of channels.
+
+    `name` is "" where the kind has only one signal. `title` names the family of such channels in the report. `width` is
+    the number of columns, None where it may be any. `letters` are the endings of the columns of a CSV that
+    `crosscheck verify` reads ("tip.px"); `own` is what `trajectory.csv` calls the part, and `unit` the unit it writes.
+    """
+
+    name: str
+    title: str
+    width: int | None
+    unit: str = ""
+    letters: tuple[str, ...] = ()
+    own: str = ""
+
+
+@dataclass(frozen=True)
+class ChannelKind:
+    """Channels that have the same parts; `panel` is the title of their panel of the report, "" if they have none."""
+
+    name: str
+    panel: str
+    of_items: bool
+    parts: tuple[Part, ...]
+
+
+def _load(whose: str) -> tuple[Part, Part]:
+    return (
+        Part("torque", f"{whose} torques", 3, "N m", ("tx", "ty", "tz"), "torque"),
+        Part("force", f"{whose} forces", 3, "N", ("fx", "fy", "fz"), "force"),
+    )
+
+
+KINDS = (
+    ChannelKind(
+        "marker",
+        "Motion",
+        of_items=True,
+        parts=(
+            Part("position", "Marker positions", 3, "m", ("px", "py", "pz"), "position"),
+            Part("orientation", "Marker orientations", 4, "1", ("qw", "qx", "qy", "qz"), "quaternion"),
+            Part("velocity", "Marker velocities", 3, "m/s", ("vx", "vy", "vz"), "velocity"),
+            Part("angular_velocity", "Angular velocities", 3, "rad/s", ("wx", "wy", "wz"), "angular_velocity"),
+        ),
+    ),
+    ChannelKind(
+        "energy",
+        "Energy",
+        of_items=False,
+        parts=tuple(Part(kind, "Energy", 1, "J") for kind in (*ENERGIES, "total")),
+    ),
+    ChannelKind(
+        "momentum",
+        "Momentum",
+        of_items=False,
+        parts=(Part("angular", "Angular momentum", 3, "N m s"), Part("linear", "Linear momentum", 3, "N s")),
+    ),
+    ChannelKind("load", "Hinge loads", of_items=True, parts=_load("Hinge")),
+    ChannelKind("wheel_load", "Wheel loads", of_items=True, parts=_load("Wheel bearing")),
+    ChannelKind("drive", "Drive loads", of_items=True, parts=(Part("", "Drive loads", None),)),
+    ChannelKind("work", "", of_items=False, parts=(Part("", "work", 1, "J"),)),
+)
+CONSERVED = {"energy": "energy.total", "linear_momentum": "momentum.linear", "angular_momentum": "momentum.angular"}
+
+
+def kind_named(name: str) -> ChannelKind:
+    """The kind of channels called `name`."""
+    return next(kind for kind in KINDS if kind.name == name)
+
+
+def part_of(channel: str) -> Part | None:
+    """What a channel is, by its name; None where there is no such kind of channels."""
+    head, of_item, rest = channel.partition(":")
+    name, _, last = (head, "", rest.rpartition(".")[2]) if of_item else channel.partition(".")
+    for kind in KINDS:
+        if kind.name == name and kind.of_items == bool(of_item):
+            parts = {part.name: part for part in kind.parts}
+            return parts.get("") or parts.get(last)  # the name of an item may hold dots
+    return None

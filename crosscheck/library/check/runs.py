@@ -1,0 +1,50 @@
+"""Who runs what: variants and engines that a part of the run file names must be there, and run it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+
+from crosscheck.library.case import ComparisonSide, RunFile, Variant
+from crosscheck.library.check.ranges import problem
+from flexmb.scene.problems import Place, Problem, closest
+
+
+def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Place) -> Iterator[Problem]:
+    """The variant must be there, and must be run by the engines."""
+    variant = find_variant(run, name)
+    if variant is None:
+        yield no_variant(name, [each.name for each in run.variants], place)
+    else:
+        yield from check_engines_run(variant, engines, place)
+
+
+def check_engines_run(variant: Variant, engines: Iterable[str], place: Place) -> Iterator[Problem]:
+    """The variant must be run by the engines."""
+    for engine in engines:
+        if engine not in (*variant.engines, *variant.also):
+            text = f'engine "{engine}" does not run variant "{variant.name}"'
+            yield problem(place, text, "add it to the variant's engines")
+
+
+def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Problem]:
+    """Each engine is named once."""
+    for engine in dict.fromkeys(engine for engine in engines if engines.count(engine) > 1):
+        yield problem(place, f'engine "{engine}" is listed twice', "name it once")
+
+
+def check_same_times(run: RunFile, a: ComparisonSide, b: ComparisonSide, place: Place) -> Iterator[Problem]:
+    """Two sides that are compared must have the same sample times."""
+    variants = [find_variant(run, side.variant) for side in (a, b)]
+    if len({(each.duration_s or run.duration_s, each.samples or run.samples) for each in variants if each}) > 1:
+        text = f'"{a.variant}" and "{b.variant}" have other sample times'
+        yield problem(place, text, "give both the same duration_s and samples")
+
+
+def find_variant(run: RunFile, name: str) -> Variant | None:
+    """The variant called `name`, or None."""
+    return next((variant for variant in run.variants if variant.name == name), None)
+
+
+def no_variant(name: str, names: Sequence[str], place: Place) -> Problem:
+    """The problem that there is no variant called `name`."""
+    return problem(place, f'no variant "{name}"; the variants are {", ".join(names)}', closest(name, names))

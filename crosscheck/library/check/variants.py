@@ -1,0 +1,86 @@
+"""Variants: their engines, transformations, refinements and ladders of efforts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+from crosscheck.library.case import EffortLadder, Refined, RunFile, Variant
+from crosscheck.library.check.ranges import (
+    MOST_PIECES,
+    check_count,
+    check_duration,
+    check_samples,
+    check_within,
+    problem,
+)
+from crosscheck.library.check.runs import check_engines_once, check_engines_run
+from flexmb.scene.problems import Place, Problem
+
+MOST_STEPS = 1e8  # of one run with fixed steps: hours
+MOST_EFFORTS = 20
+TOLERANCES = (1e-15, 0.5)  # below, rounding decides; above, nothing is solved
+ORDERS = (0.1, 16.0)
+
+
+def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Problem]:
+    """The problems of a variant."""
+    if not variant.engines:
+        yield problem(place.key("engines"), "name at least one engine", "for example [\"native\"]")
+    yield from check_engines_once(variant.engines, place.key("engines"))
+    yield from check_engines_once(variant.also, place.key("also"))
+    twice = sorted(set(variant.engines) & set(variant.also))
+    if twice:
+        yield problem(place.key("also"), f"{', '.join(twice)} is among the engines already", "name it once")
+    if variant.duration_s is not None:
+        yield from check_duration(variant.duration_s, place)
+    if variant.samples is not None:
+        yield from check_samples(variant.samples, place)
+    for key, transform in (("segments", "segments"), ("pieces", "substructures")):
+        count = getattr(variant, key)
+        if (count is not None) != (variant.transform == transform):
+            yield problem(place.key(key), f'give it exactly with "{transform}"', f'transform = "{transform}"')
+        if count is not None:
+            yield from check_count(count, place.key(key), 1)
+    pieces = variant.transform == "substructures"
+    if variant.eigenmodes and not pieces:
+        yield problem(place.key("eigenmodes"), 'give it with "substructures" only', "take it out")
+    yield from check_count(variant.eigenmodes, place.key("eigenmodes"), 0)
+    if variant.split_body is not None and variant.transform not in ("segments", "substructures"):
+        yield problem(place.key("split_body"), 'give it with "segments" or "substructures"', "take it out")
+    if variant.refined is not None:
+        yield from _refined(variant, variant.refined, place.key("refined"))
+    duration = variant.duration_s if variant.duration_s is not None else run.duration_s
+    for i, ladder in enumerate(variant.efforts):
+        yield from _ladder(variant, ladder, duration, place.key("efforts", i))
+
+
+def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Problem]:
+    counts = {key: getattr(refined, key) for key in ("segments", "pieces", "elements")}
+    if all(count is None for count in counts.values()):
+        yield problem(place, "it refines nothing", "give segments, pieces or elements")
+    for key, transform in (("segments", "segments"), ("pieces", "substructures")):
+        fine, coarse = counts[key], getattr(variant, key)
+        if fine is not None and coarse is None:
+            yield problem(place.key(key), f'give it with "{transform}" only', "take it out")
+        elif fine is not None and not coarse < fine <= MOST_PIECES:
+            yield problem(place.key(key), f"{fine} is not finer than {coarse}", f"give more than {coarse}")
+    if counts["elements"] is not None:
+        yield from check_count(counts["elements"], place.key("elements"), 1)
+    yield from check_within(refined.order, ORDERS, place.key("order"))
+
+
+def _ladder(variant: Variant, ladder: EffortLadder, duration: float, place: Place) -> Iterator[Problem]:
+    yield from check_engines_run(variant, (ladder.engine,), place.key("engine"))
+    where = place.key("values")
+    if not 2 <= len(ladder.values) <= MOST_EFFORTS:
+        text = f"an uncertainty needs at least two efforts, and {MOST_EFFORTS} are enough"
+        yield problem(where, text, "list them from coarse to fine")
+    if not all(coarse > fine for coarse, fine in pairwise(ladder.values)):
+        yield problem(where, "they do not fall", "list them from coarse to fine (falling)")
+    for i, value in enumerate(ladder.values):
+        if ladder.kind == "tolerance":
+            yield from check_within(value, TOLERANCES, where.key(i))
+        elif not 0.0 < value <= duration <= MOST_STEPS * value:
+            text = f"a step of {value:g} s makes no run of {duration:g} s"
+            yield problem(where.key(i), text, f"give a step for at most {MOST_STEPS:g} of them")

@@ -1,0 +1,157 @@
+"""Records: everything a crosscheck run finds out, one JSON object a line, written as it comes.
+
+A file of records is the archive: verdicts and report are made from it alone, with no engine installed. Signals are
+stored as float64, deflated and in base64, so that replaying a verdict gives the same digits. A run that was killed
+leaves at most one broken line at the end, which reading skips and resuming cuts off. Any other line that is no record
+is read as a `BrokenLine`, which names it: what it held counts as lost, and a session that has one is never as expected.
+Resuming moves such lines to a file of their own, and runs again what they held.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import msgspec
+
+from crosscheck.library.channels import part_of
+from crosscheck.library.check import check_recorded
+from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
+from crosscheck.records.packing import packed_bytes, unpack
+from flexmb.output.writing import folder, writing
+from flexmb.scene.reading import MIB, allowance, regular_size
+
+LONGEST_LINE = 128 * MIB  # a hundred markers at ten thousand times fit
+
+
+class BrokenRecords(UserWarning):
+    """Lines were set aside from a file of records."""
+
+
+class Archive:
+    """A records file open for appending; every record is on disk when `write` returns."""
+
+    def __init__(self, file: Path, kind: Any = Written) -> None:
+        """`kind` are the records that the file holds; lines that are none of them are set aside (BrokenRecords)."""
+        folder(file.parent)
+        self._file = file
+        _set_broken_lines_aside(file, kind)
+        self._stream = file.open("ab")
+        self._encoder = msgspec.json.Encoder()
+
+    def write(self, record: msgspec.Struct) -> None:
+        """Append one line."""
+        with writing(self._file):
+            self._stream.write(self._encoder.encode(record) + b"\n")
+            self._stream.flush()
+
+    def close(self) -> None:
+        """Close the file."""
+        with writing(self._file):
+            self._stream.close()
+
+
+def read(file: Path) -> list[Record]:
+    """All records of a file, in order; a last line without its end is skipped, a line that is no record a BrokenLine.
+
+    What is returned is sound: arrays unpack, cases can be run. OSError where the file is none or cannot be read.
+    """
+    return decoded_lines(file, Written)
+
+
+def decoded_lines(file: Path, kind: Any) -> list[Any]:
+    """`read` for records of any tagged struct or union of them."""
+    decoder = msgspec.json.Decoder(kind)
+    left = allowance(regular_size(file))
+    found: list[Any] = []
+    with file.open("rb") as stream:
+        for number, line in enumerate(_lines(stream), start=1):
+            try:
+                record = decoder.decode(line)
+                left -= _checked(record, left)
+            except (ValueError, RecursionError) as error:  # broken JSON, another schema, text that is not UTF-8
+                record = BrokenLine(str(file), number, str(error))
+            found.append(record)
+    return found
+
+
+def _lines(stream: BinaryIO) -> Iterator[bytes]:
+    """Whole lines with their ends; of a line beyond LONGEST_LINE only its beginning, which is no record."""
+    begun = b""
+    while piece := stream.readline(LONGEST_LINE):
+        begun = begun[:80] or piece
+        if piece.endswith(b"\n"):
+            yield begun
+            begun = b""
+
+
+def _checked(record: Any, limit: int) -> int:
+    """Bytes of memory that a record's arrays take; ValueError where it contradicts itself or they exceed `limit`."""
+    if isinstance(record, CaseRecord):
+        check_recorded(record.run)
+        if record.variants.keys() != {variant.name for variant in record.run.variants}:
+            raise ValueError("its variants are not those of its run file")
+    if not isinstance(record, RunRecord):
+        return 0
+    sized = 0.0 < record.effort_value < math.inf or (record.effort_value == 0.0 and record.rungs < 2)
+    if not (0 <= record.rung <= max(record.rungs - 1, 0) and sized):
+        raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
+    arrays = [*record.channels.values(), *([] if record.times is None else [record.times])]
+    size = sum(packed_bytes(packed) for packed in arrays)
+    if size > limit:
+        raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
+    _check_shapes(record)
+    for packed in arrays:
+        unpack(packed)
+    return size
+
+
+def _check_shapes(record: RunRecord) -> None:
+    """Every channel must be an array (T, k) at T times; ValueError names one that is not."""
+    rows = None if record.times is None else record.times.shape
+    if record.status == "finished" and not (rows and rows[0]):
+        raise ValueError("it is finished but has no times")
+    if rows is not None and len(rows) != 1:
+        raise ValueError(f"its times have the shape {rows}")
+    for name, packed in record.channels.items():
+        if rows is None or len(packed.shape) != 2 or packed.shape[:1] != rows or packed.shape[1] == 0:
+            raise ValueError(f"{name} of shape {packed.shape} does not belong to times of shape {rows}")
+        part = part_of(name)
+        if part is not None and part.width not in (None, packed.shape[1]):
+            raise ValueError(f"{name} has {packed.shape[1]} columns")
+
+
+def _set_broken_lines_aside(file: Path, kind: Any) -> None:
+    """Leave only whole records in a file to append to; broken lines move to `<file>.broken`, with a warning.
+
+    The end of a run that was killed is no loss to speak of: it is cut off without a word.
+    """
+    if not file.exists():
+        return
+    broken = {record.number: record for record in decoded_lines(file, kind) if isinstance(record, BrokenLine)}
+    if not broken and _ended(file):
+        return
+    aside, kept = file.with_name(file.name + ".broken"), file.with_name(file.name + ".kept")
+    with file.open("rb") as stream, kept.open("wb") as whole:
+        for number, line in enumerate(stream, start=1):
+            if number in broken:
+                with aside.open("ab") as lost:
+                    lost.write(line)
+            elif line.endswith(b"\n"):
+                whole.write(line)
+    os.replace(kept, file)
+    for each in broken.values():
+        warnings.warn(f"{each}; moved to {aside.name}, and what it held is run again", BrokenRecords, stacklevel=3)
+
+
+def _ended(file: Path) -> bool:
+    """Whether the last line is whole."""
+    with file.open("rb") as stream:
+        stream.seek(max(0, stream.seek(0, os.SEEK_END) - 1))
+        return stream.read() in (b"", b"\n")
+
+

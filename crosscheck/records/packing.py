@@ -1,0 +1,48 @@
+"""Arrays as text that gives back the same digits: float64, deflated, in base64."""
+
+from __future__ import annotations
+
+import base64
+import math
+import zlib
+
+import msgspec
+import numpy as np
+
+from flexmb.typing import Real
+
+
+class Packed(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """An array of float64: little-endian, row-major, deflated, base64."""
+
+    shape: tuple[int, ...]
+    data: str
+
+
+def pack(values: Real) -> Packed:
+    """The array as text, exact to the last bit."""
+    data = np.ascontiguousarray(values, dtype="<f8")
+    return Packed(shape=data.shape, data=base64.b64encode(zlib.compress(data.tobytes(), 6)).decode())
+
+
+def unpack(packed: Packed) -> Real:
+    """The array of a text, exact to the last bit. ValueError where the data do not fill the shape just so.
+
+    It takes no more memory than the shape says, whatever the data would unpack to.
+    """
+    size = packed_bytes(packed)
+    unpacker = zlib.decompressobj()
+    try:
+        data = unpacker.decompress(base64.b64decode(packed.data, validate=True), size + 1)
+    except (zlib.error, ValueError) as error:
+        raise ValueError(f"an array is damaged: {error}") from None
+    if len(data) != size or not unpacker.eof:
+        raise ValueError(f"an array of shape {packed.shape} does not hold the numbers that it should")
+    return np.frombuffer(data, dtype="<f8").reshape(packed.shape).astype(np.float64)
+
+
+def packed_bytes(packed: Packed) -> int:
+    """Size of an array in memory, by its shape. ValueError for a shape that no array has."""
+    if not 1 <= len(packed.shape) <= 2 or any(length < 0 for length in packed.shape):
+        raise ValueError(f"no signal has the shape {packed.shape}")
+    return 8 * math.prod(packed.shape)

@@ -1,0 +1,160 @@
+"""The outcome for continuous integration: verdicts.json for programs, summary.md for a job page, junit.xml."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+
+from crosscheck.engines.registry import BUILT_IN
+from crosscheck.judging.figures import recordable
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.verdict import STATUSES, Verdict
+from flexmb.output.printable import printable
+
+SHOWN = 40
+# Characters with a meaning in Markdown: within a line (an underscore only beside a gap), and list signs at its start.
+MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
+
+
+def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
+    """verdicts.json: a list with one record a verdict."""
+    records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
+    file.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+
+
+def write_summary(outcome: SessionOutcome, file: Path) -> None:
+    """summary.md: headline, counts by case, what is not as expected, what did not run."""
+    lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
+    lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
+    lines += ["|---" * (3 + len(STATUSES)) + "|"]
+    for case, verdicts in outcome.verdicts.items():
+        counts = [sum(verdict.ok for verdict in verdicts)]
+        counts += [sum(verdict.status == status for verdict in verdicts) for status in STATUSES]
+        lines.append(f"| {_flat(case)} | {len(verdicts)} | {' | '.join(map(str, counts))} |")
+    if outcome.unexpected:
+        lines += ["", "## Not as expected", "", "| case | comparison | channel | pair | status | expected | reason |"]
+        lines += ["|---|---|---|---|---|---|---|"]
+        lines += [_row(verdict) for verdict in outcome.unexpected[:SHOWN]]
+        if len(outcome.unexpected) > SHOWN:
+            lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
+    lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
+    if outcome.strict:
+        lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
+    if outcome.absences:
+        lines += ["", "## What did not run to the end, and why", ""]
+        for each in outcome.absences:
+            what = _flat(f"{each.case}, {each.variant}, {each.engine}{_role(each.role)}: {each.reason}")
+            lines.append(f"- **{each.status}** {what}")
+    if outcome.broken:
+        lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
+    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def write_junit(outcome: SessionOutcome, file: Path) -> None:
+    """junit.xml: one suite for each case, one test for each verdict, and one failing test for each run that is lost.
+
+    Verdicts that need a lost run are skipped, because the failing test of that run stands for them.
+
+    A verdict that is worse than recorded says so in its output, and fails if the session is strict.
+    """
+    suites = ElementTree.Element("testsuites", name="crosscheck")
+    for case, verdicts in outcome.verdicts.items():
+        suite = ElementTree.SubElement(suites, "testsuite", name=case)
+        missing = [each for each in outcome.lost if each.case == case]
+        gone = {(each.variant, each.engine) for each in missing}
+        tests = [_test(suite, each, _complaint(outcome, each), bool(gone & set(each.sides))) for each in verdicts]
+        for each in missing:
+            name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
+            test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
+            ElementTree.SubElement(test, "failure", type=each.status, message=each.reason)
+        suite.set("tests", str(len(tests) + len(missing)))
+        suite.set("failures", str(tests.count("failure") + len(missing)))
+        suite.set("skipped", str(tests.count("skipped")))
+    if outcome.broken:
+        count = str(len(outcome.broken))
+        suite = ElementTree.SubElement(suites, "testsuite", name="records", tests=count, failures=count)
+        for line in outcome.broken:
+            test = ElementTree.SubElement(suite, "testcase", classname="records", name="the line is a record")
+            ElementTree.SubElement(test, "failure", type="broken", message=line)
+    if not outcome.all:
+        suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
+        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
+        ElementTree.SubElement(test, "failure", type="nothing", message=outcome.headline)
+    for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
+        element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
+    ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
+
+
+def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:
+    """Why a strict session rejects a verdict that is as expected."""
+    if not outcome.strict or not verdict.ok:
+        return ""
+    if verdict.worse:
+        return f"worse than recorded: {verdict.worse}"
+    return "no accepted figures" if verdict.accepted is None and recordable(verdict, BUILT_IN) else ""
+
+
+def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bool) -> str:
+    """One test case; returns what it counts as. `lost`: the failure of a run that it needs is there already."""
+    name = f"{verdict.comparison}: {verdict.channel}, {verdict.pair}"
+    test = ElementTree.SubElement(suite, "testcase", classname=f"{verdict.case}.{verdict.kind}", name=name)
+    if verdict.ok and verdict.worse:
+        ElementTree.SubElement(test, "system-out").text = f"worse than recorded: {verdict.worse}"
+    if complaint:
+        ElementTree.SubElement(test, "failure", type="figures", message=complaint)
+        return "failure"
+    if verdict.ok:
+        return "passed"
+    text = f"{verdict.status}, expected {verdict.expected}: {verdict.reason}"
+    if lost and verdict.status == "did not run":
+        ElementTree.SubElement(test, "skipped", message=text)
+        return "skipped"
+    ElementTree.SubElement(test, "failure", type=verdict.status, message=text)
+    return "failure"
+
+
+def _table(title: str, verdicts: list[Verdict], say: Callable[[Verdict], str]) -> list[str]:
+    """A section with a row for each verdict, up to the number that is shown; nothing if there are none."""
+    if not verdicts:
+        return []
+    lines = ["", f"## {title}", "", "| case | comparison | channel | pair | what |", "|---|---|---|---|---|"]
+    for verdict in verdicts[:SHOWN]:
+        cells = (_flat(verdict.case), _flat(verdict.comparison), _code(verdict.channel), _flat(verdict.pair))
+        lines.append(f"| {' | '.join(cells)} | {_flat(say(verdict))} |")
+    if len(verdicts) > SHOWN:
+        lines += ["", f"... and {len(verdicts) - SHOWN} more, in verdicts.json."]
+    return lines
+
+
+def _row(verdict: Verdict) -> str:
+    cells = (
+        _flat(verdict.case),
+        _flat(verdict.comparison),
+        _code(verdict.channel),
+        _flat(verdict.pair),
+        f"**{verdict.status}**",
+        verdict.expected,
+        _flat(verdict.reason),
+    )
+    return "| " + " | ".join(cells) + " |"
+
+
+def _role(role: str) -> str:
+    return "" if role == "main" else f" ({role})"
+
+
+def _flat(text: str) -> str:
+    """Text on one line, escaped so that Markdown shows just that text."""
+    return MARKDOWN.sub(r"\\\g<0>", printable(" ".join(text.split())))
+
+
+def _code(text: str) -> str:
+    """Text as code on one line: between more backticks than it holds itself; a bar would end a table's cell."""
+    flat = printable(" ".join(text.split()))
+    fence = "`" * (1 + max(map(len, re.findall("`+", flat)), default=0))
+    space = " " if flat.startswith("`") or flat.endswith("`") else ""
+    return f"{fence}{space}{flat}{space}{fence}".replace("|", "\\|")

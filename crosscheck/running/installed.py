@@ -1,0 +1,66 @@
+"""Which engines there are here: what they are, installed or not, in which version, and how to get them."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from crosscheck.engines.answers import checked_version, clean
+from crosscheck.engines.contract import EngineMissing
+from crosscheck.engines.registry import BUILT_IN, BrokenPlugIn, engine, plug_ins
+from crosscheck.running.execute import describe
+from crosscheck.running.pool import run_jobs
+
+ANSWER_LIMIT_S = 60.0
+
+
+@dataclass(frozen=True)
+class EngineState:
+    """An engine: what it is in a line, its version, or None, what is the matter (`absence`), and how to install it."""
+
+    name: str
+    version: str | None
+    advice: str
+    summary: str = ""
+    absence: str = "not installed"
+
+
+def describe_engines() -> list[EngineState]:
+    """All engines known here, shipped ones and plug-ins; these are asked in processes of their own."""
+    states = [_state(name) for name in BUILT_IN]
+    names = plug_ins()
+    found = {name: _useless(name, "it gave no answer") for name in names}
+    with tempfile.TemporaryDirectory() as folder:
+        log = str(Path(folder) / "log")
+        for event in run_jobs(tell, names, 1, log, kind=str, time_limit_s=lambda name: ANSWER_LIMIT_S):
+            name = names[event.job]
+            if event.kind == "emitted":
+                found[name] = event.content
+            elif event.kind in ("crashed", "stopped"):
+                found[name] = _useless(name, event.content)
+    return [*states, *(found[name] for name in names)]
+
+
+def tell(name: str, emit: Callable[[EngineState], None]) -> None:
+    """What a worker does to describe an engine."""
+    emit(_state(name))
+
+
+def _state(name: str) -> EngineState:
+    summary = ""
+    try:
+        found = engine(name)
+        summary = clean(str(getattr(found, "summary", "")))
+        return EngineState(name, checked_version(found.version()), "", summary)
+    except EngineMissing as error:
+        return EngineState(name, None, clean(str(error)), summary)
+    except BrokenPlugIn as error:
+        return _useless(name, str(error))
+    except Exception as error:
+        return _useless(name, describe(error))
+
+
+def _useless(name: str, why: str) -> EngineState:
+    return EngineState(name, None, clean(why), absence="does not work")

@@ -1,0 +1,41 @@
+"""The verdicts of maps as a file, which several runs of different maps share."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from pathlib import Path
+
+import msgspec
+
+from crosscheck.records.archive import BrokenRecords
+from crosscheck.stability.boundary import MapVerdict
+from flexmb.scene.reading import regular_size
+
+VERDICTS = "maps.json"
+
+
+def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
+    """The verdicts as a JSON file; those of other maps that it holds already are kept.
+
+    A file with other content is set aside as `<file>.broken`, with a warning, so that the verdicts can still be
+    written.
+    """
+    try:
+        known = {verdict.map: verdict for verdict in read_verdicts(file)} if file.exists() else {}
+    except ValueError as error:
+        aside = file.replace(file.with_name(file.name + ".broken"))
+        warnings.warn(f"{error}; moved to {aside.name}", BrokenRecords, stacklevel=2)
+        known = {}
+    known |= {verdict.map: verdict for verdict in verdicts}
+    text = msgspec.json.format(msgspec.json.encode([known[name] for name in sorted(known)]), indent=1)
+    file.write_bytes(text + b"\n")
+
+
+def read_verdicts(file: Path) -> list[MapVerdict]:
+    """The verdicts that `write_verdicts` wrote. Raises OSError, or ValueError naming the file."""
+    text = file.read_bytes() if regular_size(file) else b""
+    try:
+        return msgspec.json.decode(text, type=list[MapVerdict])
+    except (ValueError, RecursionError) as error:
+        raise ValueError(f"{file}: these are no verdicts on maps: {error}") from None

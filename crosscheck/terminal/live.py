@@ -1,0 +1,94 @@
+"""Progress of a run: a bar over all jobs, a line for each job at work, and a line that stays for each that ended."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Sequence
+from types import TracebackType
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from crosscheck.records.kinds import RunRecord
+from crosscheck.running.plan import Job
+from crosscheck.running.pool import Event
+from flexmb.output.printable import printable
+
+MARKS = {
+    "finished": "[green]✓[/green]",
+    "diverged": "[magenta]✕[/magenta]",
+    "failed": "[red]✕[/red]",
+    "crashed": "[red]✕[/red]",
+    "did not finish": "[red]✕[/red]",
+    "refused": "[yellow]⊘[/yellow]",
+    "did not run": "[yellow]–[/yellow]",
+}
+
+
+class LiveProgress:
+    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear."""
+
+    def __init__(self, console: Console) -> None:
+        self._progress = Progress(
+            SpinnerColumn(),
+            TextColumn("{task.description}", markup=False),  # names stand in it
+            BarColumn(bar_width=24),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            console=console,
+            transient=True,
+        )
+        self._overall: TaskID | None = None
+        self._lines: dict[int, TaskID] = {}
+        self._records: dict[int, list[RunRecord]] = {}
+        self._started: dict[int, float] = {}
+
+    def __enter__(self) -> LiveProgress:
+        self._progress.start()
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, at: TracebackType | None) -> None:
+        self._progress.stop()
+
+    def hear(self, jobs: Sequence[Job], event: Event) -> None:
+        """Show one event."""
+        if self._overall is None:
+            self._overall = self._progress.add_task("all runs", total=len(jobs))
+        title = printable(jobs[event.job].title)
+        if event.kind == "started":
+            self._started[event.job] = time.perf_counter()
+            self._records[event.job] = []
+            self._lines[event.job] = self._progress.add_task(f"{title}: starting", total=None)
+        elif event.kind == "emitted" and isinstance(event.content, RunRecord):
+            self._records[event.job].append(event.content)
+        elif event.kind == "emitted" and isinstance(event.content, str):
+            self._progress.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
+        elif event.kind != "emitted":
+            self._progress.remove_task(self._lines.pop(event.job))
+            self._progress.advance(self._overall)
+            self._progress.console.print(self._ending(title, event))
+
+    def _ending(self, title: str, event: Event) -> Text:
+        """The lasting line of a job."""
+        if event.kind in ("crashed", "stopped"):
+            status = "crashed" if event.kind == "crashed" else "did not finish"
+            return _line(status, f"{title}: {status}: {event.content}")
+        records, spent = self._records[event.job], time.perf_counter() - self._started[event.job]
+        if not records:
+            return _line("finished", f"{title}: already recorded")
+        last = records[-1]
+        if last.status != "finished":
+            return _line(last.status, f"{title}: {last.status}: {_in_short(last.message)}")
+        efforts = f"{len(records)} effort{'s' if len(records) > 1 else ''}"
+        return _line("finished", f"{title}: {efforts} in {spent:.1f} s")
+
+
+def _line(status: str, text: str) -> Text:
+    """The mark of a status, and text as it stands: names and messages may look like markup."""
+    return Text.from_markup(MARKS[status]) + Text(" " + printable(text))
+
+
+def _in_short(message: str) -> str:
+    """The headline of a message, its first problem and that one's remedy, on one line; reports have the rest."""
+    return " ".join(" ".join(message.splitlines()[:3]).split())

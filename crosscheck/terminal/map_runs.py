@@ -1,0 +1,63 @@
+"""Maps on the terminal: a bar while they run, a line for each verdict."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.text import Text
+
+from crosscheck.running.pool import Limits
+from crosscheck.stability.map import StabilityMap
+from crosscheck.stability.picture import draw
+from crosscheck.stability.run import Finished, run_map
+from crosscheck.stability.verdict_file import VERDICTS, write_verdicts
+from crosscheck.terminal.text import marked, words
+from flexmb.output.writing import folder, writing
+
+
+def run_and_draw(
+    console: Console, names: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
+    limits: Limits,
+) -> int:  # fmt: skip
+    """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
+    verdicts = []
+    folder(pictures)
+    for name in names:
+        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, limits)
+        with writing(pictures):
+            picture = draw(done, pictures / f"{name}.svg")
+            verdicts.append(done.verdict)
+            write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
+        console.print(_line(done, picture), soft_wrap=True)
+    good = sum(verdict.ok for verdict in verdicts)
+    colour = "green" if good == len(verdicts) else "red"
+    console.print(words(f"{good} of {len(verdicts)} maps agree with their overlays", f"bold {colour}"))
+    return 0 if good == len(verdicts) else 1
+
+
+def _run(
+    console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits
+) -> Finished:
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), MofNCompleteColumn(),
+        TimeElapsedColumn(), console=console, transient=True,
+    ) as progress:  # fmt: skip
+        task = progress.add_task(name, total=None)
+
+        def hear(what: StabilityMap, done: int, known: int) -> None:
+            progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
+
+        return run_map(name, records, depth=depth, fresh=fresh, limits=limits, listener=hear)
+
+
+def _line(done: Finished, picture: Path) -> Text:
+    verdict = done.verdict
+    cells = ", ".join(f"{count} {name}" for name, count in verdict.cells.items())
+    far = "beyond the map" if verdict.distance < 0 else f"{verdict.distance}"
+    text = f"{verdict.map}: {verdict.status}, farthest cell from the overlay {far}; {cells}; {verdict.seconds:.0f} s"
+    worst = "" if verdict.ok or not verdict.worst else f"; {verdict.worst}"
+    mark = ("✓", "green") if verdict.ok else ("✕", "red")
+    return marked(*mark, f"{text}{worst} -> {picture}")

@@ -1,0 +1,197 @@
+"""Accepted figures: a loss of digits is noticed, noise is not; what is wrong is never accepted."""
+
+from __future__ import annotations
+
+import functools
+import math
+import tomllib
+from pathlib import Path
+from xml.etree import ElementTree
+
+import msgspec
+import pytest
+from typer.testing import CliRunner
+
+from crosscheck import cli
+from crosscheck.judging import accept
+from crosscheck.judging import outcome as outcome_module
+from crosscheck.judging.figures import FLOOR, figures, recordable, worse
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.library.accepted import Accepted, Figure, dumps, key, merged
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import load_case, shipped_cases
+from crosscheck.report import ci
+from crosscheck.report.ci import write_junit, write_summary
+from crosscheck.running.sweep import sweep
+from tests.crosscheck.made_records import ONE_PAIR, TIP, judged, ladder, single, way
+from tests.crosscheck.sessions import PROVIDER, copy_case
+
+PLACE = key(TIP, ("one", "rigid"), ("two", "rigid"))
+WIDE = {"COLUMNS": "200"}
+
+
+@pytest.mark.parametrize(
+    ("E", "U", "grown"),
+    [
+        (1e-9, 1e-8, ""),
+        (9e-8, 9.9e-8, ""),  # E is noise below U: all of it may be there on another machine
+        (0.0, 0.0, ""),
+        (1e-9, 1.1e-7, "U is 1.1e-07, accepted were 1.0e-08"),
+        (1.1e-7, 1e-8, "E is 1.1e-07, accepted were 1.0e-09"),
+        (1e-5, 1e-5, "U is 1.0e-05, accepted were 1.0e-08; E is 1.0e-05, accepted were 1.0e-09"),
+        (math.nan, 1e-8, "E is nan, accepted were 1.0e-09"),
+        (1e-9, math.nan, "U is nan, accepted were 1.0e-08"),
+        (1e-9, math.inf, "U is inf, accepted were 1.0e-08"),
+        (None, None, "accepted with E 1.0e-09, and now there is no figure at all"),
+    ],
+)
+def test_growth_by_more_than_ten_is_worse(E: float | None, U: float | None, grown: str) -> None:
+    assert worse(Figure(1e-9, 1e-8), E, U) == grown
+
+
+def test_growth_within_rounding_is_none() -> None:
+    assert worse(Figure(0.0, 0.0), 9.9 * FLOOR, 9.9 * FLOOR) == ""
+    assert worse(Figure(0.0, 0.0), 1e-17, 10.1 * FLOOR) != ""
+    assert worse(Figure(1e-17), 10.1 * FLOOR, None) != ""
+    assert pytest.approx(2.2e-13, rel=0.01) == FLOOR
+
+
+def test_what_has_no_accepted_figure_is_not_worse() -> None:
+    assert worse(None, 1.0, math.nan) == ""
+
+
+def session(accepted: Accepted, spread: float = 1e-6, strict: bool = False) -> SessionOutcome:
+    runs = [*ladder("one", {TIP: way()}, spread=spread), *ladder("two", {TIP: way()}, spread=spread)]
+    return judged(ONE_PAIR, runs, accepted, strict)
+
+
+@pytest.fixture
+def own(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The engines of these tests are the library's own."""
+    for module in (outcome_module, ci, accept):
+        monkeypatch.setattr(module, "BUILT_IN", ("one", "two", "fine", "stepper"))
+
+
+def test_a_loss_of_three_digits_is_a_warning_and_an_error_where_that_is_asked_for(own: None, tmp_path: Path) -> None:
+    then = figures(session({}, 1e-9).all, ("one", "two"))
+    assert list(then) == ["both"] and list(then["both"]) == [PLACE]
+    assert session(then, 1e-9, strict=True).ok
+    lost = session(then, 1e-6)
+    assert (lost.ok, lost.headline) == (True, "All 1 verdicts are as expected, 1 of them worse than recorded")
+    strictly = session(then, 1e-6, strict=True)
+    assert (strictly.ok, strictly.headline) == (False, "1 of 1 verdicts are worse than recorded")
+    assert single(lost).worse.startswith("U is 1.8e-05, accepted were 1.8e-08")
+    for outcome, failures in ((lost, "0"), (strictly, "1")):
+        write_summary(outcome, tmp_path / "summary.md")
+        assert "## Worse than recorded" in (tmp_path / "summary.md").read_text(encoding="utf-8")
+        write_junit(outcome, tmp_path / "junit.xml")
+        (suite,) = ElementTree.parse(tmp_path / "junit.xml").getroot()
+        assert suite.get("failures") == failures
+        assert "worse than recorded: U is" in suite[0].find("system-out").text
+
+
+def test_a_channel_without_accepted_figures_says_so_where_that_is_asked_for(own: None, tmp_path: Path) -> None:
+    assert session({}).ok
+    strictly = session({}, strict=True)
+    assert (strictly.ok, strictly.headline) == (False, "1 of 1 verdicts have no accepted figures")
+    write_summary(strictly, tmp_path / "summary.md")
+    assert "## No accepted figures" in (tmp_path / "summary.md").read_text(encoding="utf-8")
+    write_junit(strictly, tmp_path / "junit.xml")
+    assert "no accepted figures" in (tmp_path / "junit.xml").read_text(encoding="utf-8")
+
+
+def test_foreign_engines_have_no_accepted_figures() -> None:
+    outcome = session({}, strict=True)
+    assert outcome.ok
+    assert figures(outcome.all, ("one",)) == {}
+    assert not recordable(single(outcome), ("two",))
+
+
+def test_what_is_not_as_expected_is_not_called_worse(own: None) -> None:
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way(2.0)})]
+    outcome = judged(ONE_PAIR, runs, {"both": {PLACE: Figure(1e-9, 1e-9)}}, strict=True)
+    assert (outcome.worse, outcome.headline) == ([], "1 of 1 verdicts are not as expected")
+
+
+def test_a_partial_run_keeps_the_figures_of_others() -> None:
+    before = {"a": {"x": Figure(1.0), "y": Figure(1.0)}, "b": {"x": Figure(1.0)}}
+    now = {"a": {"x": Figure(2.0)}, "c": {"x": Figure(2.0)}}
+    assert merged(before, now) == {
+        "a": {"x": Figure(2.0), "y": Figure(1.0)}, "b": {"x": Figure(1.0)}, "c": {"x": Figure(2.0)},
+    }  # fmt: skip
+
+
+def test_the_file_is_stable_sorted_and_read_back() -> None:
+    accepted = {
+        'two "quoted"\x7f': {"b | one (v) | two (v)": Figure(1.24e-9, 2e-8)},
+        "a": {"z": Figure(1e-3), "y": Figure(0.0)},
+    }
+    text = dumps(accepted)
+    found = msgspec.convert(tomllib.loads(text), Accepted)
+    assert found == {**accepted, 'two "quoted"\x7f': {"b | one (v) | two (v)": Figure(1.2e-9, 2e-8)}}
+    assert dumps(found) == text
+    assert text.index('"y"') < text.index('"z"') < text.index("quoted")
+
+
+def test_accepting_and_being_strict_on_the_command_line(
+    own: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    """Accept, pass strictly; loosen an effort by three digits, warn, fail strictly; break a thing, accept nothing."""
+    monkeypatch.setattr(cli, "sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr(cli.console, "_width", 200)
+    folder = copy_case(tmp_path)
+    file, run = folder / "accepted.toml", folder / "run.toml"
+
+    def crosscheck(*words: str) -> tuple[int, str]:
+        out = ["--out", str(tmp_path / "out"), "--jobs", "2"]
+        result = CliRunner().invoke(cli.app, ["run", str(folder), *words, *out], env=WIDE)
+        return result.exit_code, result.output
+
+    code, output = crosscheck("--strict")
+    assert (code, "13 of 15 verdicts have no accepted figures" in output) == (1, True), output
+    code, output = crosscheck("--accept", "--strict")
+    assert (code, "13 figures accepted: review" in output) == (0, True), output
+    assert len(load_case(folder).accepted["rigid, all engines"]) == 11
+    assert crosscheck("--strict")[0] == 0
+    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    assert "(accepted: E" in page
+
+    text = run.read_text(encoding="utf-8")
+    loose = 'efforts = [{ engine = "fine", kind = "tolerance", method = "dop853", values = [1e-5, 1e-6, 1e-7] }]\nnote'
+    wide = text.replace("= 1e-6,", "= 1e-2,").replace("= 1e-6 }", "= 1e-2 }").replace("limit = 1e-8", "limit = 1e-3")
+    run.write_text(wide.replace("note", loose, 1), encoding="utf-8")
+    code, output = crosscheck()
+    assert code == 0 and "worse than recorded" in output, output
+    assert crosscheck("--strict")[0] == 1
+
+    before = file.read_text(encoding="utf-8")
+    run.write_text(text.replace('"energy" = 1e-6', '"energy" = 1e-16'), encoding="utf-8")
+    code, output = crosscheck("--accept")
+    assert (code, "Nothing is accepted" in output) == (1, True), output
+    assert file.read_text(encoding="utf-8") == before
+
+    file.write_text(before.replace("rigid, all", "rigid, some"), encoding="utf-8")
+    with pytest.raises(CaseError, match="accepted.toml: .*no such comparison"):
+        load_case(folder)
+    file.write_text(before.replace("E = ", "e = ", 1), encoding="utf-8")
+    with pytest.raises(CaseError, match="accepted.toml"):
+        load_case(folder)
+
+
+def test_no_agreement_of_the_library_is_uncertain_by_more_than_a_hundredth() -> None:
+    for case in shipped_cases():
+        agreeing = [item.name for item in case.run.comparisons if item.expect == "agree"]
+        for name in agreeing:
+            assert all(figure.U <= 1e-2 for figure in case.accepted[name].values()), (case.name, name)
+
+
+def test_every_case_of_the_library_has_accepted_figures() -> None:
+    assert all(case.accepted for case in shipped_cases())
+
+
+def test_ten_times_the_figure_is_not_yet_worse() -> None:
+    assert worse(Figure(0.0, 0.5), 5.0, 5.0) == ""
+    assert worse(Figure(0.5, 0.25), 5.0, 2.5) == ""
+    assert (
+        worse(Figure(0.5, 0.25), 5.1, 2.6) == "U is 2.6e+00, accepted were 2.5e-01; E is 5.1e+00, accepted were 5.0e-01"
+    )

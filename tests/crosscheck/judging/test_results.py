@@ -1,0 +1,191 @@
+"""From records to results and their U: which records count, what a ladder must be, what each lack is called."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+
+from crosscheck.judging.case_verdicts import drift_of
+from crosscheck.judging.results import CaseResults, Result, Session, collect
+from crosscheck.judging.verdict import conserve
+from crosscheck.records.kinds import BrokenLine, CaseRecord, RunRecord, VariantInfo
+from crosscheck.records.machine import environment
+from crosscheck.records.packing import pack
+from tests.crosscheck.made_records import ONE_PAIR, TIMES, TIP, ended, ladder, run_file, way
+
+FORCE = "load:pivot.force"
+GROWING = np.column_stack([TIMES, TIMES**2, 0.0 * TIMES])
+TWO_VARIANTS = """
+[[variant]]
+name = "plain"
+engines = ["one"]
+
+[[variant]]
+name = "rigid"
+transform = "segments"
+segments = 2
+refined = { segments = 6, order = 1.0 }
+engines = ["one"]
+"""
+
+
+def session(text: str, records: list[Any]) -> Session:
+    run = run_file(text)
+    infos = {variant.name: VariantInfo(level="", drawing=None) for variant in run.variants}
+    return collect([CaseRecord(case="made/made", run=run, provenance=None, readme="", variants=infos), *records])
+
+
+def case(text: str, records: list[Any]) -> CaseResults:
+    return session(text, records).cases[0]
+
+
+def one(records: list[Any], text: str = ONE_PAIR) -> Result:
+    return case(text, records).get("rigid", "one")
+
+
+def steps(signals: dict[str, np.ndarray], order: float) -> list[RunRecord]:
+    """A ladder of steps 0.4, 0.2, 0.1 whose error is h^order times the signal."""
+    values = {h: {name: (1.0 + h**order) * signal for name, signal in signals.items()} for h in (0.4, 0.2, 0.1)}
+    return [
+        msgspec.structs.replace(
+            run, effort_kind="step", effort_value=h, channels={name: pack(each) for name, each in values[h].items()}
+        )
+        for run, h in zip(ladder("one", signals), values, strict=True)
+    ]
+
+
+def test_a_session_keeps_its_environments_and_broken_lines() -> None:
+    where, broken = environment(("made/made",)), BrokenLine("records.jsonl", 3, "why")
+    found = session(ONE_PAIR, [where, broken, *ladder("one", {TIP: way()})])
+    assert (found.environments, found.broken, len(found.cases)) == ((where,), (broken,), 1)
+
+
+def test_what_is_run_again_counts_as_the_last_even_if_it_is_cut_short() -> None:
+    """The scene was edited and one effort run before the session was killed: the old results are another scene's."""
+    runs = ladder("one", {TIP: way()})
+    assert one(runs).status == "finished"
+    again = msgspec.structs.replace(runs[0], scene="edited")
+    assert one([*runs, again]).status == "did not run"
+
+
+def test_a_record_without_an_effort_has_no_runs() -> None:
+    blank = ended(ladder("one", {TIP: way()})[0], "crashed", "why", effort="", times=None, channels={})
+    found = one([blank])
+    assert (found.status, found.message, found.runs, found.channels) == ("crashed", "why", (), ())
+
+
+@pytest.mark.parametrize(
+    ("changes", "status", "message", "reached"),
+    [
+        ({}, "finished", "", None),
+        ({"rungs": 4}, "did not run", "the finest effort is not recorded: the session was cut short", None),
+        ({"times": None}, "failed", "its record holds no times", None),
+        ({"status": "failed", "message": "why"}, "failed", "why", None),
+        ({"status": "did not finish", "message": "why"}, "did not finish", "why", None),
+        ({"status": "diverged", "message": "why"}, "diverged", "diverged at t = 1 s: why", 1.0),
+        ({"status": "diverged", "message": "why", "times": None}, "diverged", "diverged at t = 0 s: why", 0.0),
+        (
+            {"status": "diverged", "message": "why", "times": pack(TIMES[:0])},
+            "diverged",
+            "diverged at t = 0 s: why",
+            0.0,
+        ),
+    ],
+)
+def test_a_result_is_its_finest_run(changes: dict[str, Any], status: str, message: str, reached: float | None) -> None:
+    runs = [msgspec.structs.replace(run, rungs=changes.get("rungs", 3)) for run in ladder("one", {TIP: way()})]
+    runs[-1] = msgspec.structs.replace(runs[-1], **changes)
+    found = one(runs[::-1])
+    assert (found.variant, found.engine, found.status, found.message) == ("rigid", "one", status, message)
+    assert (found.reached_s, found.runs) == (reached, tuple(runs))
+
+
+def test_signals_are_unpacked_once() -> None:
+    result = one(ladder("one", {TIP: way(), FORCE: way(2.0)}))
+    assert result.values(TIP) is result.values(TIP)
+    assert not np.array_equal(result.values(TIP), result.values(FORCE))
+
+
+def test_a_finished_run_has_times_and_signals_at_them() -> None:
+    runs = ladder("one", {TIP: way()})
+
+    def last(**changes: Any) -> Result:
+        return one([*runs[:2], msgspec.structs.replace(runs[2], **changes)])
+
+    assert (last(times=None).status, last(times=None).message) == ("failed", "its record holds no times")
+    single = last(times=pack(TIMES[:1]), channels={TIP: pack(way()[:1])})
+    assert (single.status, single.channels) == ("finished", (TIP,))
+    for times, values in ((TIMES[:0], way()[:0]), (TIMES, way()[:5]), (TIMES, way()[:, 0]), (way(), way())):
+        found = last(times=pack(times), channels={TIP: pack(values)})
+        text = f"its record holds {TIP} of shape {values.shape} at times of shape {times.shape}"
+        assert (found.status, found.message) == ("failed", text)
+
+
+def test_two_efforts_that_did_the_same_say_nothing_where_the_first_diverged() -> None:
+    runs = ladder("one", {TIP: way()})
+    coarse = ended(runs[0], "diverged", times=None, channels={})
+    apart = one([coarse, *runs[1:]]).doubt(TIP, False)
+    assert apart.how == "3 x the difference of the only two efforts"
+    same = msgspec.structs.replace(runs[1], channels=runs[2].channels, evaluations=runs[2].evaluations)
+    how = one([coarse, same, runs[2]]).doubt(TIP, False).how
+    assert how == "unknown: fewer than two efforts finished with different results"
+
+
+def test_spatial_doubt_keeps_the_order_and_ends_at_its_largest() -> None:
+    runs = [*steps({TIP: GROWING}, 2.0), *ladder("one", {TIP: 1.5 * GROWING}, role="refined")[-1:]]
+    doubt = one(runs, TWO_VARIANTS).doubt(TIP, True)
+    own = one(runs, TWO_VARIANTS).doubt(TIP, False)
+    assert doubt.how == "Richardson, observed order 2.00; spatial refinement"
+    assert doubt.order == own.order and np.isclose(own.order or 0.0, 2.0)
+    assert doubt.value == doubt.envelope[-1] > 1.1 * doubt.envelope[-2]
+
+
+@pytest.mark.parametrize(
+    ("refined", "why"),
+    [
+        ([], "did not run: no run of it is recorded: the session was cut short"),
+        ([{"channels": {}}], "does not offer the channel"),
+        ([{}], "gave the very same result: it is not refined"),
+        ([{"status": "refused", "message": "no"}], "was refused: no"),
+        ([{"status": "failed", "message": "no"}], "failed: no"),
+    ],
+)
+def test_what_a_refined_run_lacks_is_named(refined: list[dict[str, Any]], why: str) -> None:
+    runs = ladder("one", {TIP: way()})
+    finer = [msgspec.structs.replace(runs[-1], role="refined", **changes) for changes in refined]
+    result = one([*runs, *finer], TWO_VARIANTS)
+    assert result.doubt(TIP, True).how == f"unknown: its refined run {why}"
+    assert np.isfinite(result.doubt(TIP, False).value)
+    assert result.refined is not None
+    assert (result.refined.variant, result.refined.engine) == ("rigid", "one")
+
+
+def test_elements_are_refined_twofold() -> None:
+    text = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one"]\nrefined = { elements = 8, order = 4.0 }', 1)
+    assert one(ladder("one", {TIP: way()}), text).refinement == (2.0, 4.0)
+    assert one(ladder("one", {TIP: way()}), TWO_VARIANTS).refinement == (3.0, 1.0)
+
+
+def flat(level: float, samples: int = 11) -> np.ndarray:
+    return np.full((samples, 1), level)
+
+
+def test_a_small_quantity_is_measured_by_itself() -> None:
+    result = one(ladder("one", {"energy.total": flat(0.2), "energy.kinetic": flat(-0.25), "momentum.linear": way(0.5)}))
+    assert drift_of(result, "energy.total")[1] == pytest.approx(0.25)
+    assert drift_of(result, "momentum.linear")[1] == pytest.approx(0.5)
+    assert drift_of(one(ladder("one", {"energy.total": flat(0.2)})), "energy.total")[1] == 0.0
+
+
+def test_the_drift_of_nothing_is_nothing() -> None:
+    last = ladder("one", {"energy.total": flat(1.0, 0), "energy.kinetic": flat(1.0, 0), "momentum.linear": way()[:0]})[
+        -1
+    ]
+    result = Result("rigid", "one", "finished", "", (last,))
+    for channel in ("energy.total", "momentum.linear"):
+        drift, size = drift_of(result, channel)
+        assert (len(drift), size) == (0, 0.0)
+        assert conserve(drift, size, 0.5).status == "failed"

@@ -1,0 +1,136 @@
+"""The figures and words of an uncertainty, down to its edges: orders known in advance, and each fault by its name."""
+
+from __future__ import annotations
+
+import warnings
+
+import numpy as np
+import pytest
+
+from crosscheck.judging.uncertainty import RungSignal, estimate, observed_order, roundoff_floor, spatial, unknown
+from crosscheck.judging.verdict import conserve
+
+FORCE = "load:pivot.force"
+
+
+def rungs(efforts: tuple[float, ...], order: float) -> list[RungSignal]:
+    return [RungSignal(h, np.array([[0.0], [h**order]])) for h in efforts]
+
+
+@pytest.mark.parametrize("efforts", [(0.4, 0.2, 0.1), (0.9, 0.3, 0.1), (0.6, 0.2, 0.1)])
+@pytest.mark.parametrize("order", [0.95, 1.0, 1.05, 2.0, 3.0, 4.0])
+def test_a_whole_order_is_extrapolated(efforts: tuple[float, ...], order: float) -> None:
+    """Richardson: U is 1.25 times the error that is there."""
+    found = estimate(FORCE, "step", rungs(efforts, order), 0, 0.0)
+    assert np.isclose(found.value, 1.25 * efforts[2] ** order, rtol=1e-9)
+    assert np.isclose(found.order or 0.0, order)
+    assert found.how == f"Richardson, observed order {order:.2f}"
+
+
+@pytest.mark.parametrize("efforts", [(0.4, 0.2, 0.1), (0.9, 0.3, 0.1)])
+def test_other_orders_get_less_credit_or_none(efforts: tuple[float, ...]) -> None:
+    ratio = efforts[1] / efforts[2]
+
+    def found(order: float) -> tuple[float, float | None, str]:
+        given = rungs(efforts, order)
+        gap = abs(given[1].values[1, 0] - given[2].values[1, 0])
+        doubt = estimate(FORCE, "step", given, 0, 0.0)
+        return doubt.value / gap, doubt.order, doubt.how
+
+    factor, order, how = found(1.5)
+    assert np.isclose(factor, 1.25 / (ratio - 1.0)) and np.isclose(order or 0.0, 1.5)
+    assert how == "difference of the two finest steps, as order 1.50 is not whole"
+    assert np.isclose(found(6.0)[0], 1.25 / (ratio**4 - 1.0))
+    factor, order, how = found(0.5)
+    assert np.isclose(factor, 3.0 * ratio**0.5) and order is None
+    assert how == "3 x the larger difference: the runs do not converge yet"
+
+
+@pytest.mark.parametrize(("values", "bound"), [((3.0, 1.0, 0.0), 1.0), ((3.5, 1.0, 0.0), 1.0), ((2.9, 1.0, 0.0), 5.7)])
+def test_tolerances_that_halve_the_error_bound_it(values: tuple[float, ...], bound: float) -> None:
+    given = [RungSignal(10.0**-n, np.array([[each]])) for n, each in enumerate(values)]
+    found = estimate(FORCE, "tolerance", given, 0, 0.0)
+    assert np.isclose(found.value, bound) and found.order is None
+    short = "difference of the two finest tolerances"
+    assert found.how == (short if bound == 1.0 else "3 x the larger difference: the runs do not converge yet")
+
+
+def test_judging_warns_of_nothing() -> None:
+    """What overflows is told in words, once."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert conserve(np.full(1, 1e300), 1e-300, 0.5).status == "unresolved"
+        for level in (1e200, 1e308):
+            huge = np.full((2, 3), level)
+            assert np.all(np.isinf(spatial(FORCE, huge, -huge, 1.0 + 1e-15, 1e-300)))
+        for level in (1e308, 0.0):
+            apart = [RungSignal(0.1, np.full((3, 1), -1e308)), RungSignal(0.01, np.full((3, 1), level))]
+            found = estimate(FORCE, "step", apart, 0, 0.0)
+            assert np.array_equal(found.envelope, np.full(3, np.inf))
+            assert found.how == "unknown: the runs are so far apart that their distance is no number"
+        assert observed_order((4.0, 1.0, 1.0), 2.0, 1.0) is None
+        assert observed_order((4.0, 4.0, 1.0), 2.0, 1.0) is None
+    assert np.all(np.isinf(spatial(FORCE, np.zeros((3, 0)), np.zeros((3, 0)), 2.0, 1.0)))
+
+
+def test_orders_are_looked_for_between_nothing_and_sixteen() -> None:
+    assert observed_order((4.0, 2.0, 1.0), 2.0**15, 1.0) == pytest.approx(15.0)
+    assert observed_order((4.0, 2.0, 1.0), 2.0**17, 1.0) is None
+    assert observed_order((4.0, 2.0, 1.0), 1.0, 1.0) is None
+    assert observed_order((1e12, 1e6, 1.0), 1e6, 1.0) == pytest.approx(1.0)
+    assert observed_order((1.1e12, 1e6, 1.0), 1e6, 1.0) is None
+    assert observed_order((1e12, 0.9e6, 0.8), 1e6, 1.0) is None
+    assert roundoff_floor(2.0, 9) == 6.0 * np.finfo(float).eps
+    assert (unknown(3, "so").how, unknown(3, "so").envelope.shape) == ("unknown: so", (3,))
+
+
+def level(effort: float, *values: float) -> RungSignal:
+    return RungSignal(effort, np.array(values)[:, None])
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "evaluations", "size", "why"),
+    [
+        ("step", [], 0, 0.0, "fewer than two efforts finished with different results"),
+        ("step", [level(0.1, 1.0)], 0, 0.0, "fewer than two efforts finished with different results"),
+        ("speed", [level(0.2, 1.0), level(0.1, 1.0)], 0, 0.0, 'efforts of kind "speed" have no order'),
+        ("step", [level(0.1, 1.0), level(0.0, 1.0)], 0, 0.0, "the efforts 0.1, 0 do not fall to a positive number"),
+        ("step", [level(0.1, 1.0), level(0.1, 1.0)], 0, 0.0, "the efforts 0.1, 0.1 do not fall to a positive number"),
+        (
+            "step",
+            [level(0.2, 1.0, 2.0), level(0.1, 1.0)],
+            0,
+            0.0,
+            "the efforts have results of different shapes, or empty ones",
+        ),
+        ("step", [level(0.2), level(0.1)], 0, 0.0, "the efforts have results of different shapes, or empty ones"),
+        ("step", [level(0.2, np.nan), level(0.1, 1.0)], 0, 0.0, "an effort has values that are not numbers"),
+        (
+            "step",
+            [level(0.2, 1.0), level(0.1, 1.0)],
+            -1,
+            2.0,
+            "-1 evaluations of a signal of size 2 leave no round-off",
+        ),
+        ("step", [level(0.2, 1.0), level(0.1, 1.0)], np.inf, 2.0, "inf evaluations of a signal of size 2 leave no"),
+        ("step", [level(0.2, 1.0), level(0.1, 1.0)], 1, np.inf, "1 evaluations of a signal of size inf leave no"),
+    ],
+)
+def test_each_fault_of_a_ladder_is_named(
+    kind: str, given: list[RungSignal], evaluations: int, size: float, why: str
+) -> None:
+    found = estimate(FORCE, kind, given, evaluations, size)
+    assert found.how.startswith(f"unknown: {why}") and (found.value, found.order) == (np.inf, None)
+    assert found.how.removeprefix(f"unknown: {why}") in ("", " to be told", " round-off to be told")
+    assert found.envelope.shape == (len(given[-1].values) if given else 0,)
+
+
+def test_two_efforts_bound_by_three_times_their_difference() -> None:
+    found = estimate(FORCE, "step", [level(0.2, 0.0, 3.0, 1.0), level(0.1, 0.0, 1.0, 1.0)], 0, 0.0)
+    assert np.array_equal(found.envelope, (0.0, 6.0, 6.0))
+    assert (found.value, found.order, found.how) == (6.0, None, "3 x the difference of the only two efforts")
+
+
+def test_only_the_last_three_efforts_count() -> None:
+    found = estimate(FORCE, "step", rungs((2.0, 0.8, 0.2, 0.1), 2.0), 0, 0.0)
+    assert np.isclose(found.value, 0.0125) and found.how == "Richardson, observed order 2.00"

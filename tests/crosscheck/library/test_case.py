@@ -1,0 +1,171 @@
+"""Case folders: the documented example is valid, faulty run files are refused with place and remedy."""
+
+from __future__ import annotations
+
+import textwrap
+import tomllib
+from pathlib import Path
+
+import msgspec
+import pytest
+
+from crosscheck.library import case as case_module
+from crosscheck.library.case import CaseError, Comparison, ComparisonSide, Refined, RunFile, Variant
+from crosscheck.library.check import check_run_file
+from crosscheck.library.find import load_case, resolve
+from crosscheck.library.selection import select
+from crosscheck.running.plan import refine, variant_scene
+from tests.crosscheck.sessions import CASE, copy_case
+from tests.flexmb.surrogate.beams import beam_scene
+
+EXAMPLE = textwrap.dedent(case_module.__doc__.split("run.toml::")[1].split("Channels are named")[0])
+
+
+def example() -> RunFile:
+    return msgspec.convert(tomllib.loads(EXAMPLE), RunFile)
+
+
+def test_the_documented_example_is_valid() -> None:
+    check_run_file(example())
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        (
+            'a = { variant = "full"',
+            'a = { variant = "fool"',
+            'no variant "fool"; the variants are rigid, full, segments',
+        ),
+        ('engine = "native" }\nb', 'engine = "exudyn" }\nb', 'engine "exudyn" does not run variant "full"'),
+        ('reason = "above the critical speed the unstiffened body diverges"', "", "needs a reason"),
+        ("segments = 16", "", r"\$.variant\[2\].segments"),
+        ('transform = "segments"', "", r"\$.variant\[2\].segments"),
+        ('transform = "segments"', 'transform = "substructures"', r"\$.variant\[2\].segments .*: give it exactly"),
+        ('engines = ["native"]', 'pieces = 2\nengines = ["native"]', r"\$.variant\[1\].pieces .*: give it exactly"),
+        ("refined = { segments = 32 }", "refined = { pieces = 32 }", r"\$.variant\[2\].refined.pieces"),
+        ('scene = "flexible.toml"', "eigenmodes = 1", r"\$.variant\[1\].eigenmodes"),
+        ('scene = "flexible.toml"', 'split_body = "a"', r"\$.variant\[1\].split_body"),
+        ('engines = ["native"]', "engines = []", "name at least one engine"),
+        ('also = ["native-frisch"]', 'also = ["native"]', r"\$.variant\[1\].also .*: native is among"),
+        ('name = "full"', 'name = "rigid"', "two variants have the same name"),
+        ('reference = "rigid"', 'reference = "stiff"', 'no variant "stiff"'),
+        ("duration_s = 10.0", "duration_s = 0.0", "needs a duration"),
+        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = 0", r"\$.time_limit_s: 0 makes no sense"),
+        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = nan", r"\$.time_limit_s"),
+        ("duration_s = 10.0", "duration_s = 10.0\ntime_limit_s = inf", r"\$.time_limit_s"),
+        ('b = { variant = "rigid", engine = "pinocchio" }', 'b = { variant = "rigid", engine = "adams" }', "adams"),
+        ('goals = { "marker:tip.position" = 1e-6 }', "goals = {}", "at least one channel"),
+    ],
+)
+def test_faulty_run_files_are_refused(tmp_path: Path, old: str, new: str, message: str) -> None:
+    assert old in EXAMPLE
+    folder = copy_case(tmp_path)
+    (folder / "run.toml").write_text(EXAMPLE.replace(old, new, 1), encoding="utf-8")
+    with pytest.raises(CaseError, match=message) as refusal:
+        load_case(folder)
+    assert "run.toml" in str(refusal.value)
+
+
+@pytest.mark.parametrize(
+    ("line", "place"),
+    [("samples = 81", "samples"), ("duration = 3", "duration"), ('name = "rigid"\nengine = "x"', "engine")],
+)
+def test_unknown_keys_and_types_name_their_place(tmp_path: Path, line: str, place: str) -> None:
+    folder = copy_case(tmp_path)
+    text = (folder / "run.toml").read_text(encoding="utf-8")
+    changed = {
+        "samples": text.replace("samples = 81", 'samples = "many"'),
+        "duration": "duration = 3\n" + text,
+        "engine": text.replace('name = "rigid"', line, 1),
+    }[place]
+    (folder / "run.toml").write_text(changed, encoding="utf-8")
+    with pytest.raises(CaseError, match=place):
+        load_case(folder)
+
+
+def test_missing_scene_and_unknown_case_say_what_to_do(tmp_path: Path) -> None:
+    folder = copy_case(tmp_path)
+    (folder / "scene.toml").unlink()
+    with pytest.raises(CaseError, match=r"needs scene.toml"):
+        load_case(folder)
+    with pytest.raises(CaseError, match="crosscheck list"):
+        resolve(("no such case",))
+
+
+def test_a_folder_is_a_case() -> None:
+    (case,) = resolve((str(CASE),))
+    assert case.name == "pendulum/single"
+    assert case.provenance is not None
+
+
+def pairs(run: RunFile) -> set[tuple[str, str]]:
+    return {(item.a.engine, item.b.engine) for item in run.comparisons}
+
+
+def test_all_pairs_and_selections_of_engines() -> None:
+    run = example()
+    everything = pairs(select(run, ()))
+    assert ("mujoco", "exudyn") in everything
+    assert len(select(run, ()).comparisons) == 6 + 2
+    assert pairs(select(run, ("native", "mujoco"))) == {("native", "mujoco")}
+    alone = select(run, ("mujoco",))
+    assert pairs(alone) == {pair for pair in everything if "mujoco" in pair}
+    assert set(alone.variant("rigid").engines) == {"native", "pinocchio", "mujoco", "exudyn"}
+
+
+def test_a_foreign_engine_joins_what_is_compared_engine_by_engine() -> None:
+    run = select(example(), ("mine",))
+    assert ("native", "mine") in pairs(run)
+    assert all("mine" in pair for pair in pairs(run))
+
+
+def test_a_shipped_engine_that_the_case_leaves_out_stays_out() -> None:
+    run = msgspec.structs.replace(
+        example(),
+        variants=tuple(
+            msgspec.structs.replace(v, engines=tuple(e for e in v.engines if e != "exudyn")) for v in example().variants
+        ),
+    )
+    assert pairs(select(run, ("native", "exudyn"))) == set()
+
+
+def test_charts_follow_their_variants() -> None:
+    run = select(example(), ("exudyn",))
+    assert [chart.variants for chart in run.charts] == [("rigid",)]
+
+
+def test_an_engine_beside_a_variant_runs_it_without_joining_its_pairs() -> None:
+    """Not as the first of all pairs, but where asked for, charted, and where a comparison names it."""
+    variants = tuple(
+        msgspec.structs.replace(v, engines=("native", "mujoco"), also=("exudyn",)) if v.name == "rigid" else v
+        for v in example().variants
+    )
+    named = Comparison(
+        name="named", goals={"energy": 1e-9},
+        a=ComparisonSide(variant="rigid", engine="native"), b=ComparisonSide(variant="rigid", engine="exudyn"),
+    )  # fmt: skip
+    run = msgspec.structs.replace(example(), variants=variants, comparisons=example().comparisons[:1], controls=())
+    chosen = select(run, ())
+    assert pairs(chosen) == {("native", "mujoco")}
+    assert chosen.variant("rigid").engines == ("native", "mujoco", "exudyn")
+    assert chosen.variant("rigid").also == ()
+    run = msgspec.structs.replace(run, comparisons=(*run.comparisons, named))
+    check_run_file(run)
+    assert pairs(select(run, ())) == {("native", "mujoco"), ("native", "exudyn")}
+
+
+def test_a_variant_of_pieces_is_refined_by_more_pieces() -> None:
+    scene = beam_scene()
+    variant = Variant(
+        name="pieces", transform="substructures", pieces=2, eigenmodes=1, refined=Refined(pieces=3), level="linear",
+        engines=("native",),
+    )  # fmt: skip
+    coarse, fine = (variant_scene(scene, each) for each in (variant, refine(variant, variant.refined)))
+    assert [body.name for body in coarse.bodies] == ["boom.p00", "boom.p01", "panel"]
+    assert [body.name for body in fine.bodies] == ["boom.p00", "boom.p01", "boom.p02", "panel"]
+    assert fine.bodies[0].level == "linear"
+    assert [body.modes.count for body in coarse.bodies[:2]] == [1, 1]
+    elsewhere = msgspec.structs.replace(variant, split_body="panel")
+    with pytest.raises(ValueError, match="no beam"):
+        variant_scene(scene, elsewhere)

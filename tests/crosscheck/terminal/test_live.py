@@ -1,0 +1,37 @@
+"""Live progress: what stays on the screen after a job."""
+
+from __future__ import annotations
+
+import io
+
+import numpy as np
+from rich.console import Console
+
+from crosscheck.records.kinds import RunRecord
+from crosscheck.running.plan import MAIN, Job
+from crosscheck.running.pool import Event
+from crosscheck.terminal.live import LiveProgress
+
+
+def lasting_line(message: str) -> str:
+    """What stays of a job that did not run."""
+    job = Job("case", "rigid", MAIN, "absent", None, "", np.zeros(2), "module:engines")
+    record = RunRecord(
+        case="case", variant="rigid", role=MAIN, engine="absent", version="", scene="", status="did not run",
+        message=message,
+    )  # fmt: skip
+    screen = io.StringIO()
+    with LiveProgress(Console(file=screen, width=200)) as live:
+        for event in (Event(0, "started"), Event(0, "emitted", record), Event(0, "ended")):
+            live.hear([job], event)
+    return screen.getvalue()
+
+
+def test_brackets_in_a_remedy_are_text_not_markup() -> None:
+    remedy = "not installed: `pip install flexmb[peers]`"
+    assert f"did not run: {remedy}" in lasting_line(remedy)
+
+
+def test_first_problem_of_a_scene_stays_with_its_place() -> None:
+    message = 'scene "s" has 2 problems:\n  1. $.bodies[1]: no mass\n     -> add it\n  2. $.hinges[0]: no axis\n'
+    assert 'did not run: scene "s" has 2 problems: 1. $.bodies[1]: no mass -> add it\n' in lasting_line(message)
