@@ -159,7 +159,7 @@ def prepare(
     t_end, tolerance = arguments.number("t_end", t_end), arguments.number("tolerance", tolerance)
     check_scene(scene, t_end)
     if not 0.0 < tolerance < 1.0:
-        raise ValueError(f"the tolerance is {tolerance:g}: give a part of one, such as 1e-3")
+        raise ValueError(f"the tolerance is {tolerance:g}: give a fraction, such as 1e-3")
     bench = Bench(scene, t_end, quantities(quantity, scene))
     base = rigid_run(scene, bench.times)
     known, slow = {}, 0

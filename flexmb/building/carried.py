@@ -1,4 +1,4 @@
-"""How much inertia the speeds of a tree move, roughly: what pivots are compared with."""
+"""A rough measure of the inertia that each speed of a tree moves; pivots are compared with it."""
 
 from __future__ import annotations
 

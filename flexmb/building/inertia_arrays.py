@@ -1,4 +1,4 @@
-"""Inertia of all bodies as arrays: what each level needs of the points of a body, summed once, and what stays a sum."""
+"""Inertia of all bodies as arrays: what each level sums over points before a run, and what is left to sum in it."""
 
 from __future__ import annotations
 

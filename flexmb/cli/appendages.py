@@ -16,7 +16,7 @@ from flexmb.scene.files import load_scene
 def equivalence(
     scene: SceneFile,
     body: Annotated[str, typer.Argument(help="Name of the flexible body.", metavar="BODY", show_default=False)],
-    accuracy: Annotated[float, typer.Option(help="What counts as equal: a part of one.")] = 0.05,
+    accuracy: Annotated[float, typer.Option(help="Relative difference that counts as equal, such as 0.05.")] = 0.05,
     modes: Annotated[
         int | None, typer.Option(help="How many modes to look at; default all good ones.", show_default=False)
     ] = None,

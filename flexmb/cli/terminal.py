@@ -1,4 +1,4 @@
-"""What all commands share: consoles, exit codes, the words that they read, and errors as messages."""
+"""Common parts of all commands: consoles, exit codes, options that are read from text, and errors as messages."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def range_of(option: str, text: str) -> list[float]:
 
 @contextmanager
 def no_traceback() -> Iterator[None]:
-    """What the user can put right is a message, not a traceback."""
+    """Errors that the user can put right are shown as messages, not as tracebacks."""
     try:
         yield
     except BrokenPipeError:  # whoever read the output has read enough

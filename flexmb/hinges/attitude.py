@@ -1,4 +1,4 @@
-"""What hinges with a quaternion have in common: names of coordinates and speeds, and finite turns."""
+"""Common parts of hinges with a quaternion: names of coordinates and speeds, and finite turns."""
 
 from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import exponential_coefficients

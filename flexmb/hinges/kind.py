@@ -1,4 +1,4 @@
-"""What the file of a hinge declares of its kind, and what most kinds have in common."""
+"""The declaration that the file of a hinge makes of its kind, and what most kinds have in common."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def scalar_names(item: Item) -> tuple[Names, Names]:
 
 
 def no_ball(item: Any) -> tuple[float, float]:
-    """Neither stiffness nor damping but that of scalar coordinates."""
+    """No isotropic spring: stiffness and damping belong to scalar coordinates only."""
     return 0.0, 0.0
 
 

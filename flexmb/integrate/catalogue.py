@@ -1,4 +1,4 @@
-"""The integrators there are, each declared in its own file."""
+"""All integrators, each declared in its own file."""
 
 from __future__ import annotations
 
@@ -13,5 +13,5 @@ INTEGRATORS: dict[str, Integrator] = {
 
 
 def integrator(name: str) -> Integrator:
-    """The integrator of that name; ValueError for a name that there is not."""
+    """The integrator of that name; ValueError for an unknown name."""
     return INTEGRATORS[arguments.one_of("method", name, INTEGRATORS)]

@@ -1,4 +1,4 @@
-"""What runs have in common: derivatives that are checked, error scale, first step, change of step, stretches of steps.
+"""Common parts of all runs: derivatives that are checked, error scale, first step, change of step, stretches of steps.
 
 The last components of a state y (n,) may be pure quadratures: only the first `controlled` ones enter a norm (see
 `Accuracy`).
@@ -24,7 +24,7 @@ HALVED = 0.5  # change of step where an iteration did not converge
 _STEP_SLACK = 1e-9
 
 # Entries of `counts`: evaluations, steps, samples stored, Jacobians, and factorisations or exponentials of a matrix.
-# One is no count: another thread sets STOP while a run goes on, which then ends.
+# STOP is not a count: another thread sets it during a run, and the run then ends.
 EVALUATIONS, ACCEPTED, REJECTED, SAMPLES, STOP, JACOBIANS, FACTORISATIONS = range(7)
 COUNTS = 7  # their number: length of `counts`
 

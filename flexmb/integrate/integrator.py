@@ -1,4 +1,4 @@
-"""What an integrator declares about itself: the last lines of its file. `catalogue` lists all of them."""
+"""The declaration of an integrator, which stands in the last lines of its file. `catalogue` lists all of them."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an integrator is given: a differential equation, the times of its output and how accurate it shall be.
+"""The input of an integrator: a differential equation, the times of its output and the accuracy.
 
 Functions and tables are given by address, so that each integrator is compiled once.
 """

@@ -1,4 +1,4 @@
-"""What a run may ask of an integrator."""
+"""The settings of an integrator, and their limits."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ class Settings:
         )
 
     def checked(self, t_end: float) -> Settings:
-        """The same in plain numbers; ValueError for settings that make no sense, TypeError for what is no number."""
+        """The same in plain numbers; ValueError for settings that make no sense, TypeError for anything but numbers."""
         plain = replace(
             self,
             rtol=arguments.number("rtol", self.rtol),

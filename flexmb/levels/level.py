@@ -1,4 +1,4 @@
-"""What the file of a fidelity level declares of it, and the tables that it makes of a body."""
+"""The declaration that the file of a fidelity level makes of it, and the tables that it makes of a body."""
 
 from __future__ import annotations
 

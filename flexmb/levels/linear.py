@@ -7,8 +7,8 @@ B_n = -1/2 E_n, G_nk = 1/2 d2J/(deta_n deta_k):
     torque   w x (J w) + sum_n etadot_n (E_n w + w x C0_n)
     modal    w.(B_n - sum_k eta_k G_nk) w + w.sum_k etadot_k (C1_kn - C1_nk)
 
-Not a kinetic energy's equations: power is balanced to first order only, and M_m is not positive definite everywhere.
-The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
+These are not the equations of a kinetic energy: power is balanced to first order only, and M_m is not positive definite
+everywhere. The rotary inertia of wheels is no part of it: it turns with the wheel's node exactly and is summed.
 """
 
 from dataclasses import replace

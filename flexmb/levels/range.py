@@ -1,9 +1,9 @@
-"""How far a modal field means anything."""
+"""The range of deflections in which a modal field means anything."""
 
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 
-RANGE = 10.0  # deflections of so many body sizes are a motion that diverged, not one that a modal field describes
+RANGE = 10.0  # beyond so many body sizes a motion has diverged, and no modal field describes it
 
 
 @helper

@@ -19,7 +19,7 @@ def inertia_and_bias(c, w, k):
 
 @helper
 def rigid_block_and_bias(c, w, k):
-    """The same without the modal blocks of M_m, for whom has no use for them."""
+    """The same without the modal blocks of M_m, for callers that do not need them."""
     rigid.inertia_and_bias(c, w, k)
     omega = vec3(w.body[k].velocity, 0)
     for n in range(c.body[k].modes):

@@ -1,7 +1,7 @@
 """Level stiffened: level full with a second-order field, displacements phi eta + 1/2 eta' G eta.
 
-The kinetic energy is the sum over inertia points that move so, all products kept: nothing is truncated, and it is
-positive. Centrifugal, gyroscopic and gravity stiffness follow from it, as the velocity of a point is
+The kinetic energy is the sum over inertia points that move like this. All products are kept: nothing is truncated, so
+it is positive. Centrifugal, gyroscopic and gravity stiffness follow from it, as the velocity of a point is
 
     v + w x rho + sum_n (phi_n + (G eta)_n) etadot_n
 

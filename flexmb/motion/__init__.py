@@ -1,1 +1,1 @@
-"""Coordinates and speeds: what a state says of them, their rates, and steps on the manifold of rotations."""
+"""Coordinates and speeds: read from a state, their rates, and steps on the manifold of rotations."""

@@ -1,4 +1,5 @@
-"""Coordinates and speeds: out of the integrator's vector, their rates, and what springs and motors do along them.
+"""Coordinates and speeds: read from the integrator's vector, their rates, and the forces of springs and motors along
+them.
 
 Both algorithms, Jain's recursion and Frisch's matrices, start here.
 """

@@ -1,1 +1,1 @@
-"""On the way out: folders and files that are written, text that is shown."""
+"""Output: folders and files that are written, and text that is shown."""

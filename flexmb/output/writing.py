@@ -1,4 +1,4 @@
-"""Where results go: a folder is looked at before anything is computed, and an error of the disk names the file."""
+"""Writing results: a folder is checked before anything is computed, and an error of the disk names the file."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def matches(pattern: str, channel: str) -> bool:
 
 
 def family(channel: str) -> str:
-    """What a channel is one of: "load.torque" for every hinge's torque, "energy" for every kind of energy."""
+    """The family of a channel: "load.torque" for every hinge's torque, "energy" for every kind of energy."""
     kind, _, rest = channel.partition(":")
     if not rest:
         return "energy" if channel.startswith("energy.") else channel

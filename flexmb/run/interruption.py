@@ -14,7 +14,7 @@ PATIENCE = 0.1  # s between looks at the keyboard, where waiting itself does not
 
 
 class Interrupted(KeyboardInterrupt):
-    """Ctrl-C ended a run. `trajectory` holds what was reached, as of a run that stopped."""
+    """Ctrl-C ended a run. `trajectory` holds the run up to there, like that of any run that stopped."""
 
     def __init__(self, trajectory: Trajectory) -> None:
         super().__init__(trajectory)
@@ -25,7 +25,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index) -> tuple[Any, bool]:
-    """What `run` returns, and whether Ctrl-C was pressed: then stop[0] = 1 asks it to return soon.
+    """The result of `run`, and whether Ctrl-C was pressed, in which case stop[0] = 1 asks `run` to return soon.
 
     Python handles signals in the main thread, and only between its own instructions: so compiled code runs in another
     thread, and the main one waits. Called from another thread, `run` is called there, and Ctrl-C is for others to see.

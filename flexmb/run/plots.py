@@ -1,4 +1,4 @@
-"""Charts of one run as PNG files: what an analyst looks at first."""
+"""Charts of one run as PNG files, for a first look."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ from flexmb.typing import Index, Real
 
 
 class Raw(NamedTuple):
-    """What an integrator leaves: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
+    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
 
     states: Real
     status: Status
@@ -65,7 +65,7 @@ class Integration:
 
 
 def integrate(system: System, route: Route, times: Real, settings: Settings) -> Raw:
-    """Run once over no time at all, which compiles, and then in earnest."""
+    """Run once over no time at all, which compiles the kernels, and then over the whole time."""
     initial = system.initial_state
     ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
 

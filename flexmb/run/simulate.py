@@ -32,7 +32,7 @@ from flexmb.typing import Real
 
 
 class RunSettings(TypedDict, total=False):
-    """How accurately `simulate` integrates, and in which steps; what is left out is as in `Settings`.
+    """How accurately `simulate` integrates, and in which steps; a setting that is left out is as in `Settings`.
 
     rtol = 1e-10, atol = 1e-12 (SI units), step (s), max_steps = 1,000,000, spectral_radius = 0.8
     """
@@ -58,26 +58,25 @@ def simulate(
 
     method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol (1e-10 and 1e-12 if
     left out), in the root mean square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not
-    longer than `step` (s). For scenes with modes or springs much faster than what matters: "radau5", which lets them
-    die out where the step is longer than their period; "exponential", which follows them exactly as far as they are
-    linear, whatever the step; both adapt their steps as "dop853" does. "generalised_alpha" takes equal steps and damps
-    what they do not resolve: `spectral_radius` from 1, nothing, to 0, all in one step (0.8 if left out); rtol and atol
-    are what its Newton iterations may leave. See docs/integrators.md.
-    max_steps: a run of more steps stops, 1,000,000 if left out.
-    samples: how many equally spaced output times, both ends included, or the times themselves, from 0 to t_end.
-    algorithm: "articulated", the O(N) recursion; "composite", the mass matrix and its Cholesky factors; or Frisch's
-    equations, "frisch" or "frisch_as_printed", which take bodies of level `full` as `linear`. Accelerations and loads
-    of the output are theirs too.
-    stabilise: how closures are kept closed. 0: after every step coordinates and speeds are projected back to where all
-    closures are closed, to 1e-13 of the mechanism's size. A rate k (1/s): errors g of closures are left to decay by
-    g'' + 2 k g' + k^2 g = 0 (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
+    longer than `step` (s). Three methods are for scenes with modes or springs that are much faster than the motion of
+    interest. "radau5" lets them die out where the step is longer than their period; "exponential" follows them exactly
+    as far as they are linear, whatever the step; both adapt their steps as "dop853" does. "generalised_alpha" takes
+    equal steps and damps the modes that they do not resolve, by `spectral_radius` from 1 (no damping) to 0 (all in one
+    step), 0.8 if left out; rtol and atol bound the remaining error of its Newton iterations. See docs/integrators.md.
+    max_steps: a run of more steps stops, 1,000,000 if left out. samples: how many equally spaced output times, both
+    ends included, or the times themselves, from 0 to t_end. algorithm: "articulated", the O(N) recursion; "composite",
+    the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which take bodies
+    of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how closures are kept
+    closed. 0: after every step coordinates and speeds are projected back to where all closures are closed, to 1e-13 of
+    the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0 (Baumgarte), which
+    costs less and leaves a drift; k times the step should stay below 1.
 
     Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
     closes the closures or they leave no motion. A run that fails raises nothing: `status` and `message` of the
-    trajectory say why it stopped, and what was reached is kept. Ctrl-C ends a run at its next step and raises
-    `Interrupted`, a KeyboardInterrupt, whose `trajectory` is what was reached; a second one while the outputs of that
-    are evaluated keeps those that are.
+    trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run at its next step and raises
+    `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a second Ctrl-C while their
+    outputs are evaluated keeps those that are finished.
     """
     _refuse_unknown(settings)
     t_end = _end(t_end)
@@ -142,7 +141,7 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm) -> Tr
     for t, y in zip(times, raw.states, strict=False):
         try:
             seen.append(system.evaluate(t, y[: system.nq], y[system.nq : -1], algorithm))
-        except NotFiniteError as error:  # squares overflow before the state does
+        except NotFiniteError as error:  # squares overflow earlier than the state itself
             if status is Status.OK:
                 status, stopped_at, message = Status.NONFINITE, float(t), f"stopped at t = {t:g} s: {error}"
             break

@@ -1,4 +1,4 @@
-"""What a run says about itself in a terminal."""
+"""The summary of a run in a terminal."""
 
 from __future__ import annotations
 

@@ -33,7 +33,7 @@ class MarkerPath:
 
 @dataclass(frozen=True)
 class Statistics:
-    """What a run cost: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
+    """The cost of a run: seconds of compiling (or of reading compiled kernels), of integrating, of evaluating outputs.
 
     `factorisations` counts those of a matrix of the size of the state, or of its exponential.
     """
@@ -93,7 +93,7 @@ class Trajectory:
 
     @property
     def energy_scale(self) -> float:
-        """What a drift of energy is compared with (J): the largest change of work or of any kind of energy."""
+        """The scale of a drift of energy (J): the largest change of work or of any kind of energy."""
         changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
         return max(*changes, float(np.max(self.energy["kinetic"])))
 

@@ -1,8 +1,8 @@
 """Compile ahead: `python -m flexmb.run.warm_up` fills the disk cache, so that the first real run starts at once.
 
-Everything depends on types only, not on the scene: one small scene of each kind compiles what every scene of its kind
-runs. Without arguments that is what `simulate` does with a tree by its defaults; --method, --algorithm and --scene add
-others.
+Compiled kernels depend on types only, not on the scene: one small scene of each kind compiles all that other scenes of
+its kind run. Without arguments these are the kernels that `simulate` runs for a tree by its defaults; --method,
+--algorithm and --scene add others.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an algorithm declares about itself: the last lines of its file. `algorithms` lists all of them."""
+"""The declaration of an algorithm, which stands in the last lines of its file. `algorithms` lists all of them."""
 
 from __future__ import annotations
 

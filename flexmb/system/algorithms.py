@@ -1,4 +1,4 @@
-"""The algorithms there are, each declared in its own file, and the names of those that can do something."""
+"""All algorithms, each declared in its own file, and the names of those with a certain ability."""
 
 from __future__ import annotations
 

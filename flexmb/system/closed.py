@@ -90,7 +90,7 @@ class ClosedSystem(System):
         return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
-        """By closure, how far it is open: distance (m) and angle (rad, its sine) along what it suppresses."""
+        """By closure, how far it is open along what it suppresses: distance (m) and angle (rad, its sine)."""
         return self.closures.gaps(*self.layout.entering(state))
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
@@ -131,7 +131,7 @@ class ClosedSystem(System):
             )
 
     def fault_name(self, status: int, fault: int) -> str:
-        """What a failure's number stands for: a closure or a body."""
+        """Name of the closure or body that the number of a failure stands for."""
         if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)

@@ -72,7 +72,7 @@ class MassMatrixFactors:
         return int(self._w.fault[0])
 
     def solve(self, b: Real) -> Real:
-        """M^-1 b for b (nu,) or (nu,m); as of its kin, ValueError or TypeError for an array that is not that."""
+        """M^-1 b for b (nu,) or (nu,m); this and all products raise ValueError or TypeError for other arrays."""
         return self._by_columns(factorisation.solve, b)
 
     def half_solve(self, b: Real) -> Real:
@@ -80,7 +80,7 @@ class MassMatrixFactors:
         return self._by_columns(factorisation.half_solve, b)
 
     def half_multiply(self, y: Real) -> Real:
-        """F y for y (nu,) or (nu,m): what `half_solve` undoes; F itself of the unit matrix."""
+        """F y for y (nu,) or (nu,m), the inverse of `half_solve`; with the unit matrix, F itself."""
         return self._by_columns(factorisation.half_multiply, y)
 
     def multiply(self, x: Real) -> Real:

@@ -50,7 +50,7 @@ class Precision(NamedTuple):
 
     @property
     def warning(self) -> str:
-        """What `PrecisionWarning` says."""
+        """The text of a `PrecisionWarning`."""
         return (
             f"about {self.digits:.0f} of 16 digits of the accelerations are left: the inertia that body "
             f'"{self.body}" moves nearly vanishes beside what it is summed from; bring masses, inertias and lengths '
@@ -66,7 +66,7 @@ class ConsistentMotion(NamedTuple):
 
 
 class Mechanics:
-    """What a `System` answers about its equations of motion. It writes into one workspace."""
+    """Everything that a `System` can be asked about its equations of motion. It writes into one workspace."""
 
     constants: Constants
     layout: Layout
@@ -110,7 +110,8 @@ class Mechanics:
         return factors
 
     def digits_left(self, state: State) -> float:
-        """Significant decimal digits, 0 to 16, of the accelerations of the free speeds that rounding leaves: estimated.
+        """Estimate of the significant decimal digits, 0 to 16, that rounding leaves of the accelerations of the free
+        speeds.
 
         From the largest magnification of a rounding of the inertias by M^-1 over all loads, in units that do not
         matter (`flexmb.jain.precision`), in O(N). Single accelerations may be better. Of closed chains: those of the
@@ -131,8 +132,8 @@ class Mechanics:
     def inverse_dynamics(self, state: State, accelerations: Real) -> Real:
         """tau (nu,) = M udot + c of accelerations (nu,), in O(N): Jain & Rodriguez (45).
 
-        Nothing drives a structure but its hinges and wheels: where the modal rows of tau (`modal_residual`) do not
-        vanish, the accelerations are not consistent with each other, and tau is not what motors would have to do.
+        Only its hinges and wheels drive a structure. Where the modal rows of tau (`modal_residual`) do not vanish, the
+        accelerations are not consistent with each other, and tau is not the load that motors would have to exert.
         `consistent_inverse_dynamics` finds the modal accelerations that belong to given hinge accelerations.
         """
         t, y = self.layout.entering(state)
@@ -145,7 +146,7 @@ class Mechanics:
         return {name: tau[place] for name, place in places.items() if place.stop > place.start}
 
     def consistent_inverse_dynamics(self, state: State, accelerations: Real) -> ConsistentMotion:
-        """Inverse dynamics of hinges and wheels that accelerate as told, structures following without modal forces.
+        """Inverse dynamics of hinges and wheels with given accelerations, which structures follow without modal forces.
 
         The modal entries of `accelerations` (nu,) are not used; those of prescribed coordinates are. Costs O(N).
         """
@@ -167,7 +168,7 @@ class Mechanics:
         return finite_result(self._w.speed["applied"].copy(), t)
 
     def fault_name(self, status: int, fault: int) -> str:
-        """What a failure's number stands for: a body."""
+        """Name of the body that the number of a failure stands for."""
         return self.body_names[fault]
 
     def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:

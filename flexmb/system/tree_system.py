@@ -74,8 +74,8 @@ class System(Mechanics):
     def state(self, q: Real, u: Real, t: float = 0.0) -> State:
         """State from q (nq,), u (nu,) and t (s), copies; quaternions need not have unit length, they are scaled.
 
-        ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, TypeError for what are no
-        real numbers.
+        Raises ValueError where lengths do not fit, numbers are not finite or a quaternion is zero, and TypeError for
+        anything but real numbers.
         """
         return self.layout.state(q, u, t)
 

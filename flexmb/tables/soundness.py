@@ -1,4 +1,4 @@
-"""Whether numbers from outside can be used, in a fifth of a microsecond."""
+"""A check whether numbers from outside can be used, which takes a fifth of a microsecond."""
 
 import math
 

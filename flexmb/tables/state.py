@@ -1,6 +1,7 @@
-"""The state of a system at one time, which system's it is, and the error of a state that has no accelerations.
+"""The state of a system at one time, the system it belongs to, and the error of a state that has no accelerations.
 
-What enters a kernel from outside enters here, through `Layout`: kernels trust the lengths and types of their arrays.
+Everything that enters a kernel from outside passes `Layout`, because kernels trust the lengths and types of their
+arrays.
 """
 
 from __future__ import annotations
@@ -22,11 +23,11 @@ class DynamicsError(ArithmeticError):
 
 
 class NotFiniteError(DynamicsError):
-    """A state is finite, and what follows from it is not: numbers overflow."""
+    """A state is finite, but its accelerations or other results overflow."""
 
 
 class PrecisionWarning(UserWarning):
-    """Rounding leaves few digits of the accelerations at this state; the message says how many, and where they go."""
+    """Rounding leaves few digits of the accelerations at this state; the message says how many, and why."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""Status codes of a run: what a kernel returns instead of raising, and what to do about it."""
+"""Status codes of a run: a kernel returns one instead of raising; each has advice on what to do."""
 
 from __future__ import annotations
 

@@ -92,13 +92,15 @@ def faults_of_rooms(page: str, package: str, order: Layers) -> list[str]:
 
 
 def faults_of_names(text: str, root: Path = ROOT) -> list[str]:
-    """Files and folders that the text names but that do not exist, and names that their files do not define."""
+    """Files and folders that the text names but that do not exist, and names that their files do not define.
+
+    `<name>` in a path stands for any: the new file has neighbours there.
+    """
     faults = []
     for path, name in re.findall(r"`((?:flexmb|crosscheck|tests|docs|cases|\.ci)/[\w./<>-]*)(?::(\w+))?`", text):
-        place = root / path.partition("<")[0]
-        if not place.exists():
+        if not any(root.glob(re.sub(r"<\w+>", "*", path).rstrip("/"))):
             faults.append(f"{path} does not exist")
-        elif name and not _defines(place.read_text(encoding="utf-8"), name):
+        elif name and not _defines((root / path).read_text(encoding="utf-8"), name):
             faults.append(f"{path} does not define {name}")
     return faults
 

@@ -59,7 +59,7 @@ def equivalence(
     (3,) m: a hinge to be judged beside the best one. Raises ValueError as `best_hinge` does.
     """
     if not 0.0 < accuracy < 1.0:
-        raise ValueError(f"accuracy is a part of one, such as 0.05, got {accuracy:g}")
+        raise ValueError(f"accuracy is a fraction between 0 and 1, such as 0.05, got {accuracy:g}")
     best = best_hinge(body, axes, modes)
     axes, modes = best.hinge.axes, best.modes
     fits = {AT_CLAMP: fit_at(body, np.zeros(3), axes, modes), BEST: best}

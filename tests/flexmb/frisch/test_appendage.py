@@ -120,7 +120,7 @@ def test_command_prints_tables_and_writes_a_picture(tmp_path):
         (("panel", "--axis", "up"), "--axis is x, y, z or three numbers"),
         (("panel", "--point", "1,2"), "--point is"),
         (("panel", "--mode", "99"), "it has modes 1 to"),
-        (("panel", "--accuracy", "5"), "a part of one"),
+        (("panel", "--accuracy", "5"), "a fraction between 0 and 1"),
     ],
 )
 def test_command_says_what_is_wrong(tmp_path, words, message):

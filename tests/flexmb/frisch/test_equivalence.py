@@ -335,5 +335,5 @@ def test_verdicts_follow_the_numbers():
     assert [verdict.better for verdict in best.verdicts] == ["either", "flexible", "rigid", "rigid"]
     assert "modes other than 1 have 38.7 % of the mass" in best.verdicts[1].reason
     assert equivalence(cantilever(1)).verdicts[1].better == "rigid"  # no other modes to speak of
-    with pytest.raises(ValueError, match="a part of one"):
+    with pytest.raises(ValueError, match="a fraction between 0 and 1"):
         equivalence(cantilever(), accuracy=5.0)
