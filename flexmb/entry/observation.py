@@ -23,6 +23,8 @@ from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
+Places = dict[str, tuple[slice, tuple[int, ...]]]
+
 
 @bundle
 class Outputs:
@@ -52,19 +54,24 @@ def shapes(speeds: int, markers: int, hinges: int, wheels: int) -> dict[str, tup
     }
 
 
-def parts(every: Real, of: Mapping[str, tuple[int, ...]]) -> dict[str, Real]:
-    """Views of a row of numbers, by name."""
+def places(of: Mapping[str, tuple[int, ...]]) -> Places:
+    """Where parts of these shapes lie in a row."""
     found, start = {}, 0
     for name, shape in of.items():
         stop = start + math.prod(shape)
-        found[name], start = every[start:stop].reshape(shape), stop
+        found[name], start = (slice(start, stop), shape), stop
     return found
+
+
+def parts(every: Real, of: Places) -> dict[str, Real]:
+    """Views of a row of numbers, by name."""
+    return {name: every[place].reshape(shape) for name, (place, shape) in of.items()}
 
 
 def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: Index) -> Outputs:
     """Outputs of these shapes, for markers at these ports of these bodies."""
     every = np.zeros(sum(math.prod(shape) for shape in of.values()))
-    return Outputs(marker_body, marker_port, np.zeros(of["rates"]), every, **parts(every, of))
+    return Outputs(marker_body, marker_port, np.zeros(of["rates"]), every, **parts(every, places(of)))
 
 
 @kernel

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection
 
 from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.system.by_composite_bodies import ALGORITHM as COMPOSITE
@@ -22,6 +22,8 @@ WITH_JACOBIAN = tuple(each.name for each in ALGORITHMS.values() if each.jacobian
 NESTED = tuple(each.name for each in ALGORITHMS.values() if each.errata is not None)
 
 
-def chosen(name: str, among: Iterable[str] = ALGORITHMS) -> DynamicsAlgorithm:
+def chosen(name: str, among: Collection[str] = ALGORITHMS) -> DynamicsAlgorithm:
     """The algorithm of that name; ValueError for a name that is not `among` those."""
-    return ALGORITHMS[arguments.one_of("algorithm", name, among)]
+    if not (isinstance(name, str) and name in among):  # asked at every evaluation: no sentence is written for nothing
+        arguments.one_of("algorithm", name, among)
+    return ALGORITHMS[name]

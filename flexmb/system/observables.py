@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flexmb.entry.observation import outputs, parts, shapes
+from flexmb.entry.observation import outputs, parts, places, shapes
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
 
@@ -62,14 +62,14 @@ class Observation:
     """The arrays that kernels fill at one state, `out`, and an `Evaluation` made of them."""
 
     def __init__(self, names: Names, speeds: int) -> None:
-        self._names = names
-        self._shapes = shapes(speeds, len(names.markers), len(names.hinges), len(names.wheels))
-        places = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
-        self.out = outputs(self._shapes, places[:, 0].copy(), places[:, 1].copy())
+        of = shapes(speeds, len(names.markers), len(names.hinges), len(names.wheels))
+        at = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
+        self._names, self._places = names, places(of)
+        self.out = outputs(of, at[:, 0].copy(), at[:, 1].copy())
 
     def evaluation(self, t: float) -> Evaluation:
         """A copy of what was filled last; DynamicsError where a number is not finite."""
-        names, found = self._names, parts(finite_result(self.out.every, t).copy(), self._shapes)
+        names, found = self._names, parts(finite_result(self.out.every, t).copy(), self._places)
         return Evaluation(
             accelerations=found["rates"],
             markers={
