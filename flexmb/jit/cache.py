@@ -27,7 +27,7 @@ from numba.core.compiler import CompileResult
 from numba.core.serialize import dumps
 
 from flexmb.jit.fingerprint import fingerprint
-from flexmb.jit.folder import forget, used, warn_once
+from flexmb.jit.folder import delete_unused, mark_used, warn_once
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -62,7 +62,7 @@ class KernelCache(NullCache):
         if _digest(file, contents) != data[:_DIGEST]:
             self._discard(file)
             return None
-        used(file)
+        mark_used(file)
         return CompileResult._rebuild(target_context, *pickle.loads(contents))
 
     def save_overload(self, sig: Any, data: Any) -> None:
@@ -75,7 +75,7 @@ class KernelCache(NullCache):
             self._folder.mkdir(parents=True, exist_ok=True)
             written.write_bytes(_digest(file, contents) + contents)
             os.replace(written, file)
-            forget(self._folder)
+            delete_unused(self._folder)
         except OSError as problem:
             if not file.is_file():  # else another process was faster
                 warn_once(

@@ -128,7 +128,7 @@ class _Words:
                 names[code.co_names[number >> 1]] = None  # the last bit is no part of the number
             else:
                 arguments[i] = 0
-                if not _is_told(code, operations[i + 1 : i + 2], arguments[i + 1 : i + 2]):
+                if not _is_docstring(code, operations[i + 1 : i + 2], arguments[i + 1 : i + 2]):
                     constants.append(code.co_consts[number])
         yield operations
         yield bytes(arguments)
@@ -221,8 +221,8 @@ class _FileWords(_Words):
         return None
 
 
-def _is_told(code: CodeType, operation: bytes, argument: Sequence[int]) -> bool:
-    """Whether the next instruction stores a constant as the docstring of a file or class, or as its line."""
+def _is_docstring(code: CodeType, operation: bytes, argument: Sequence[int]) -> bool:
+    """Whether the instruction after a constant stores it as the docstring of a file or class, or as its line."""
     return operation == _STORE and code.co_names[argument[0]] in ("__doc__", "__firstlineno__")
 
 

@@ -1,4 +1,8 @@
-"""The folder of compiled kernels: where it is, and how long files stay there."""
+"""The folder of compiled kernels: where it is, and how long files stay there.
+
+Every edit of the sources leaves kernels behind that nobody asks for any more, but no file tells whether an older state
+of the sources will come back. So a file is as young as its last use, and what was not used for two months is deleted.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +17,7 @@ from pathlib import Path
 
 from numba import config
 
-_FORGOTTEN = 60 * 24 * 3600.0  # s since a file was last used
+_UNUSED = 60 * 24 * 3600.0  # s since a file was last used
 
 
 @cache
@@ -47,16 +51,16 @@ def _of_the_user() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache", "numba")
 
 
-def used(file: Path) -> None:
-    """Note that a file is of use."""
+def mark_used(file: Path) -> None:
+    """Make a file as young as one that was just written."""
     with suppress(OSError):
         os.utime(file)
 
 
 @cache
-def forget(directory: Path) -> None:
-    """Delete, once in a process, the files that nobody has used for two months: kernels of earlier sources."""
-    oldest = time.time() - _FORGOTTEN
+def delete_unused(directory: Path) -> None:
+    """Delete, once in a process, the files that nobody has used for two months."""
+    oldest = time.time() - _UNUSED
     with suppress(OSError):
         for file in directory.iterdir():
             with suppress(OSError):

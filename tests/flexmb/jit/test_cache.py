@@ -12,7 +12,7 @@ import pytest
 
 from flexmb.jit import folder as folders
 from flexmb.jit import hooks
-from flexmb.jit.folder import cache_directory, forget, warn_once
+from flexmb.jit.folder import cache_directory, delete_unused, warn_once
 from flexmb.jit.kernel import kernel
 
 ROOT = Path(__file__).parents[3]
@@ -85,7 +85,7 @@ def hits(cache: Path, monkeypatch) -> int:
     """Versions of the kernel that were found in a cache: of two."""
     monkeypatch.setattr(hooks, "cache_directory", lambda: cache / "sources")
     warn_once.cache_clear()
-    forget.cache_clear()
+    delete_unused.cache_clear()
     fresh = kernel(weighted)
     assert fresh(np.arange(4), 2.0) == 12.0
     assert fresh(np.array([0.5, 0.25]), 2.0) == 1.5
