@@ -10,7 +10,7 @@ R b x a.
 """
 
 from flexmb.closure.tables import ON_GROUND, ROTATION
-from flexmb.jain.kinematics import port_acceleration, port_velocity
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import (
     add,

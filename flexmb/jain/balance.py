@@ -2,7 +2,7 @@
 
 from flexmb.hinges.catalogue import SPHERICAL
 from flexmb.jain.forces import load_vector
-from flexmb.jain.kinematics import port_velocity
+from flexmb.jain.ports import port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia

@@ -1,6 +1,7 @@
 """What acts on the bodies besides inertia: elasticity, hinge springs and motors, loads at nodes, wheels."""
 
-from flexmb.jain.kinematics import add_force, port_bias, port_velocity
+from flexmb.jain.kinematics import add_force
+from flexmb.jain.ports import port_bias, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
 from flexmb.spatial.vector import (

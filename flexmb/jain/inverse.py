@@ -4,17 +4,11 @@ tau holds inertia, gravity, elasticity and node loads; hinge springs and motors 
 vanish where the accelerations are consistent with an undriven structure.
 """
 
+from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import elastic_forces, node_loads
-from flexmb.jain.kinematics import (
-    acceleration_sweep,
-    add_force,
-    motion_column,
-    port_acceleration,
-    port_velocity,
-    pose_sweep,
-    velocity_sweep,
-)
+from flexmb.jain.kinematics import add_force, motion_column, pose_sweep, velocity_sweep
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia

@@ -3,7 +3,8 @@
 Total load (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
 """
 
-from flexmb.jain.kinematics import motion_column, port_acceleration, port_velocity
+from flexmb.jain.kinematics import motion_column
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.vector import add, axpy, cross, dot, mat3, scale, store3, sub, times, vec3

@@ -60,6 +60,12 @@ def dot6(V, F):
 
 
 @helper
+def less6(s, V, F):
+    """s - V' F: what a load, or a motion, leaves of s; the angular part is taken off first."""
+    return s - dot(V[0], F[0]) - dot(V[1], F[1])
+
+
+@helper
 def times6(R, V):
     """Components in axes A from components in axes B, with R = R_AB."""
     return times(R, V[0]), times(R, V[1])
@@ -75,6 +81,12 @@ def times6_t(R, V):
 def shift_motion(V, d):
     """phi' V: the motion of O as a point of a body whose motion is known about Q."""
     return V[0], add(V[1], cross(V[0], d))
+
+
+@helper
+def shift_acceleration(A, V, d):
+    """Acceleration of O as a point of a body that moves by V, A about Q: phi' A and the centripetal w x (w x d)."""
+    return A[0], add(A[1], add(cross(A[0], d), cross(V[0], cross(V[0], d))))
 
 
 @helper

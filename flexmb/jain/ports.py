@@ -1,0 +1,58 @@
+"""Motion of ports: frames fixed to points of bodies that may deform, where hinges, wheels, loads and markers sit."""
+
+from flexmb.jit.kernel import helper
+from flexmb.levels.field import field_motion, second_order_motion
+from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, vec6
+from flexmb.spatial.vector import add, cross, mat3, matmul, scale, store3, store9, vec3
+
+
+@helper
+def move_port(c, w, k, i):
+    """Pose and relative motion of port i of body k, from eta and etadot in w.mode."""
+    if c.body[k].modes == 0:
+        return  # set once in the workspace
+    x = vec3(c.port[i].position, 0)
+    offset = vec3(c.port[i].offset, 0)
+    row = c.port[i].second
+    if row >= 0:
+        r, R, w_rel, v_rel, alpha, a = second_order_motion(
+            x, offset, c.port_mode[i], c.second_shape[row], w.mode[k], c.body[k].modes, w.port_mode[i]
+        )
+    else:
+        r, R, w_rel, v_rel, alpha, a = field_motion(
+            x, offset, c.port_mode[i], w.mode[k], c.body[k].modes, w.port_mode[i]
+        )
+    store3(w.port[i].r, 0, r)
+    store9(w.port[i].R, 0, matmul(R, mat3(c.port[i].frame, 0)))
+    store6(w.port[i].v, 0, (w_rel, v_rel))
+    store6(w.port[i].a, 0, (alpha, a))
+
+
+@helper
+def mode_motion(w, i, n):
+    """Column n of Pi_i: velocity of port i relative to its body by the speed of mode n, body axes."""
+    return vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+
+
+@helper
+def port_velocity(w, k, i):
+    """Velocity of port i of body k, body axes (5)."""
+    return sum6(shift_motion(vec6(w.body[k].velocity, 0), vec3(w.port[i].r, 0)), vec6(w.port[i].v, 0))
+
+
+@helper
+def port_bias(w, k, i):
+    """Acceleration of port i at zero acceleration of the body origin and etaddot = 0, body axes."""
+    omega = vec3(w.body[k].velocity, 0)
+    w_rel, v_rel = vec6(w.port[i].v, 0)
+    inner = add(cross(omega, vec3(w.port[i].r, 0)), scale(2.0, v_rel))
+    return sum6(vec6(w.port[i].a, 0), (cross(omega, w_rel), cross(omega, inner)))
+
+
+@helper
+def port_acceleration(c, w, k, i):
+    """Acceleration of port i, minus gravity, body axes."""
+    A = sum6(port_bias(w, k, i), shift_motion(vec6(w.body[k].accel, 0), vec3(w.port[i].r, 0)))
+    for n in range(c.body[k].modes):
+        A = axpy6(w.mode[k, n].etadd, mode_motion(w, i, n), A)
+    return A
