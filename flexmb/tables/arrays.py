@@ -189,8 +189,9 @@ BODY_STATE = _record(
     ("force", _F, (6,)),  # rigid part of the bias force
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
-    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)' by free speed
-    ("hinge_factor", _F, (6, 6)),  # Cholesky factor of D_R
+    # by free speed; of a hinge with a single axis as flexmb.jain.hinge_solve has it
+    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)'
+    ("hinge_factor", _F, (6, 6)),  # Cholesky factor L of D_R
     ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
     ("free_speed", _I, (6,)),  # the hinge's speeds that are free
     ("free_count", _I),
