@@ -7,7 +7,8 @@ from flexmb.jain.loads import drive_loads
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import load_state, store_slope
-from flexmb.spatial.vector import mat3, store3, times, vec3
+from flexmb.spatial.spatial_vector import store6, times6, vec6
+from flexmb.spatial.vector import mat3
 from flexmb.tables.status import OK
 
 
@@ -49,5 +50,4 @@ def world_loads(c, w, loads):
     """w.body.load of every body in World axes."""
     for k in range(c.body.shape[0]):
         R = mat3(w.body[k].pose_rotation, 0)
-        store3(loads[k], 0, times(R, vec3(w.body[k].load, 0)))
-        store3(loads[k], 3, times(R, vec3(w.body[k].load, 3)))
+        store6(loads[k], 0, times6(R, vec6(w.body[k].load, 0)))

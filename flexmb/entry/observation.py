@@ -12,13 +12,16 @@ from collections.abc import Mapping
 import numpy as np
 
 from flexmb.entry.articulated import world_loads
+from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.balance import energy_and_momentum
-from flexmb.jain.kinematics import acceleration_sweep, port_acceleration, port_velocity, pose_sweep, velocity_sweep
+from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import load_state
+from flexmb.spatial.spatial_vector import store6, times6
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
@@ -124,14 +127,11 @@ def _observe_motion(c, w, out):
 def _observe_marker(c, w, k, port, row):
     """The row (24,) of a marker at a port of body k."""
     R = mat3(w.body[k].pose_rotation, 0)
-    omega, v = port_velocity(w, k, port)
-    alpha, a = port_acceleration(c, w, k, port)
+    alpha, a = times6(R, port_acceleration(c, w, k, port))
     store3(row, 0, add(vec3(w.body[k].pose_position, 0), times(R, vec3(w.port[port].r, 0))))
     store9(row, 3, matmul(R, mat3(w.port[port].R, 0)))
-    store3(row, 12, times(R, omega))
-    store3(row, 15, times(R, v))
-    store3(row, 18, times(R, alpha))
-    store3(row, 21, add(times(R, a), vec3(c.gravity, 0)))
+    store6(row, 12, times6(R, port_velocity(w, k, port)))
+    store6(row, 18, (alpha, add(a, vec3(c.gravity, 0))))
 
 
 @helper
@@ -140,6 +140,4 @@ def _world_wheel_loads(c, w, loads):
     for k in range(c.body.shape[0]):
         R = mat3(w.body[k].pose_rotation, 0)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            tau, f = wheel_load(c, w, k, i)
-            store3(loads[i], 0, times(R, tau))
-            store3(loads[i], 3, times(R, f))
+            store6(loads[i], 0, times6(R, wheel_load(c, w, k, i)))
