@@ -1,17 +1,17 @@
 """What one hinge does in the sweeps, by the factor of its D_R = L L': the only place that knows a single axis.
 
-H holds the free speeds of hinge k; P_R and z_R are the articulated inertia and force of body k about O, without its
-modes. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64), `eliminate` leaves
-G L = P_R H' L'^-1 in `hinge_gain`, L in `hinge_factor` and L^-1 epsilon in `hinge_residual`. What is solved with these
-factors later:
+P_R and z_R are the articulated inertia and force of body k about O, without its modes; the rows of H are the motions of
+the hinge's free speeds. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64), `eliminate` leaves
+G L = P_R H' L'^-1 in `hinge_gain`, L in `hinge_factor` and L^-1 epsilon in `hinge_residual`. `accelerate` takes the
+residual outward. The others solve with the same factors for a response:
 
-    innovate      y = L^-1 (T - H z)           z^+ = z + G L y                  inward
-    solve         x = L'^-1 (y - (G L)'alpha^+)    alpha = alpha^+ + H' x       outward
-    synthesise    T = L y + H z                z^+ = z + G L y                  inward, undoes `innovate`
-    excite        y = L' x + (G L)'alpha^+     alpha = alpha^+ + H' x           outward, undoes `solve`
+    innovate      y = L^-1 (T - H z)               z^+ = z + G L y            inward   (55)
+    solve         x = L'^-1 (y - (G L)'alpha^+)    alpha = alpha^+ + H' x     outward  (56)
+    synthesise    T = L y + H z                    z^+ = z + G L y            inward, undoes `innovate`
+    excite        y = L' x + (G L)'alpha^+         alpha = alpha^+ + H' x     outward, undoes `solve`
 
-T, y and x are the hinge's places in `speed` of a response x, each in place of what it is made from. Prescribed speeds
-are no freedom: H leaves them out, and they are zero in y and x.
+The response holds T, y and x in one array `speed`, each in place of what it is made from. Prescribed speeds are no
+freedom: H leaves them out, and they are zero in y and x.
 
 A hinge with a single axis, one free speed along z, needs no small matrices: H picks a row, and D_R is a number. For
 such a hinge G is kept instead of G L, D_R instead of L, and D_R^-1 epsilon instead of L^-1 epsilon, so that forward
@@ -29,7 +29,7 @@ from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, 
 from flexmb.spatial.pivots import is_rounding, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
-from flexmb.tables.arrays import ANGULAR_Z
+from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
 
 SINGLE = -1  # free_count of a hinge with a single axis
 
@@ -69,7 +69,7 @@ def eliminate(c, w, k):
     j, axis = c.body[k].u_index, c.body[k].axis
     if axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
         return _eliminate_several(c, w, k, P, z)
-    PH = inertia_column(P, 2 if axis == ANGULAR_Z else 5)
+    PH = inertia_column(P, ANGULAR_Z if axis == ANGULAR_Z else LINEAR_Z)  # the compiler sees that there are but two
     D = _along(axis, PH)
     before = w.body[k].inertia[2 if axis == ANGULAR_Z else 17]
     if is_small(c, w, j, D, before) and is_rounding(D, before):
