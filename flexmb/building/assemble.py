@@ -15,6 +15,7 @@ from flexmb.scene.tree import GROUND
 from flexmb.tables import arrays as a
 from flexmb.tables.functions import pack
 
+_AXIS = {catalogue.REVOLUTE: a.ANGULAR_Z, catalogue.PRISMATIC: a.LINEAR_Z}
 DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
 
 
@@ -99,6 +100,7 @@ def assemble(
     body["parent"] = [index.get(link.parent, -1) for link in chain]
     body["level"] = [link.level for link in chain]
     body["hinge_kind"] = [link.kind for link in chain]
+    body["axis"] = [_AXIS.get(link.kind, a.NO_AXIS) for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
     body["q_index"] = [numbering.q[link.hinge.name].start for link in chain]
     body["u_index"] = [numbering.u[link.hinge.name].start for link in chain]

@@ -3,19 +3,19 @@
 By unit loads that pass through the articulated quantities, `Recursion`; all other routes are in `generalised`.
 """
 
-from math import sqrt
-
 from flexmb.closure import generalised
 from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
 from flexmb.closure.factor import choose_rows, factorise, solve
 from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.unit_loads import apply_load, clear_loads, half_solve, pass_inward, pass_outward, pivot
+from flexmb.closure.unit_loads import apply_load, half_solve, pass_inward
+from flexmb.jain import hinge_solve, innovations
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
-from flexmb.jain.sweeps import SINGLE, forward_dynamics, outward
+from flexmb.jain.response import clear, read_speeds, write_speeds
+from flexmb.jain.sweeps import forward_dynamics, outward
 from flexmb.jit.kernel import by_bundle, helper
 from flexmb.motion.coordinates import load_state
-from flexmb.spatial.vector import add3, scale, vec3
+from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
 
 
@@ -32,36 +32,29 @@ def _tree_and_rows(route, s):
 
 @helper
 def _pass_load(route, s, i, x):
-    for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
-        pass_inward(s.c, s.w, s.cw, s.cc.path[j], 0, x)
+    pass_inward(s.c, s.w, s.cc, s.cw, i, x)
 
 
 @helper
 def _pass_outward(route, s, x, v):
-    pass_outward(s.c, s.w, s.cw, x, v)
+    read_speeds(s.cw.response, x)
+    innovations.respond(s.c, s.w, s.cw.response)
+    write_speeds(s.cw.response, v)
 
 
 @helper
 def _accelerate(route, s):
     """In the terms of `flexmb.jain.sweeps`: z_f -= J_f'f, z_R and epsilon likewise, and outward once more."""
     c, w, cc, cw = s.c, s.w, s.cc, s.cw
-    clear_loads(c, cw)
+    clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
-        tau, f = load_on_b(cc, cw, i)
-        apply_load(c, w, cc, cw, i, 0, tau, f)
-    x = cw.coefficient
-    for k in range(c.body.shape[0] - 1, -1, -1):
-        pass_inward(c, w, cw, k, 0, x)
+        apply_load(c, w, cc, cw, i, load_on_b(cc, cw, i))
+    innovations.innovations(c, w, cw.response)
+    for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
-            w.mode[k, n].zf -= x[c.body[k].etad_index + n]
-        add3(w.body[k].hinge_force, 0, scale(-1.0, vec3(cw.force[k, 0], 0)))
-        add3(w.body[k].hinge_force, 3, scale(-1.0, vec3(cw.force[k, 0], 3)))
-        j = c.body[k].u_index
-        if w.body[k].free_count == SINGLE:
-            w.body[k].hinge_residual[0] += x[j] / sqrt(pivot(c, w, k))
-        else:
-            for n in range(w.body[k].free_count):
-                w.body[k].hinge_residual[n] += x[j + n]
+            w.mode[k, n].zf -= cw.response.speed[c.body[k].etad_index + n]
+        add6(w.body[k].hinge_force, 0, vec6(cw.response.body[k].force, 0))
+        hinge_solve.add_innovations(c, w, cw.response, k)
     outward(c, w)
     drive_loads(c, w)
 
@@ -82,7 +75,7 @@ def _locate(route, t, y, s):
 # A route with an array "speed" is one of generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
 free_tree = by_bundle("speed", generalised.tree_and_rows, _tree_and_rows)
-# (s, i, x): x, zero before, of the load in slot 0 of the bodies on the path of closure i.
+# (s, i, x): x of the forces in cw.response on the bodies on the path of closure i.
 pass_load = by_bundle("speed", generalised.pass_load, _pass_load)
 # (s, x, v): v = M^-1 J'f, the change of all speeds, where x is that of the rows' loads f.
 respond = by_bundle("speed", generalised.respond, _pass_outward)

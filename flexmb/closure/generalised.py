@@ -11,14 +11,17 @@ of the hinge: so its components along the hinge's motions are what springs and m
 """
 
 from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.unit_loads import apply_load, apply_unit_load, clear_body, clear_loads, project_inward
+from flexmb.closure.unit_loads import apply_load, apply_unit_load
 from flexmb.jain import composite, innovations
+from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.inverse import inverse_dynamics
-from flexmb.jain.kinematics import acceleration_sweep, pose_sweep, velocity_sweep
+from flexmb.jain.kinematics import pose_sweep, velocity_sweep
+from flexmb.jain.response import clear, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import by_bundle, helper
 from flexmb.motion.coordinates import load_state
-from flexmb.spatial.vector import add3, mat3, matmul, scale, times, transpose, vec3
+from flexmb.spatial.spatial_vector import add6, times6, vec6
+from flexmb.spatial.vector import mat3, matmul, transpose
 from flexmb.tables.status import OK
 
 
@@ -35,12 +38,10 @@ def _by_composite_bodies(route, c, w):
 @helper
 def _half_by_recursion(x, c, w, T):
     """F^-1 T in place of T, Jain & Rodriguez (55)."""
-    innovations.clear(c, x)
-    for j in range(T.shape[0]):
-        x.speed[j].applied = T[j]
+    clear(c, x)
+    read_speeds(x, T)
     innovations.innovations(c, w, x)
-    for j in range(T.shape[0]):
-        T[j] = x.speed[j].innovation
+    write_speeds(x, T)
 
 
 @helper
@@ -60,11 +61,9 @@ def _half_by_composite_bodies(m, c, w, T):
 @helper
 def _rest_by_recursion(x, c, w, y, v):
     """v = F'^-1 y, the outward half of (56)."""
-    for j in range(y.shape[0]):
-        x.speed[j].innovation = y[j]
+    read_speeds(x, y)
     innovations.respond(c, w, x)
-    for j in range(y.shape[0]):
-        v[j] = x.speed[j].acceleration if c.speed[j].prescribed < 0 else 0.0
+    write_speeds(x, v)
 
 
 @helper
@@ -110,25 +109,17 @@ def _half_solve(s):
     """J' of every row into cw.half, then F^-1 J'."""
     c, cc, cw = s.c, s.cc, s.cw
     for i in range(cc.closure.shape[0]):
-        start, stop = cc.closure[i].row_start, cc.closure[i].row_stop
-        for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
-            clear_body(c, cw, cc.path[j])
-        for r in range(start, stop):
-            for j in range(cw.half.shape[1]):
-                cw.half[r, j] = 0.0
+        for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             apply_unit_load(c, s.seen, cc, cw, i, r)
-        for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
-            for r in range(start, stop):
-                project_inward(c, s.seen, cw, cc.path[j], r - start, cw.half[r])
-        for r in range(start, stop):
-            _half(s.route, c, s.w, cw.half[r])
+            pass_load(s.route, s, i, cw.half[r])
 
 
 @helper
 def pass_load(route, s, i, T):
-    """F^-1 of the generalised forces T of the load in slot 0 of the bodies on the path of closure i, in its place."""
+    """F^-1 of the generalised forces of the forces in cw.response on the path of closure i, into T (nu,)."""
     for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
-        project_inward(s.c, s.seen, s.cw, s.cc.path[j], 0, T)
+        innovations.project(s.c, s.seen, s.cw.response, s.cc.path[j])
+    write_speeds(s.cw.response, T)
     _half(s.route, s.c, s.w, T)
 
 
@@ -159,23 +150,18 @@ def accelerate(route, s):
 def hinge_and_drive_loads(route, s):
     """w.body.load and w.speed.drive for the accelerations and closure loads found; the factors of M are lost."""
     c, w, cc, cw = s.c, s.w, s.cc, s.cw
-    tau, T = cw.step, cw.coefficient
+    tau, T = cw.step, cw.response.speed
     inverse_dynamics(c, w, tau)
-    clear_loads(c, cw)
+    clear(c, cw.response)
     for i in range(cc.closure.shape[0]):
-        torque, force = load_on_b(cc, cw, i)
-        apply_load(c, s.seen, cc, cw, i, 0, torque, force)
-    for j in range(T.shape[0]):
-        T[j] = 0.0  # wheels, on which closures do not act
+        apply_load(c, s.seen, cc, cw, i, load_on_b(cc, cw, i))
     for k in range(c.body.shape[0] - 1, -1, -1):
-        project_inward(c, s.seen, cw, k, 0, T)
-        torque, force = vec3(cw.force[k, 0], 0), vec3(cw.force[k, 0], 3)
+        innovations.project(c, s.seen, cw.response, k)
+        F = vec6(cw.response.body[k].force, 0)
         i = c.body[k].outboard_port
         if i >= 0:
-            turn = matmul(mat3(w.port[i].R, 0), transpose(mat3(s.seen.port[i].R, 0)))
-            torque, force = times(turn, torque), times(turn, force)
-        add3(w.body[k].load, 0, scale(-1.0, torque))
-        add3(w.body[k].load, 3, scale(-1.0, force))
+            F = times6(matmul(mat3(w.port[i].R, 0), transpose(mat3(s.seen.port[i].R, 0))), F)
+        add6(w.body[k].load, 0, F)
     for j in range(T.shape[0]):
         w.speed[j].drive = tau[j] - w.speed[j].applied - T[j] if c.speed[j].prescribed >= 0 else 0.0
     pose_sweep(c, w)

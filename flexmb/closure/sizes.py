@@ -19,9 +19,10 @@ from math import sqrt
 
 from flexmb.closure.factor import norm
 from flexmb.closure.forces import pass_load
-from flexmb.closure.unit_loads import at_port, clear_body
+from flexmb.closure.unit_loads import at_port, clear_path
+from flexmb.jain.ports import mode_motion
 from flexmb.jit.kernel import helper
-from flexmb.spatial.vector import dot, vec3
+from flexmb.spatial.spatial_vector import dot6
 
 _ZERO = (0.0, 0.0, 0.0)
 _AXES = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
@@ -35,39 +36,30 @@ def measure_ports(s):
         total = 0.0
         for axis in _AXES:
             for side in range(2):
-                total += (cc.length[0] * _response(s, i, cc.side[i, side], axis, _ZERO)) ** 2
-                total += _response(s, i, cc.side[i, side], _ZERO, axis) ** 2
+                total += (cc.length[0] * _response(s, i, cc.side[i, side], (axis, _ZERO))) ** 2
+                total += _response(s, i, cc.side[i, side], (_ZERO, axis)) ** 2
             for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
                 if s.c.body[cc.path[j]].outboard_port >= 0:
-                    total += (cc.length[0] * _reaction(s, i, cc.path[j], axis, _ZERO)) ** 2
-                    total += _reaction(s, i, cc.path[j], _ZERO, axis) ** 2
+                    total += (cc.length[0] * _reaction(s, i, cc.path[j], (axis, _ZERO))) ** 2
+                    total += _reaction(s, i, cc.path[j], (_ZERO, axis)) ** 2
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             cw.size[r] = sqrt(total)
 
 
 @helper
-def _response(s, i, side, tau, f):
+def _response(s, i, side, F):
     """|x| of a load about a port of closure i, port axes."""
-    _clear(s, i)
-    at_port(s.c, s.seen, s.cw, side, 0, tau, f)
+    clear_path(s.c, s.cc, s.cw, i)
+    at_port(s.c, s.seen, s.cw, side, F)
     pass_load(s.route, s, i, s.cw.coefficient)
     return norm(s.cw.coefficient)
 
 
 @helper
-def _reaction(s, i, k, tau, f):
+def _reaction(s, i, k, F):
     """|x| of what the modes of body k feel of a load at the node that its hinge sits on, body axes."""
-    _clear(s, i)
+    clear_path(s.c, s.cc, s.cw, i)
     for n in range(s.c.body[k].modes):
-        column = s.seen.port_mode[s.c.body[k].outboard_port, n]
-        s.cw.modal[k, 0, n] = dot(vec3(column.W, 0), tau) + dot(vec3(column.L, 0), f)
+        s.cw.response.mode[k, n].zf = -dot6(mode_motion(s.seen, s.c.body[k].outboard_port, n), F)
     pass_load(s.route, s, i, s.cw.coefficient)
     return norm(s.cw.coefficient)
-
-
-@helper
-def _clear(s, i):
-    for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
-        clear_body(s.c, s.cw, s.cc.path[j])
-    for j in range(s.cw.coefficient.shape[0]):
-        s.cw.coefficient[j] = 0.0

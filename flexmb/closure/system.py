@@ -66,8 +66,7 @@ class Closures:
     def chain(self, algorithm: Literal["articulated", "composite"], rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
-        bodies, modes = c.mode.shape
-        own = workspace(cc, bodies, modes, len(c.speed))
+        own = workspace(cc, c)
         own.rank[0], own.size[:], own.gain[:] = self.rank, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)

@@ -9,14 +9,13 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jain.places import Matrices
-from flexmb.jain.response import Response
+from flexmb.jain.response import Response, response
 from flexmb.jit.bundle import bundle
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.typing import Index, Real, Record
 
 ROTATION, TRANSLATION = range(2)
 ON_GROUND = -1  # body of a frame that is fixed in World
-ROWS = 6  # the most motions one closure can suppress
 
 _F, _I = np.float64, np.int64
 
@@ -86,11 +85,9 @@ class ClosureWorkspace:
     rank: Index  # (1,) independent rows; -1 until they are counted
     scratch: Real  # (G,)
     size: Real  # (G,) response of the ports of a row's closure by themselves, `flexmb.closure.sizes`
-    force: Real  # (N,ROWS,6) loads on their way inward, body axes
-    modal: Real  # (N,ROWS,m)
+    response: Response  # loads on their way inward, and what they move
     coefficient: Real  # (nu,)
     step: Real  # (nu,) a displacement or a change of speeds
-    accel: Real  # (N,6) of the bodies, per `step`
     former: Real  # (G,nu) `basis` of the last state that a run has accepted, `flexmb.closure.branch`
     former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
@@ -127,9 +124,9 @@ class Closed:
         return self.w.fault
 
 
-def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureWorkspace:
-    """A workspace of the right sizes."""
-    rows = len(c.row)
+def workspace(c: ClosureConstants, tree: Constants) -> ClosureWorkspace:
+    """A workspace of the right sizes for closures on a tree."""
+    rows, nu = len(c.row), len(tree.speed)
     return ClosureWorkspace(
         closure=np.zeros(len(c.closure), CLOSURE_STATE),
         row=np.zeros(rows, ROW_STATE),
@@ -140,11 +137,9 @@ def workspace(c: ClosureConstants, bodies: int, modes: int, nu: int) -> ClosureW
         rank=np.array([-1]),
         scratch=np.zeros(rows),
         size=np.zeros(rows),
-        force=np.zeros((bodies, ROWS, 6)),
-        modal=np.zeros((bodies, ROWS, modes)),
+        response=response(tree),
         coefficient=np.zeros(nu),
         step=np.zeros(nu),
-        accel=np.zeros((bodies, 6)),
         former=np.zeros((rows, nu)),
         former_pivot=np.zeros(rows),
         former_rows=np.arange(rows),

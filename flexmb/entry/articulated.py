@@ -1,15 +1,11 @@
 """Entry points of the compiled recursion: right-hand side, accelerations, and everything observable at one state."""
 
 from flexmb.jain import inverse
+from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.balance import energy_and_momentum, power
-from flexmb.jain.kinematics import (
-    acceleration_sweep,
-    port_acceleration,
-    port_velocity,
-    pose_sweep,
-    velocity_sweep,
-)
+from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
+from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import load_state, store_slope

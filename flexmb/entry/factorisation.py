@@ -1,6 +1,7 @@
 """Entry points of the innovations factorisation of a mass matrix, M = F F': Jain & Rodriguez (54)-(56)."""
 
 from flexmb.jain import innovations, precision
+from flexmb.jain.response import clear, read_speeds, write_speeds
 from flexmb.jit.kernel import helper, kernel
 from flexmb.motion.coordinates import load_state
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -17,56 +18,46 @@ def factorise(t, y, scene, c, w):
 def solve(c, w, x, b):
     """Rows of b (m,nu) replaced by M^-1 b."""
     for row in range(b.shape[0]):
-        _apply(c, x, b[row])
+        _enter(c, x, b[row])
         innovations.innovations(c, w, x)
         innovations.respond(c, w, x)
-        for j in range(b.shape[1]):
-            b[row, j] = x.speed[j].acceleration
+        write_speeds(x, b[row])
 
 
 @kernel
 def half_solve(c, w, x, b):
     """Rows of b (m,nu) replaced by F^-1 b."""
     for row in range(b.shape[0]):
-        _apply(c, x, b[row])
+        _enter(c, x, b[row])
         innovations.innovations(c, w, x)
-        for j in range(b.shape[1]):
-            b[row, j] = x.speed[j].innovation
+        write_speeds(x, b[row])
 
 
 @kernel
 def half_multiply(c, w, x, b):
     """Rows of b (m,nu) replaced by F b."""
     for row in range(b.shape[0]):
-        innovations.clear(c, x)
-        for j in range(b.shape[1]):
-            x.speed[j].innovation = b[row, j]
+        _enter(c, x, b[row])
         innovations.synthesise(c, w, x)
-        for j in range(b.shape[1]):
-            b[row, j] = x.speed[j].applied
+        write_speeds(x, b[row])
 
 
 @kernel
 def multiply(c, w, x, b):
     """Rows of b (m,nu) replaced by M b."""
     for row in range(b.shape[0]):
-        innovations.clear(c, x)
-        for j in range(b.shape[1]):
-            x.speed[j].acceleration = b[row, j]
+        _enter(c, x, b[row])
         innovations.excite(c, w, x)
         innovations.synthesise(c, w, x)
-        for j in range(b.shape[1]):
-            b[row, j] = x.speed[j].applied
+        write_speeds(x, b[row])
 
 
 @kernel
 def weigh(c, w, x, y):
     """y (nu,) replaced by F^-1 S'S F'^-1 y, for S of `flexmb.jain.precision`."""
-    for j in range(y.shape[0]):
-        x.speed[j].innovation = y[j]
+    _enter(c, x, y)
     precision.weigh(c, w, x)
-    for j in range(y.shape[0]):
-        y[j] = x.speed[j].innovation
+    write_speeds(x, y)
 
 
 @kernel
@@ -76,7 +67,7 @@ def log_determinant(c, w):
 
 
 @helper
-def _apply(c, x, b):
-    innovations.clear(c, x)
-    for j in range(b.shape[0]):
-        x.speed[j].applied = b[j]
+def _enter(c, x, b):
+    """A right side, and no other forces."""
+    clear(c, x)
+    read_speeds(x, b)

@@ -4,9 +4,10 @@ tau holds inertia, gravity, elasticity and node loads, but not hinge springs and
 with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
 """
 
+from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import add_port_torque, elastic_forces, node_loads
-from flexmb.jain.kinematics import acceleration_sweep, motion_column, pose_sweep, velocity_sweep
+from flexmb.jain.kinematics import motion_column, pose_sweep, velocity_sweep
 from flexmb.jain.ports import mode_motion, port_acceleration
 from flexmb.jain.wheels import gyroscopic_torque, spin_axis
 from flexmb.jit.kernel import helper

@@ -14,16 +14,19 @@ in units that do not matter; u kappa bounds the share of rounding in the acceler
 which it is 1 has no inertia but rounding.
 """
 
-from flexmb.jain.innovations import clear_body, innovations, port_response, push, respond
+from flexmb.jain.innovations import innovations, respond
 from flexmb.jain.kinematics import motion_column
+from flexmb.jain.ports import mode_motion
+from flexmb.jain.response import clear_body, port_response, push
 from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import sqrt
-from flexmb.spatial.vector import add, add3, mat3, scale, times, vec3
+from flexmb.spatial.spatial_vector import add6, scale6, vec6
+from flexmb.spatial.vector import add, mat3, times, vec3
 
 
 @helper
 def weigh(c, w, x):
-    """y = F^-1 S'S F'^-1 y of the free speeds, y in x.speed.innovation: kappa is the largest eigenvalue of this."""
+    """y = F^-1 S'S F'^-1 y of the free speeds, y in x.speed: kappa is the largest eigenvalue of this."""
     respond(c, w, x)
     for k in range(c.body.shape[0]):
         clear_body(c, x, k)
@@ -31,12 +34,9 @@ def weigh(c, w, x):
         s = _size(c, w, k)
         _weigh_modes(c, w, x, k, s)
         for n in range(c.body[k].nv):
-            j = c.body[k].u_index + n
-            angular, linear = motion_column(c, w, k, n)
-            x.speed[j].applied = _squares(s, angular, linear) * x.speed[j].acceleration
+            x.speed[c.body[k].u_index + n] *= _squares(s, motion_column(c, w, k, n))
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            j = c.wheel[i].u_index
-            x.speed[j].applied = c.wheel[i].axial * x.speed[j].acceleration
+            x.speed[c.wheel[i].u_index] *= c.wheel[i].axial
         if c.body[k].parent >= 0:
             _weigh_transfer(c, w, x, k, s)
     innovations(c, w, x)
@@ -53,11 +53,11 @@ def _size(c, w, k):
 
 
 @helper
-def _squares(s, angular, linear):
-    """sum_i s_i^2 h_i^2 of h = [angular; linear]."""
+def _squares(s, h):
+    """sum_i s_i^2 h_i^2."""
     total = 0.0
     for i in range(3):
-        total += s[0][i] * s[0][i] * angular[i] * angular[i] + s[1][i] * s[1][i] * linear[i] * linear[i]
+        total += s[0][i] * s[0][i] * h[0][i] * h[0][i] + s[1][i] * s[1][i] * h[1][i] * h[1][i]
     return total
 
 
@@ -70,9 +70,8 @@ def _weigh_modes(c, w, x, k, s):
         for i in range(n + 1):
             size += w.pff[k, n, i] * w.pff[k, n, i]
         if out >= 0:
-            size += _squares(s, vec3(w.port_mode[out, n].W, 0), vec3(w.port_mode[out, n].L, 0))
-        j = c.body[k].etad_index + n
-        x.speed[j].applied = size * x.speed[j].acceleration
+            size += _squares(s, mode_motion(w, out, n))
+        x.speed[c.body[k].etad_index + n] *= size
 
 
 @helper
@@ -84,18 +83,19 @@ def _weigh_transfer(c, w, x, k, s):
     angular = add(angular, _lever(vec3(w.body[k].arm, 0), linear))
     if i >= 0:
         angular = add(angular, _lever(vec3(w.port[i].r, 0), linear))
-        alpha, a = port_response(c, w, x, p, i)
-        push(c, w, x, p, i, (_weighted(angular, alpha), _weighted(linear, a)))
+        push(c, w, x, p, i, _weighted((angular, linear), port_response(c, w, x, p, i)))
     else:
-        alpha, a = vec3(x.body[p].accel, 0), vec3(x.body[p].accel, 3)
-        add3(x.body[p].force, 0, scale(-1.0, _weighted(angular, alpha)))
-        add3(x.body[p].force, 3, scale(-1.0, _weighted(linear, a)))
+        add6(x.body[p].force, 0, scale6(-1.0, _weighted((angular, linear), vec6(x.body[p].accel, 0))))
 
 
 @helper
-def _weighted(t, a):
-    """t_i^2 a_i."""
-    return t[0] * t[0] * a[0], t[1] * t[1] * a[1], t[2] * t[2] * a[2]
+def _weighted(t, A):
+    """t_i^2 A_i."""
+    alpha, a = A
+    return (
+        (t[0][0] * t[0][0] * alpha[0], t[0][1] * t[0][1] * alpha[1], t[0][2] * t[0][2] * alpha[2]),
+        (t[1][0] * t[1][0] * a[0], t[1][1] * t[1][1] * a[1], t[1][2] * t[1][2] * a[2]),
+    )
 
 
 @helper

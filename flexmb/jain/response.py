@@ -1,4 +1,4 @@
-"""What the recursions of the innovations factorisation write: forces in, innovations and accelerations out.
+"""Forces that act beside those of a workspace, and the accelerations they add: what later right sides are solved in.
 
 It stands beside the workspace whose sweeps hold the factors and the poses; nothing there is overwritten, hence the
 factors of one forward dynamics serve as many responses as are asked for.
@@ -8,7 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.jain.ports import mode_motion
 from flexmb.jit.bundle import bundle
+from flexmb.jit.kernel import helper
+from flexmb.spatial.spatial_vector import add6, axpy6, dot6, scale6, shift_force, shift_motion, vec6
+from flexmb.spatial.vector import vec3
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real, Record
 
@@ -20,11 +24,6 @@ MODE_RESPONSE = np.dtype([
     ("zf", np.float64),  # z_f: minus the load on the mode
     ("etadd", np.float64),
 ])
-SPEED_RESPONSE = np.dtype([
-    ("applied", np.float64),  # generalised force T
-    ("innovation", np.float64),  # y = D^-1/2 (1 - H Psi K) T
-    ("acceleration", np.float64),  # M^-1 T
-])
 
 
 @bundle
@@ -34,7 +33,7 @@ class Response:
     ground: Real  # (3,) zero: gravity is no part of a response
     body: Record  # (N,) BODY_RESPONSE
     mode: Record  # (N,m) MODE_RESPONSE
-    speed: Record  # (nu,) SPEED_RESPONSE
+    speed: Real  # (nu,) generalised forces T, their innovations y, accelerations M^-1 T: each in place of the last
 
 
 def response(c: Constants) -> Response:
@@ -44,5 +43,54 @@ def response(c: Constants) -> Response:
         ground=np.zeros(3),
         body=np.zeros(n, BODY_RESPONSE),
         mode=np.zeros((n, m), MODE_RESPONSE),
-        speed=np.zeros(len(c.speed), SPEED_RESPONSE),
+        speed=np.zeros(len(c.speed)),
     )
+
+
+@helper
+def clear(c, x):
+    """No forces, on bodies, modes or speeds."""
+    for k in range(c.body.shape[0]):
+        clear_body(c, x, k)
+    for j in range(x.speed.shape[0]):
+        x.speed[j] = 0.0
+
+
+@helper
+def clear_body(c, x, k):
+    """No forces on body k and its modes."""
+    for i in range(6):
+        x.body[k].force[i] = 0.0
+    for n in range(c.body[k].modes):
+        x.mode[k, n].zf = 0.0
+
+
+@helper
+def read_speeds(x, y):
+    """y (nu,) into x.speed."""
+    for j in range(y.shape[0]):
+        x.speed[j] = y[j]
+
+
+@helper
+def write_speeds(x, y):
+    """x.speed into y (nu,)."""
+    for j in range(y.shape[0]):
+        y[j] = x.speed[j]
+
+
+@helper
+def push(c, w, x, k, port, F):
+    """Add a load F = [tau; f] at a port of body k, body axes: A F with A = [Pi'; phi] of (14), (15)."""
+    for n in range(c.body[k].modes):
+        x.mode[k, n].zf -= dot6(mode_motion(w, port, n), F)
+    add6(x.body[k].force, 0, scale6(-1.0, shift_force(F, vec3(w.port[port].r, 0))))
+
+
+@helper
+def port_response(c, w, x, k, port):
+    """Acceleration of a port of body k that the forces cause, body axes."""
+    A = shift_motion(vec6(x.body[k].accel, 0), vec3(w.port[port].r, 0))
+    for n in range(c.body[k].modes):
+        A = axpy6(x.mode[k, n].etadd, mode_motion(w, port, n), A)
+    return A

@@ -4,10 +4,12 @@ D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The s
 `flexmb.jain.sweeps` does the same to a smaller matrix after the modes: this one is what it is checked against.
 """
 
+from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
 from flexmb.jain.doubt import note_hinge, note_modes
 from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
-from flexmb.jain.kinematics import inboard_acceleration, motion_column, store_body_acceleration
-from flexmb.jain.sweeps import bodies, find_free, impose, wheel_acceleration
+from flexmb.jain.hinge_solve import find_free, impose
+from flexmb.jain.kinematics import motion_column
+from flexmb.jain.sweeps import bodies, wheel_acceleration
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia

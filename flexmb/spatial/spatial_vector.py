@@ -84,6 +84,12 @@ def shift_motion(V, d):
 
 
 @helper
+def shift_acceleration(A, V, d):
+    """Acceleration of O as a point of a body that moves by V, A about Q: phi' A and the centripetal w x (w x d)."""
+    return A[0], add(A[1], add(cross(A[0], d), cross(V[0], cross(V[0], d))))
+
+
+@helper
 def shift_force(F, d):
     """phi F: the force about Q of one that is known about O."""
     return add(F[0], cross(d, F[1])), F[1]

@@ -18,6 +18,7 @@ from flexmb.typing import Index, Real, Record
 
 RIGID, RUTHLESS, FULL, LINEAR, STIFFENED = range(5)
 EXPLICIT, WOODBURY, CONDENSED = range(3)
+ANGULAR_Z, LINEAR_Z, NO_AXIS = 2, 5, -1
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
 
@@ -32,6 +33,7 @@ BODY = _record(
     ("parent", _I),  # -1 for ground
     ("level", _I),  # RIGID, RUTHLESS, FULL, LINEAR or STIFFENED
     ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
+    ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
     ("u_index", _I),  # first hinge speed in u
@@ -188,8 +190,9 @@ BODY_STATE = _record(
     ("force", _F, (6,)),  # rigid part of the bias force
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
-    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)' by free speed
-    ("hinge_factor", _F, (6, 6)),  # Cholesky factor of D_R
+    # by free speed; of a hinge with a single axis as flexmb.jain.hinge_solve has it
+    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)'
+    ("hinge_factor", _F, (6, 6)),  # Cholesky factor L of D_R
     ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
     ("free_speed", _I, (6,)),  # the hinge's speeds that are free
     ("free_count", _I),

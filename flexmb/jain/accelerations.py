@@ -1,0 +1,63 @@
+"""Accelerations outward, body by body: Jain & Rodriguez (24), with what hinges and modes do given or found on the way.
+
+Accelerations are classical, of the point O in body axes, and those of the workspace are minus gravity. Each function
+is for accelerations that x holds: the workspace w itself, or a response to forces.
+"""
+
+from flexmb.jain.kinematics import motion_column
+from flexmb.jain.ports import mode_motion
+from flexmb.jit.kernel import helper
+from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, times6_t, vec6
+from flexmb.spatial.vector import cross, mat3, sub, times_t, vec3
+
+
+@helper
+def acceleration_sweep(c, w):
+    """Accelerations of all bodies for given udot in w.speed.acceleration (24): inverse dynamics, outward."""
+    for k in range(c.body.shape[0]):
+        A = sum6(inboard_acceleration(c, w, k), vec6(w.body[k].bias, 0))
+        for n in range(c.body[k].nv):
+            A = axpy6(w.speed[c.body[k].u_index + n].acceleration, motion_column(c, w, k, n), A)
+        for n in range(c.body[k].modes):
+            w.mode[k, n].etadd = w.speed[c.body[k].etad_index + n].acceleration
+        store_body_acceleration(c, w, k, A)
+
+
+@helper
+def inboard_acceleration(c, w, k):
+    """Acceleration of O as a point of the parent, without bias terms, minus gravity, in body axes: Phi' alpha_m."""
+    return carried_acceleration(c, w, w, k)
+
+
+@helper
+def carried_acceleration(c, w, x, k):
+    """Phi' alpha_m for the accelerations that x holds."""
+    p = c.body[k].parent
+    R = mat3(w.body[k].rotation, 0)
+    if p < 0:
+        return (0.0, 0.0, 0.0), times_t(R, vec3(x.ground, 0))
+    A_parent = vec6(x.body[p].accel, 0)
+    i = c.body[k].inboard_port
+    if i >= 0:
+        A_parent = shift_motion(A_parent, vec3(w.port[i].r, 0))
+        for n in range(c.body[p].modes):
+            A_parent = axpy6(x.mode[p, n].etadd, mode_motion(w, i, n), A_parent)
+    return times6_t(R, shift_motion(A_parent, vec3(w.body[k].arm, 0)))
+
+
+@helper
+def store_body_acceleration(c, w, k, A):
+    """Keep the acceleration of O (without deformation part) and go on to the body origin."""
+    store6(w.body[k].accel_hinge, 0, A)
+    store_origin_acceleration(c, w, w, k, A)
+
+
+@helper
+def store_origin_acceleration(c, w, x, k, A):
+    """From the acceleration of O, without deformation part, to that of the body origin, kept in x."""
+    i = c.body[k].outboard_port
+    if i >= 0:
+        for n in range(c.body[k].modes):
+            A = axpy6(-x.mode[k, n].etadd, mode_motion(w, i, n), A)
+        A = A[0], sub(A[1], cross(A[0], vec3(w.port[i].r, 0)))
+    store6(x.body[k].accel, 0, A)

@@ -1,0 +1,273 @@
+"""What one hinge does in the sweeps, by the factor of its D_R = L L': the only place that knows a single axis.
+
+H holds the free speeds of hinge k; P_R and z_R are the articulated inertia and force of body k about O, without its
+modes. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64), `eliminate` leaves
+G L = P_R H' L'^-1 in `hinge_gain`, L in `hinge_factor` and L^-1 epsilon in `hinge_residual`. What is solved with these
+factors later:
+
+    innovate      y = L^-1 (T - H z)           z^+ = z + G L y                  inward
+    solve         x = L'^-1 (y - (G L)'alpha^+)    alpha = alpha^+ + H' x       outward
+    synthesise    T = L y + H z                z^+ = z + G L y                  inward, undoes `innovate`
+    excite        y = L' x + (G L)'alpha^+     alpha = alpha^+ + H' x           outward, undoes `solve`
+
+T, y and x are the hinge's places in `speed` of a response x, each in place of what it is made from. Prescribed speeds
+are no freedom: H leaves them out, and they are zero in y and x.
+
+A hinge with a single axis, one free speed along z, needs no small matrices: H picks a row, and D_R is a number. For
+such a hinge G is kept instead of G L, D_R instead of L, and D_R^-1 epsilon instead of L^-1 epsilon, so that forward
+dynamics takes no square root.
+"""
+
+from math import log
+
+from flexmb.jain.doubt import note_hinge
+from flexmb.jain.explicit import cholesky
+from flexmb.jain.kinematics import motion_column
+from flexmb.jain.variants import to_parent
+from flexmb.jit.kernel import helper
+from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, outer_inertia, sum_inertia
+from flexmb.spatial.pivots import is_rounding, is_small
+from flexmb.spatial.scalar import sqrt
+from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
+from flexmb.tables.arrays import ANGULAR_Z
+
+SINGLE = -1  # free_count of a hinge with a single axis
+
+
+@helper
+def impose(c, w, k):
+    """Rates of the hinge's prescribed speeds, added to the bias."""
+    j = c.body[k].u_index
+    for n in range(c.body[k].nv):
+        f = c.speed[j + n].prescribed
+        if f >= 0:
+            w.speed[j + n].acceleration = w.function[f, 2]
+            add6(w.body[k].bias, 0, scale6(w.function[f, 2], motion_column(c, w, k, n)))
+
+
+@helper
+def find_free(c, w, k):
+    """The hinge's free speeds into w.body[k].free_speed; returns how many there are."""
+    free = 0
+    for n in range(c.body[k].nv):
+        if c.speed[c.body[k].u_index + n].prescribed < 0:
+            w.body[k].free_speed[free] = n
+            free += 1
+    w.body[k].free_count = free
+    return free
+
+
+@helper
+def eliminate(c, w, k):
+    """D_R, G_R and epsilon_R, P_R^+ and z_R^+ of (63), (64), handed to the parent; returns whether D_R > 0.
+
+    Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k in w.body.hinge_inertia and hinge_force.
+    """
+    impose(c, w, k)
+    P = load_inertia(w.body[k].hinge_inertia, 0)
+    z = sum6(vec6(w.body[k].hinge_force, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
+    j, axis = c.body[k].u_index, c.body[k].axis
+    if axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
+        return _eliminate_several(c, w, k, P, z)
+    PH = inertia_column(P, 2 if axis == ANGULAR_Z else 5)
+    D = _along(axis, PH)
+    before = w.body[k].inertia[2 if axis == ANGULAR_Z else 17]
+    if is_small(c, w, j, D, before) and is_rounding(D, before):
+        return False
+    epsilon = w.speed[j].applied - _along(axis, z)
+    s = 1.0 / D
+    w.body[k].free_count = SINGLE
+    w.body[k].hinge_factor[0, 0] = D
+    w.body[k].hinge_residual[0] = epsilon * s
+    store6(w.body[k].hinge_gain[0], 0, scale6(s, PH))
+    if c.body[k].parent >= 0:
+        z = axpy6(epsilon * s, PH, z)
+        to_parent(c, w, k, sum_inertia(P, outer_inertia(PH[0], PH[1], -s)), z)
+    return True
+
+
+@helper
+def _eliminate_several(c, w, k, P, z):
+    """The general hinge, or one that is prescribed."""
+    free = find_free(c, w, k)
+    D, G, residual = w.body[k].hinge_factor, w.body[k].hinge_gain, w.body[k].hinge_residual
+    for a in range(free):
+        n = w.body[k].free_speed[a]
+        H = motion_column(c, w, k, n)
+        PH = inertia_times(P, H)
+        store6(G[a], 0, PH)
+        residual[a] = less6(w.speed[c.body[k].u_index + n].applied, H, z)
+        for b in range(a + 1):
+            D[a, b] = dot6(PH, motion_column(c, w, k, w.body[k].free_speed[b]))
+    if not cholesky(D, free):
+        return False
+    note_hinge(c, w, k, D, 0)
+    for a in range(free):
+        for b in range(a):
+            residual[a] -= D[a, b] * residual[b]
+            for i in range(6):
+                G[a, i] -= D[a, b] * G[b, i]
+        s = 1.0 / D[a, a]
+        residual[a] *= s
+        for i in range(6):
+            G[a, i] *= s
+        GL = vec6(G[a], 0)
+        P = sum_inertia(P, outer_inertia(GL[0], GL[1], -1.0))
+        z = axpy6(residual[a], GL, z)
+    if c.body[k].parent >= 0:
+        to_parent(c, w, k, P, z)
+    return True
+
+
+@helper
+def accelerate(c, w, k, A):
+    """Rates of the free speeds from alpha^+ and what `eliminate` left; returns alpha^+ + H' udot + a_m (64)."""
+    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
+    moved = sum6(A, vec6(w.body[k].bias, 0))
+    if free == SINGLE:
+        udot = less6(w.body[k].hinge_residual[0], vec6(G[0], 0), A)
+        w.speed[j].acceleration = udot
+        return _move_along(c.body[k].axis, moved, udot)
+    for a in range(free - 1, -1, -1):
+        udot = less6(w.body[k].hinge_residual[a], vec6(G[a], 0), A)
+        for b in range(a + 1, free):
+            udot -= D[b, a] * w.speed[j + w.body[k].free_speed[b]].acceleration
+        w.speed[j + w.body[k].free_speed[a]].acceleration = udot / D[a, a]
+    for a in range(free):
+        n = w.body[k].free_speed[a]
+        moved = axpy6(w.speed[j + n].acceleration, motion_column(c, w, k, n), moved)
+    return moved
+
+
+@helper
+def add_innovations(c, w, x, k):
+    """Further forces T have the innovations y: what `eliminate` left is as if they had been there."""
+    j = c.body[k].u_index
+    if w.body[k].free_count == SINGLE:
+        w.body[k].hinge_residual[0] += x.speed[j] / sqrt(w.body[k].hinge_factor[0, 0])
+    for a in range(w.body[k].free_count):
+        w.body[k].hinge_residual[a] += x.speed[j + w.body[k].free_speed[a]]
+
+
+@helper
+def innovate(c, w, x, k, z):
+    """y = L^-1 (T - H z) in place of T; returns z^+ (55)."""
+    j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
+    if free == SINGLE:
+        epsilon = x.speed[j] - _along(c.body[k].axis, z)
+        x.speed[j] = epsilon / sqrt(D[0, 0])
+        return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
+    _hold(c, x, k)
+    for a in range(free):
+        n = w.body[k].free_speed[a]
+        epsilon = less6(x.speed[j + n], motion_column(c, w, k, n), z)
+        for b in range(a):
+            epsilon -= D[a, b] * x.speed[j + w.body[k].free_speed[b]]
+        x.speed[j + n] = epsilon / D[a, a]
+    return _gained(c, w, x, k, z)
+
+
+@helper
+def synthesise(c, w, x, k, z):
+    """T = L y + H z in place of y; returns z^+ (54)."""
+    j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
+    if free == SINGLE:
+        epsilon = sqrt(D[0, 0]) * x.speed[j]
+        x.speed[j] = epsilon + _along(c.body[k].axis, z)
+        return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
+    gained = _gained(c, w, x, k, z)
+    for a in range(free - 1, -1, -1):
+        n = w.body[k].free_speed[a]
+        T = dot6(motion_column(c, w, k, n), z)
+        for b in range(a + 1):
+            T += D[a, b] * x.speed[j + w.body[k].free_speed[b]]
+        x.speed[j + n] = T
+    _hold(c, x, k)
+    return gained
+
+
+@helper
+def solve(c, w, x, k, A):
+    """x = L'^-1 (y - (G L)'alpha^+) in place of y; returns alpha^+ + H' x (56)."""
+    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
+    if free == SINGLE:
+        rate = less6(x.speed[j] / sqrt(D[0, 0]), vec6(G[0], 0), A)
+        x.speed[j] = rate
+        return _move_along(c.body[k].axis, A, rate)
+    for a in range(free - 1, -1, -1):
+        rate = less6(x.speed[j + w.body[k].free_speed[a]], vec6(G[a], 0), A)
+        for b in range(a + 1, free):
+            rate -= D[b, a] * x.speed[j + w.body[k].free_speed[b]]
+        x.speed[j + w.body[k].free_speed[a]] = rate / D[a, a]
+    _hold(c, x, k)
+    return _spread(c, w, x, k, A)
+
+
+@helper
+def excite(c, w, x, k, A):
+    """y = L' x + (G L)'alpha^+ in place of x; returns alpha^+ + H' x."""
+    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
+    if free == SINGLE:
+        rate = x.speed[j]
+        x.speed[j] = sqrt(D[0, 0]) * (rate + dot6(vec6(G[0], 0), A))
+        return _move_along(c.body[k].axis, A, rate)
+    spread = _spread(c, w, x, k, A)
+    for a in range(free):
+        total = dot6(vec6(G[a], 0), A)
+        for b in range(a, free):
+            total += D[b, a] * x.speed[j + w.body[k].free_speed[b]]
+        x.speed[j + w.body[k].free_speed[a]] = total
+    _hold(c, x, k)
+    return spread
+
+
+@helper
+def log_determinant(w, k):
+    """log det D_R."""
+    total = 0.0
+    if w.body[k].free_count == SINGLE:
+        total += log(w.body[k].hinge_factor[0, 0])
+    for a in range(w.body[k].free_count):
+        total += 2.0 * log(w.body[k].hinge_factor[a, a])
+    return total
+
+
+@helper
+def _along(axis, F):
+    """H F of a single axis."""
+    return F[0][2] if axis == ANGULAR_Z else F[1][2]
+
+
+@helper
+def _move_along(axis, A, rate):
+    """A + H' rate of a single axis."""
+    alpha, a = A
+    if axis == ANGULAR_Z:
+        return (alpha[0], alpha[1], alpha[2] + rate), a
+    return alpha, (a[0], a[1], a[2] + rate)
+
+
+@helper
+def _hold(c, x, k):
+    """Prescribed speeds of the hinge have neither innovations nor accelerations."""
+    for j in range(c.body[k].u_index, c.body[k].u_index + c.body[k].nv):
+        if c.speed[j].prescribed >= 0:
+            x.speed[j] = 0.0
+
+
+@helper
+def _gained(c, w, x, k, z):
+    """z^+ = z + G L y of a general hinge."""
+    for a in range(w.body[k].free_count):
+        y = x.speed[c.body[k].u_index + w.body[k].free_speed[a]]
+        z = axpy6(y, vec6(w.body[k].hinge_gain[a], 0), z)
+    return z
+
+
+@helper
+def _spread(c, w, x, k, A):
+    """alpha^+ + H' x of a general hinge."""
+    for a in range(w.body[k].free_count):
+        n = w.body[k].free_speed[a]
+        A = axpy6(x.speed[c.body[k].u_index + n], motion_column(c, w, k, n), A)
+    return A
