@@ -9,7 +9,6 @@ from flexmb.jain.ports import move_port, port_bias, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.spatial_vector import (
     ZERO6,
-    add6,
     shift_acceleration,
     shift_motion,
     store6,
@@ -152,9 +151,3 @@ def pose_sweep(c, w):
             position = sub(position, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
         store9(w.body[k].pose_rotation, 0, R)
         store3(w.body[k].pose_position, 0, position)
-
-
-@helper
-def add_force(w, k, F):
-    """Add F = [tau; f] about the origin to the bias force of body k."""
-    add6(w.body[k].force, 0, F)
