@@ -1,0 +1,89 @@
+"""A hinge with a single axis takes a path of its own: to the same numbers, and one file knows of it."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from flexmb.entry import articulated, factorisation
+from flexmb.hinges import catalogue
+from flexmb.jain.response import response
+from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS, Constants
+from flexmb.tables.status import OK
+from flexmb.typing import Real
+from tests.bounds import gamma
+from tests.flexmb.jain.random_states import RandomState, random_state
+from tests.repo.project import ROOT
+
+
+@pytest.fixture(scope="module", params=["rigid", "full"])
+def found(request) -> RandomState:
+    """A tree with hinges of several kinds, many with a single axis."""
+    state = random_state(3, request.param, 20)
+    assert {ANGULAR_Z, LINEAR_Z, NO_AXIS} <= set(state.system.constants.body["axis"].tolist())
+    return state
+
+
+def without_axes(c: Constants) -> Constants:
+    """The same tree, every hinge a general one."""
+    body = c.body.copy()
+    body["axis"] = NO_AXIS
+    return replace(c, body=body)
+
+
+def test_the_axis_is_the_one_motion_of_the_hinge(found):
+    """Column 0 of H has a one in the row `axis`, and nothing else."""
+    c, w = found.system.constants, found.system.workspace()
+    assert articulated.accelerations(0.0, start(found), c, w) == OK
+    for body, state in zip(c.body, w.body, strict=True):
+        single = body["hinge_kind"] in (catalogue.REVOLUTE, catalogue.PRISMATIC)
+        assert (body["axis"] >= 0) == single
+        if single:
+            assert np.flatnonzero(state["hinge_map"][:, 0]).tolist() == [body["axis"]]
+
+
+def test_small_matrices_give_the_same_accelerations(found):
+    c = found.system.constants
+    one, several = (accelerations(found, each) for each in (c, without_axes(c)))
+    residual = found.M @ (one - several)
+    assert np.max(np.abs(residual)) <= bound(found, one)
+
+
+def test_small_matrices_give_the_same_solutions(found):
+    """The factor itself, both products with it and the solution."""
+    c = found.system.constants
+    for apply in (factorisation.half_solve, factorisation.half_multiply, factorisation.multiply, factorisation.solve):
+        one, several = (applied(found, each, apply) for each in (c, without_axes(c)))
+        assert np.max(np.abs(one - several)) <= gamma(found.system.nu) * np.linalg.cond(found.M) * np.max(np.abs(one))
+
+
+def test_one_file_knows_of_it():
+    """Elsewhere neither its mark nor the axis: the recursion asks a hinge for what it does."""
+    named = re.compile(r"\b(SINGLE|ANGULAR_Z|LINEAR_Z|REVOLUTE|PRISMATIC)\b|free_count == -1\b|body\[k\]\.axis\b")
+    assert named.search("if w.body[k].free_count == SINGLE:")
+    rooms = [path for room in ("jain", "closure", "entry") for path in (ROOT / "flexmb" / room).glob("*.py")]
+    assert [path.name for path in rooms if named.search(path.read_text(encoding="utf-8"))] == ["hinge_solve.py"]
+
+
+def start(found: RandomState) -> Real:
+    return np.concatenate([found.state.q, found.state.u, [0.0]])
+
+
+def accelerations(found: RandomState, c: Constants) -> Real:
+    w = found.system.workspace()
+    assert articulated.accelerations(found.state.t, start(found), c, w) == OK
+    return w.speed["acceleration"].copy()
+
+
+def applied(found: RandomState, c: Constants, apply) -> Real:
+    w, b = found.system.workspace(), np.random.default_rng(1).normal(size=(1, found.system.nu))
+    assert factorisation.factorise(found.state.t, start(found), c, c, w) == OK
+    apply(c, w, response(c), b)
+    return b[0]
+
+
+def bound(found: RandomState, rates: Real) -> float:
+    return float(found.bound * np.max(np.abs(found.M) @ np.abs(rates)))
