@@ -4,6 +4,7 @@ After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w
 """
 
 from flexmb.jain.doubt import note_modes
+from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import (
@@ -23,13 +24,14 @@ from flexmb.spatial.spatial_vector import (
     axpy6,
     dot6,
     less6,
+    plus6,
     scale6,
     shift_force,
     store6,
     times6,
     vec6,
 )
-from flexmb.spatial.vector import cross, dot, mat3, scale, sub, vec3
+from flexmb.spatial.vector import cross, mat3, scale, sub, vec3
 
 
 @helper
@@ -179,13 +181,11 @@ def _add_inertia(c, w, k, gamma):
 @helper
 def _add_force(c, w, z, k, F_parent):
     """z += A F with A = [Pi'; phi] of body k's inboard port on the parent, F about it in the parent's axes."""
-    parent = c.body[k].parent
-    i = c.body[k].inboard_port
+    parent, i = c.body[k].parent, c.body[k].inboard_port
     if i >= 0:
-        for n in range(c.body[parent].modes):
-            z.mode[parent, n].zf += dot6(mode_motion(w, i, n), F_parent)
-        F_parent = shift_force(F_parent, vec3(w.port[i].r, 0))
-    add6(z.body[parent].force, 0, F_parent)
+        add_port_force(c, w, z, parent, i, F_parent)
+    else:
+        add6(z.body[parent].force, 0, F_parent)
 
 
 @helper
@@ -193,7 +193,7 @@ def modal_accelerations(c, w, k, A):
     """Back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
     for n in range(c.body[k].modes - 1, -1, -1):
         P_fr = vec6(w.mode[k, n].pfr, 0)
-        s = w.mode[k, n].zf + dot(P_fr[0], A[0]) + dot(P_fr[1], A[1])
+        s = plus6(w.mode[k, n].zf, P_fr, A)
         for i in range(n + 1, c.body[k].modes):
             s += w.pff[k, i, n] * w.mode[k, i].etadd
         w.mode[k, n].etadd = -s / w.pff[k, n, n]

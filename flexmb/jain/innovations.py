@@ -20,15 +20,16 @@ from math import log, sqrt
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import carried_acceleration, store_origin_acceleration
 from flexmb.jain.explicit import force_to_parent
+from flexmb.jain.forces import add_port_torque
 from flexmb.jain.kinematics import motion_column, velocity_sweep
 from flexmb.jain.ports import mode_motion
 from flexmb.jain.response import port_response
 from flexmb.jain.sweeps import inward
-from flexmb.jain.wheels import wheel_forces
+from flexmb.jain.wheels import spin_axis, wheel_forces
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.spatial_vector import axpy6, dot6, less6, shift_force, store6, vec6
-from flexmb.spatial.vector import add3, dot, mat3, scale, times, vec3
+from flexmb.spatial.vector import dot, scale, vec3
 
 
 @helper
@@ -159,18 +160,14 @@ def log_determinant(c, w):
 @helper
 def _turn_node(c, w, x, k, i, torque):
     """z += G epsilon of wheel i: its torque about its axis, on the node that carries it."""
-    port = c.wheel[i].port
-    torque = scale(torque, times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0)))
-    add3(x.body[k].force, 0, torque)
-    for n in range(c.body[k].modes):
-        x.mode[k, n].zf += dot(vec3(w.port_mode[port, n].W, 0), torque)
+    add_port_torque(c, w, x, k, c.wheel[i].port, scale(torque, spin_axis(c, w, i)))
 
 
 @helper
 def _node_acceleration(c, w, x, k, i):
     """q . alpha of the node that carries wheel i."""
     alpha, _ = port_response(c, w, x, k, c.wheel[i].port)
-    return dot(times(mat3(w.port[c.wheel[i].port].R, 0), vec3(c.wheel[i].axis, 0)), alpha)
+    return dot(spin_axis(c, w, i), alpha)
 
 
 @helper

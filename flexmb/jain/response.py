@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
-from flexmb.spatial.spatial_vector import add6, axpy6, dot6, scale6, shift_force, shift_motion, vec6
+from flexmb.spatial.spatial_vector import axpy6, scale6, shift_motion, vec6
 from flexmb.spatial.vector import vec3
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real, Record
@@ -82,9 +83,7 @@ def write_speeds(x, y):
 @helper
 def push(c, w, x, k, port, F):
     """Add a load F = [tau; f] at a port of body k, body axes: A F with A = [Pi'; phi] of (14), (15)."""
-    for n in range(c.body[k].modes):
-        x.mode[k, n].zf -= dot6(mode_motion(w, port, n), F)
-    add6(x.body[k].force, 0, scale6(-1.0, shift_force(F, vec3(w.port[port].r, 0))))
+    add_port_force(c, w, x, k, port, scale6(-1.0, F))
 
 
 @helper

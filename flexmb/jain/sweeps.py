@@ -9,13 +9,11 @@ from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
 from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
-from flexmb.jain.ports import port_acceleration
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
-from flexmb.jain.wheels import wheel_forces
+from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.kernel import helper
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
-from flexmb.spatial.vector import dot, mat3, times, vec3
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 
@@ -73,17 +71,3 @@ def outward(c, w):
         store_body_acceleration(c, w, k, A)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             wheel_acceleration(c, w, k, i)
-
-
-@helper
-def wheel_acceleration(c, w, k, i):
-    """I (thetadd + q . alpha_node) = torque: the rate of a free wheel."""
-    j = c.wheel[i].u_index
-    f = c.speed[j].prescribed
-    if f >= 0:
-        w.speed[j].acceleration = w.function[f, 2]
-        return
-    port = c.wheel[i].port
-    axis = times(mat3(w.port[port].R, 0), vec3(c.wheel[i].axis, 0))
-    alpha, _ = port_acceleration(c, w, k, port)
-    w.speed[j].acceleration = w.speed[j].applied / c.wheel[i].axial - dot(axis, alpha)

@@ -9,7 +9,8 @@ from flexmb.jain.doubt import note_hinge, note_modes
 from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
 from flexmb.jain.hinge_solve import find_free, impose
 from flexmb.jain.kinematics import motion_column
-from flexmb.jain.sweeps import bodies, wheel_acceleration
+from flexmb.jain.sweeps import bodies
+from flexmb.jain.wheels import wheel_acceleration
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia

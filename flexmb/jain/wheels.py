@@ -4,7 +4,7 @@ The mass matrix of the body holds the despun wheel: its mass and its inertia, as
 """
 
 from flexmb.jain.forces import add_port_torque
-from flexmb.jain.ports import port_bias, port_velocity
+from flexmb.jain.ports import port_acceleration, port_bias, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
 from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, times, vec3
@@ -43,6 +43,18 @@ def wheel_forces(c, w, k):
             torque = axpy(w.speed[j].applied - axial * dot(axis, alpha), axis, gyroscopic)
             _remove_axial_inertia(c, w, k, port, axis, axial)
         add_port_torque(c, w, w, k, port, torque)
+
+
+@helper
+def wheel_acceleration(c, w, k, i):
+    """I (thetadd + q . alpha_node) = torque: the rate of a free wheel."""
+    j = c.wheel[i].u_index
+    f = c.speed[j].prescribed
+    if f >= 0:
+        w.speed[j].acceleration = w.function[f, 2]
+        return
+    alpha, _ = port_acceleration(c, w, k, c.wheel[i].port)
+    w.speed[j].acceleration = w.speed[j].applied / c.wheel[i].axial - dot(spin_axis(c, w, i), alpha)
 
 
 @helper
