@@ -23,7 +23,7 @@ class _NoMachineCode:
         """Nothing to set: there is no machine code yet."""
 
 
-class _Part(JITCodeLibrary):
+class _PartLibrary(JITCodeLibrary):
     """A function as it was lowered, for linking."""
 
     codegen = _NoMachineCode()
@@ -42,7 +42,7 @@ class _PartLowering(NativeLowering):
     _name = "part_lowering"
 
     def run_pass(self, state: Any) -> bool:
-        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        state.library = _PartLibrary(state.targetctx.codegen(), state.func_id.func_qualname)
         return bool(super().run_pass(state))
 
 

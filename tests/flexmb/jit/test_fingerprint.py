@@ -303,6 +303,7 @@ from flexmb.entry import articulated, composite, unsplit
 from flexmb.closure import dynamics
 from flexmb.frisch import evaluation
 from flexmb.run.warm_up import looped, with_panel
+from flexmb.tables import soundness
 from numba.core.dispatcher import Dispatcher
 from tests import trees
 from tests.flexmb.jit.test_fingerprint import compiled_beyond
@@ -313,7 +314,7 @@ for scene in (trees.random_scene(0, trees.MIXED), with_panel(), looped()):
             system.accelerations(system.initial_state, algorithm)
         except flexmb.SceneError:
             assert algorithm == "frisch"
-rooms = (articulated, composite, unsplit, dynamics, evaluation)
+rooms = (articulated, composite, unsplit, dynamics, evaluation, soundness)
 kernels = [each for room in rooms for each in vars(room).values() if isinstance(each, Dispatcher)]
 print(compiled_beyond(*kernels))
 """

@@ -13,7 +13,7 @@ from flexmb.jit import hooks
 from flexmb.jit.bundle import bundle
 from flexmb.jit.cache import KernelCache
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.parts import PartCompiler, _Part
+from flexmb.jit.parts import PartCompiler, _PartLibrary
 
 ROOT = Path(__file__).parents[3]
 
@@ -53,7 +53,7 @@ def test_the_hooks_are_in_use():
 
 def test_helpers_are_parts_without_machine_code(compiled):
     [version] = doubled.overloads.values()
-    assert type(version.library) is _Part
+    assert type(version.library) is _PartLibrary
     assert version.library._finalized
     assert "doubled" in version.library.get_llvm_str()
 
