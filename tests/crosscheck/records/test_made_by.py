@@ -48,6 +48,7 @@ WITHOUT_PART = {
     "flexmb.surrogate": "makes scenes, as plan",
     "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes",
+    "flexmb.scene.options": "makes scenes",
     "flexmb.scene.files": "reads scenes",
 }
 PLUG_IN = """
