@@ -20,7 +20,7 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
-    from flexmb.closure.system import ClosureError
+    from flexmb.closure.closures import ClosureError
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linear_model import LinearModel
@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
     from flexmb.run.trajectory import Trajectory
+    from flexmb.system.compile import compile
     from flexmb.system.observables import Evaluation
-    from flexmb.system.system import compile
     from flexmb.system.tree_system import System
     from flexmb.tables.state import DynamicsError, PrecisionWarning, State
     from flexmb.tables.status import Status
@@ -40,7 +40,7 @@ _LATER = {
     "advise": "flexmb.advisor.advice",
     "Campbell": "flexmb.linear.campbell",
     "campbell": "flexmb.linear.campbell",
-    "ClosureError": "flexmb.closure.system",
+    "ClosureError": "flexmb.closure.closures",
     "equilibrium": "flexmb.linear.equilibrium",
     "EquilibriumError": "flexmb.linear.equilibrium",
     "linearize": "flexmb.linear.linearize",
@@ -55,7 +55,7 @@ _LATER = {
     "PrecisionWarning": "flexmb.tables.state",
     "State": "flexmb.tables.state",
     "System": "flexmb.system.tree_system",
-    "compile": "flexmb.system.system",
+    "compile": "flexmb.system.compile",
     "Trajectory": "flexmb.run.trajectory",
 }
 

@@ -2,7 +2,7 @@
 
 The files are the module's own and all that these import, directly or not, inside the packages that count as sources:
 flexmb, crosscheck, the module's own package, and whatever on the path belongs to no installed distribution, such as a
-package in development. A module named in a string ("flexmb.system.system", "crosscheck.engines.native:NativeEngine")
+package in development. A module named in a string ("flexmb.system.compile", "crosscheck.engines.native:NativeEngine")
 counts as imported. What is installed is a library: it is known by its distribution, and its sources are not read.
 """
 

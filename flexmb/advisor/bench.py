@@ -15,13 +15,13 @@ from flexmb.advisor.methods import RunMethod, operations, simulated, steps_withi
 from flexmb.advisor.models import Model, built
 from flexmb.advisor.quantity import Quantity, Signals, measured
 from flexmb.closure import dynamics as closed
-from flexmb.closure.system import ClosureError
+from flexmb.closure.closures import ClosureError
 from flexmb.jit.counting import count
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.system import System, compile
+from flexmb.system.compile import System, compile
 from flexmb.tables.state import pack
 from flexmb.tables.status import Status
 

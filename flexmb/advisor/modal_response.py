@@ -23,7 +23,7 @@ from scipy.linalg import eigh, expm
 from scipy.spatial.transform import Rotation
 
 from flexmb.advisor.methods import RunMethod, simulated
-from flexmb.closure.system import ClosureError
+from flexmb.closure.closures import ClosureError
 from flexmb.dense.function_jets import profile
 from flexmb.modal import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
@@ -32,7 +32,7 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.schema import Load, Marker, Scene
 from flexmb.surrogate import rigidify
-from flexmb.system.system import System, compile
+from flexmb.system.compile import System, compile
 from flexmb.typing import Real
 
 MODES = 12

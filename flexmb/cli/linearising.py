@@ -49,7 +49,7 @@ def linearize(
         from flexmb.linear.linear_tables import modes_table
         from flexmb.linear.linearize import linearize as linearized
         from flexmb.linear.spin import steady_spin
-        from flexmb.system.system import compile
+        from flexmb.system.compile import compile
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")

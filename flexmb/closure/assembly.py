@@ -10,9 +10,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from flexmb.closure.closures import ClosureError, Closures
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
-from flexmb.closure.system import ClosureError, Closures
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 

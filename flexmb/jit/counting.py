@@ -74,11 +74,11 @@ def _scalars(tally: Counter[str]) -> Any:
     def counted(kind: str, operation: Callable[..., float]) -> Callable[..., float]:
         def method(*operands: float) -> float:
             tally[kind] += 1
-            return Scalar(operation(*operands))
+            return CountingFloat(operation(*operands))
 
         return method
 
-    class Scalar(float):
+    class CountingFloat(float):
         __slots__ = ()
         __add__ = counted("additions", float.__add__)
         __radd__ = counted("additions", float.__radd__)
@@ -93,18 +93,18 @@ def _scalars(tally: Counter[str]) -> Any:
 
         def __pow__(self, exponent: float) -> float:  # type: ignore[override]
             if exponent == 2:
-                return Scalar.__mul__(self, self)
+                return CountingFloat.__mul__(self, self)
             if exponent != 0.5:
                 raise NotImplementedError("only squares and square roots are counted as powers")
-            return Scalar.square_root(self)
+            return CountingFloat.square_root(self)
 
         def __neg__(self) -> float:
-            return Scalar(float.__neg__(self))
+            return CountingFloat(float.__neg__(self))
 
         def __abs__(self) -> float:
-            return Scalar(float.__abs__(self))
+            return CountingFloat(float.__abs__(self))
 
-    return Scalar
+    return CountingFloat
 
 
 def _divide(a: float, b: float) -> float:

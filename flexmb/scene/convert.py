@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 import msgspec
 from msgspec import inspect
 
-from flexmb.scene.problems import Place, Problem, SceneError, closest
+from flexmb.scene.problems import Defect, Place, SceneError, closest
 from flexmb.scene.units import split_unit
 
 Struct = TypeVar("Struct")
@@ -54,8 +54,8 @@ def _name_of(data: Any) -> str:
     return str(data.get("name", "")) if isinstance(data, dict) else ""
 
 
-def _explain(message: str, data: Any, kind: Any, place: Place) -> Problem:
-    """One msgspec message ("what - at `$.path`") as a Problem."""
+def _explain(message: str, data: Any, kind: Any, place: Place) -> Defect:
+    """One msgspec message ("what - at `$.path`") as a Defect."""
     what, _, path = message.partition(" - at ")
     steps: list[str | int] = [
         int(index) if index else key for key, index in re.findall(r"\.(\w+)|\[(\d+)\]", path.strip("`"))
@@ -68,7 +68,7 @@ def _explain(message: str, data: Any, kind: Any, place: Place) -> Problem:
         collection = steps[i - 1] if i else None
         if isinstance(step, int) and isinstance(collection, str) and (name := label(collection, value)):
             place = place.named(name)
-    return Problem(str(place), what, _remedy(what, place, value, node))
+    return Defect(str(place), what, _remedy(what, place, value, node))
 
 
 def _below(node: inspect.Type, step: str | int, value: Any) -> inspect.Type:

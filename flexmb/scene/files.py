@@ -19,7 +19,7 @@ import msgspec
 
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
-from flexmb.scene.problems import Problem, SceneError
+from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.reading import Unreadable, parse_toml, read_text
 from flexmb.scene.schema import Scene
 
@@ -76,7 +76,7 @@ def inline(value: Any) -> str:
 
 
 def _unreadable(name: str, error: Unreadable) -> SceneError:
-    return SceneError(name, [Problem(name, error.what, error.remedy)])
+    return SceneError(name, [Defect(name, error.what, error.remedy)])
 
 
 def _relative(file: str, folder: str | os.PathLike[str]) -> str:

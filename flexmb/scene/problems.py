@@ -27,7 +27,7 @@ class Place:
 
 
 @dataclass(frozen=True)
-class Problem:
+class Defect:
     """One defect of a scene: `where` is path and names, `what` the defect, `remedy` what to write instead."""
 
     where: str
@@ -41,7 +41,7 @@ class Problem:
 class SceneError(ValueError):
     """A scene that cannot be simulated; `problems` lists every defect found."""
 
-    def __init__(self, scene: str, problems: Iterable[Problem]) -> None:
+    def __init__(self, scene: str, problems: Iterable[Defect]) -> None:
         self.scene = scene
         self.problems = tuple(problems)
         count = f"{len(self.problems)} problem{'s' if len(self.problems) > 1 else ''}"

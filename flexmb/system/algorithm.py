@@ -10,7 +10,7 @@ from flexmb.frisch.errata import Erratum
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
-    from flexmb.closure.system import ClosedMotion, Closures
+    from flexmb.closure.closures import ClosedMotion, Closures
     from flexmb.entry.observation import Outputs
     from flexmb.system.tree_system import System
 

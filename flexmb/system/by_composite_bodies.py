@@ -12,7 +12,7 @@ from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
-    from flexmb.closure.system import ClosedMotion, Closures
+    from flexmb.closure.closures import ClosedMotion, Closures
     from flexmb.system.tree_system import System
 
 

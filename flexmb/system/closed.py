@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
+from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
-from flexmb.closure.system import ClosedMotion, ClosureError, Closures
 from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
 from flexmb.system import algorithms

@@ -32,7 +32,7 @@ from flexmb.advisor.quantity import error, measured, scales
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.tables.status import Status
 
 TOLERANCES = (1e-2, 1e-3)

@@ -19,7 +19,7 @@ from flexmb.run.simulate import simulate
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import AngularCoordinate, Ramp, Scene
 from flexmb.surrogate import finite_segments, substructured
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "spinning_beam"
 SPIN_UP_S = 15.0

@@ -17,7 +17,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 
 FAMILY = Path(__file__).parents[2] / "cases" / "wheel_gyrostat"
 CONSERVATIVE_RTOL = 1e-11  # at which drifts are promised

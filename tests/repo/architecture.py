@@ -8,9 +8,8 @@ from __future__ import annotations
 import ast
 import re
 from collections import defaultdict
-from itertools import chain
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any
 
 from tests.repo.project import PYPROJECT, ROOT
 
@@ -33,33 +32,11 @@ def rooms(package: str, root: Path = ROOT) -> set[str]:
 
 
 def layers(package: str, contracts: list[dict[str, Any]] | None = None) -> Layers:
-    """Rooms of a package by layer, top first, as its import contract orders them; empty where there is none."""
+    """Rooms of a package by layer, top first, as the import contract that contains the package orders them."""
     for contract in PYPROJECT["tool"]["importlinter"]["contracts"] if contracts is None else contracts:
-        if contract["type"] != "layers":
-            continue
-        prefix = "" if contract.get("containers") == [package] else f"{package}."
-        named = [re.split(r"\s*[|:]\s*", layer.strip()) for layer in contract["layers"]]
-        if contract.get("containers", [package]) == [package] and all(n.startswith(prefix) for n in chain(*named)):
-            return [tuple(sorted(name.strip("()").removeprefix(prefix) for name in each)) for each in named]
+        if contract["type"] == "layers" and contract.get("containers") == [package]:
+            return [tuple(sorted(re.findall(r"\w+", layer))) for layer in contract["layers"]]
     return []
-
-
-def beside(package: str) -> list[str]:
-    """Rooms that the contract does not order: those that import others first."""
-    left, ordered = rooms(package) - set(chain(*layers(package))), list[str]()
-    while left:
-        needed = set[str]().union(*(imports(package, room) - {room} for room in left))
-        ordered += sorted(left - needed) or sorted(left)
-        left -= set(ordered)
-    return ordered
-
-
-def imports(package: str, room: str) -> set[str]:
-    """Rooms of the same package that a room imports from."""
-    place = ROOT / package / room
-    files = place.rglob("*.py") if place.is_dir() else [place.with_suffix(".py")]
-    names = re.compile(rf"^\s*(?:from|import) {package}\.(\w+)", flags=re.MULTILINE)
-    return {name for file in files for name in names.findall(file.read_text(encoding="utf-8"))} - {room}
 
 
 # ---- The page
@@ -135,53 +112,33 @@ def _compiles(decorator: ast.expr) -> bool:
 WIDTH, ROW, GAP, MARGIN = 260, 26, 6, 16
 STYLE = (
     "text{font:13px sans-serif;fill:#222}.h{font-weight:bold}.s{font-size:11px;fill:#666}"
-    "rect{fill:#e8eef7;stroke:#8aa3c8}.b rect{fill:#f3efe4;stroke:#c8b88a}path{stroke:#555;fill:none}"
+    "rect{fill:#e8eef7;stroke:#8aa3c8}path{stroke:#555;fill:none}"
 )
 
 
-class Column(NamedTuple):
-    """A column of the picture: its heading, what is small under it, rows of rooms, and notes beside single rooms."""
-
-    title: str
-    note: str
-    rows: Layers
-    notes: dict[str, str]
-
-
 def picture() -> str:
-    """Rooms in layers, as SVG: a room imports only from lower layers; those beside the layers say from where."""
-    columns = []
-    for package in PACKAGES:
-        order, others = layers(package), beside(package)
-        notes = {room: ", ".join(sorted(imports(package, room) & set(others))) for room in others}
-        if order:
-            columns.append(Column(package, "imports go down only", order, {}))
-        if others:
-            columns.append(Column(package, "beside the layers", [(room,) for room in others], notes))
-    height = MARGIN * 2 + 2 * ROW + max(len(each.rows) for each in columns) * (ROW + GAP)
+    """Rooms in layers, as SVG: a room imports only from lower layers."""
+    ordered = {package: layers(package) for package in PACKAGES}
+    height = MARGIN * 2 + 2 * ROW + max(map(len, ordered.values())) * (ROW + GAP)
     pitch = WIDTH + 2 * MARGIN
-    width = MARGIN + len(columns) * pitch
-    drawn = [line for number, each in enumerate(columns) for line in _column(each, MARGIN + number * pitch)]
+    width = MARGIN + len(ordered) * pitch
+    columns = enumerate(ordered.items())
+    drawn = [line for number, (name, order) in columns for line in _column(name, order, MARGIN + number * pitch)]
     head = f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" width="{width}" height="{height}">'
     return "\n".join([head, f"<style>{STYLE}</style>", *drawn, "</svg>", ""])
 
 
-def _column(column: Column, x: int) -> list[str]:
+def _column(package: str, order: Layers, x: int) -> list[str]:
     y = MARGIN + 2 * ROW
-    lines = [_text(x, MARGIN + 12, column.title, "h"), _text(x, MARGIN + 28, column.note, "s")]
-    lines.append('<g class="b">' if column.notes else "<g>")
-    for number, names in enumerate(column.rows):
+    lines = [_text(x, MARGIN + 12, package, "h"), _text(x, MARGIN + 28, "imports go down only", "s")]
+    for number, names in enumerate(order):
         top, each = y + number * (ROW + GAP), (WIDTH - GAP * (len(names) - 1)) / len(names)
         for place, name in enumerate(names):
             left = x + place * (each + GAP)
             lines.append(f'<rect x="{left:g}" y="{top}" width="{each:g}" height="{ROW}" rx="4"/>')
             lines.append(_text(left + 8, top + 17, name, ""))
-        if column.notes.get(names[0]):
-            lines.append(_text(x + 90, top + 17, f"imports {column.notes[names[0]]}", "s"))
-    if not column.notes:
-        end = y + len(column.rows) * (ROW + GAP) - GAP
-        lines.append(f'<path d="M{x + WIDTH + 10} {y} V{end} m-4 -8 l4 8 l4 -8"/>')
-    return [*lines, "</g>"]
+    end = y + len(order) * (ROW + GAP) - GAP
+    return [*lines, f'<path d="M{x + WIDTH + 10} {y} V{end} m-4 -8 l4 8 l4 -8"/>']
 
 
 def _text(x: float, y: int, text: str, kind: str) -> str:

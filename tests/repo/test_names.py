@@ -1,8 +1,11 @@
-"""Modules, files and their names that pages, docstrings and comments mention exist."""
+"""Names lead somewhere: what pages, docstrings and comments mention exists, and a class has one name in the house."""
 
 from __future__ import annotations
 
+import ast
 import re
+from collections import Counter
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 
@@ -70,3 +73,23 @@ def test_every_name_leads_somewhere() -> None:
 )
 def test_a_name_that_leads_nowhere_is_found(text: str, found: list[str]) -> None:
     assert unknown_names(text) == found
+
+
+# What an engine hands over and what flexmb gives its users are the same things, in two shapes.
+SHARED = {"MarkerPath", "Trajectory"}
+
+
+def repeated_classes(sources: Iterable[str]) -> set[str]:
+    """Names that more than one class has, private ones too."""
+    nodes = (node for source in sources for node in ast.walk(ast.parse(source)))
+    names = Counter(node.name for node in nodes if isinstance(node, ast.ClassDef))
+    return {name for name, times in names.items() if times > 1}
+
+
+def test_a_class_has_one_name_in_the_house() -> None:
+    files = [path for package in ("flexmb", "crosscheck") for path in (ROOT / package).rglob("*.py")]
+    assert repeated_classes(path.read_text(encoding="utf-8") for path in files) == SHARED
+
+
+def test_a_second_class_of_one_name_is_found() -> None:
+    assert repeated_classes(["class A: ...\nclass B: ...", "def f():\n    class A: ..."]) == {"A"}

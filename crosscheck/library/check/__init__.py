@@ -22,7 +22,7 @@ from crosscheck.library.check.ranges import (
 )
 from crosscheck.library.check.runs import check_sides_run
 from crosscheck.library.check.variants import check_variant
-from flexmb.scene.problems import Problem
+from flexmb.scene.problems import Defect
 
 TIME_LIMITS_S = (1e-3, 1e7)
 
@@ -45,13 +45,13 @@ def check_recorded(run: RunFile) -> None:
     _refuse(_recorded(run))
 
 
-def _refuse(problems: Iterator[Problem]) -> None:
+def _refuse(problems: Iterator[Defect]) -> None:
     found = [str(problem) for problem in problems]
     if found:
         raise CaseError("\n".join(found))
 
 
-def _run(run: RunFile) -> Iterator[Problem]:
+def _run(run: RunFile) -> Iterator[Defect]:
     if not run.title.strip():
         yield problem(ROOT.key("title"), "it is empty", "say what the case is")
     if not run.variants:
@@ -77,7 +77,7 @@ def _run(run: RunFile) -> Iterator[Problem]:
         yield from check_chart(run, chart, ROOT.key("chart", i))
 
 
-def _recorded(run: RunFile) -> Iterator[Problem]:
+def _recorded(run: RunFile) -> Iterator[Defect]:
     yield from check_unique([variant.name for variant in run.variants], ROOT.key("variant"), "variants")
     sides = {ROOT.key("comparison", i): (item.a, item.b) for i, item in enumerate(run.comparisons)}
     sides |= {ROOT.key("control", i): control.sides for i, control in enumerate(run.controls)}

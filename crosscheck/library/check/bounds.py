@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from crosscheck.library.case import Band, Comparison, Conservation, RunFile
 from crosscheck.library.check.ranges import problem
 from crosscheck.library.check.runs import find_variant
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 
 WIDEST = 100.0  # a band that lets a difference grow more is none
 WIDEST_PART = 0.25  # of a run's duration, as a bound of the time at which it diverges
@@ -16,7 +16,7 @@ BOUNDS = {"differ": "band", "unresolved": "band", "diverged": "diverged_s", "fai
 FIGURE_OF = {"differ": "E", "unresolved": "U"}
 
 
-def check_expectation(run: RunFile, item: Comparison | Conservation, place: Place) -> Iterator[Problem]:
+def check_expectation(run: RunFile, item: Comparison | Conservation, place: Place) -> Iterator[Defect]:
     """An expectation other than agreement has a reason, and the bounds that belong to it and no other."""
     if item.expect != "agree" and not item.reason.strip():
         yield problem(place.key("reason"), "an expected status needs a reason", "say why it is so")
@@ -59,7 +59,7 @@ def _remedy(item: Comparison | Conservation, key: str) -> str:
     }[key]
 
 
-def _covered(item: Comparison, place: Place) -> Iterator[Problem]:
+def _covered(item: Comparison, place: Place) -> Iterator[Defect]:
     """Every goal's pattern has its band: the same pattern, or one that names it or a part of it."""
     for pattern in item.goals:
         if not any(_related(pattern, each) for each in item.band):
@@ -71,7 +71,7 @@ def _related(goal: str, band: str) -> bool:
     return one == other
 
 
-def check_band(band: Band, place: Place) -> Iterator[Problem]:
+def check_band(band: Band, place: Place) -> Iterator[Defect]:
     """A band is two positive numbers that are not too far apart."""
     low, high = band
     if not 0.0 < low < high < math.inf:

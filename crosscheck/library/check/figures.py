@@ -8,10 +8,10 @@ from collections.abc import Iterator
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import RunFile
 from crosscheck.library.check.ranges import ROOT, problem
-from flexmb.scene.problems import Problem
+from flexmb.scene.problems import Defect
 
 
-def check_figures(accepted: Accepted, run: RunFile) -> Iterator[Problem]:
+def check_figures(accepted: Accepted, run: RunFile) -> Iterator[Defect]:
     """The problems of the figures that were accepted for a case."""
     names = [item.name for item in run.comparisons]
     names += [f"{item.quantity.replace('_', ' ')} conserved" for item in run.conservations]

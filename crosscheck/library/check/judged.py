@@ -15,10 +15,10 @@ from crosscheck.library.check.runs import (
     no_variant,
 )
 from crosscheck.library.patterns import fault
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 
 
-def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Problem]:
+def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[Defect]:
     """The problems of a comparison."""
     yield from check_patterns(item.goals, item.scales, place)
     yield from check_expectation(run, item, place)
@@ -47,7 +47,7 @@ def check_comparison(run: RunFile, item: Comparison, place: Place) -> Iterator[P
         yield problem(place.key("b"), "it is a: a result agrees with itself", "name another engine or variant")
 
 
-def check_control(run: RunFile, item: Control, place: Place) -> Iterator[Problem]:
+def check_control(run: RunFile, item: Control, place: Place) -> Iterator[Defect]:
     """The problems of a negative control."""
     yield from check_patterns(item.goals, item.scales, place)
     for key, side in (("a", item.a), ("b", item.b)):
@@ -57,7 +57,7 @@ def check_control(run: RunFile, item: Control, place: Place) -> Iterator[Problem
 
 def check_conservation(
     run: RunFile, item: Conservation, place: Place, seen: set[tuple[str, str, str]]
-) -> Iterator[Problem]:
+) -> Iterator[Defect]:
     """The problems of a conserved quantity; `seen` are those checked before it: (variant, quantity, engine)."""
     yield from check_sides_run(run, item.variant, item.engines, place)
     yield from check_engines_once(item.engines, place.key("engines"))
@@ -74,7 +74,7 @@ def check_conservation(
         seen.add((item.variant, item.quantity, engine))
 
 
-def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Problem]:
+def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Defect]:
     """The problems of a chart."""
     yield from check_pattern(chart.observable, place.key("observable"))
     names = [variant.name for variant in run.variants]
@@ -83,7 +83,7 @@ def check_chart(run: RunFile, chart: Chart, place: Place) -> Iterator[Problem]:
             yield no_variant(name, names, place.key(key))
 
 
-def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Place) -> Iterator[Problem]:
+def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Place) -> Iterator[Defect]:
     """The problems of goals and of scales."""
     if not goals:
         yield problem(place.key("goals"), "name at least one channel and its goal", '{ "marker" = 1e-6 }')
@@ -95,7 +95,7 @@ def check_patterns(goals: dict[str, float], scales: dict[str, float], place: Pla
         yield from check_within(scale, SIZES, place.key("scales", pattern))
 
 
-def check_pattern(pattern: str, place: Place) -> Iterator[Problem]:
+def check_pattern(pattern: str, place: Place) -> Iterator[Defect]:
     """A pattern must be able to name a channel."""
     why = fault(pattern)
     if why:

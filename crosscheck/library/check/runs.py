@@ -6,10 +6,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from crosscheck.library.case import ComparisonSide, RunFile, Variant
 from crosscheck.library.check.ranges import problem
-from flexmb.scene.problems import Place, Problem, closest
+from flexmb.scene.problems import Defect, Place, closest
 
 
-def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Place) -> Iterator[Problem]:
+def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Place) -> Iterator[Defect]:
     """The variant must be there, and must be run by the engines."""
     variant = find_variant(run, name)
     if variant is None:
@@ -18,7 +18,7 @@ def check_sides_run(run: RunFile, name: str, engines: Iterable[str], place: Plac
         yield from check_engines_run(variant, engines, place)
 
 
-def check_engines_run(variant: Variant, engines: Iterable[str], place: Place) -> Iterator[Problem]:
+def check_engines_run(variant: Variant, engines: Iterable[str], place: Place) -> Iterator[Defect]:
     """The variant must be run by the engines."""
     for engine in engines:
         if engine not in (*variant.engines, *variant.also):
@@ -26,13 +26,13 @@ def check_engines_run(variant: Variant, engines: Iterable[str], place: Place) ->
             yield problem(place, text, "add it to the variant's engines")
 
 
-def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Problem]:
+def check_engines_once(engines: Sequence[str], place: Place) -> Iterator[Defect]:
     """Each engine is named once."""
     for engine in dict.fromkeys(engine for engine in engines if engines.count(engine) > 1):
         yield problem(place, f'engine "{engine}" is listed twice', "name it once")
 
 
-def check_same_times(run: RunFile, a: ComparisonSide, b: ComparisonSide, place: Place) -> Iterator[Problem]:
+def check_same_times(run: RunFile, a: ComparisonSide, b: ComparisonSide, place: Place) -> Iterator[Defect]:
     """Two sides that are compared must have the same sample times."""
     variants = [find_variant(run, side.variant) for side in (a, b)]
     if len({(each.duration_s or run.duration_s, each.samples or run.samples) for each in variants if each}) > 1:
@@ -45,6 +45,6 @@ def find_variant(run: RunFile, name: str) -> Variant | None:
     return next((variant for variant in run.variants if variant.name == name), None)
 
 
-def no_variant(name: str, names: Sequence[str], place: Place) -> Problem:
+def no_variant(name: str, names: Sequence[str], place: Place) -> Defect:
     """The problem that there is no variant called `name`."""
     return problem(place, f'no variant "{name}"; the variants are {", ".join(names)}', closest(name, names))

@@ -15,7 +15,7 @@ from crosscheck.library.check.ranges import (
     problem,
 )
 from crosscheck.library.check.runs import check_engines_once, check_engines_run
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 
 MOST_STEPS = 1e8  # of one run with fixed steps: hours
 MOST_EFFORTS = 20
@@ -23,7 +23,7 @@ TOLERANCES = (1e-15, 0.5)  # below, rounding decides; above, nothing is solved
 ORDERS = (0.1, 16.0)
 
 
-def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Problem]:
+def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defect]:
     """The problems of a variant."""
     if not variant.engines:
         yield problem(place.key("engines"), "name at least one engine", "for example [\"native\"]")
@@ -55,7 +55,7 @@ def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Prob
         yield from _ladder(variant, ladder, duration, place.key("efforts", i))
 
 
-def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Problem]:
+def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Defect]:
     counts = {key: getattr(refined, key) for key in ("segments", "pieces", "elements")}
     if all(count is None for count in counts.values()):
         yield problem(place, "it refines nothing", "give segments, pieces or elements")
@@ -70,7 +70,7 @@ def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Probl
     yield from check_within(refined.order, ORDERS, place.key("order"))
 
 
-def _ladder(variant: Variant, ladder: EffortLadder, duration: float, place: Place) -> Iterator[Problem]:
+def _ladder(variant: Variant, ladder: EffortLadder, duration: float, place: Place) -> Iterator[Defect]:
     yield from check_engines_run(variant, (ladder.engine,), place.key("engine"))
     where = place.key("values")
     if not 2 <= len(ladder.values) <= MOST_EFFORTS:

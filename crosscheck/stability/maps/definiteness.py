@@ -14,7 +14,7 @@ from flexmb.modal.flexible import beam_model
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import BeamStation, ModalState, Modes, Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 

@@ -8,7 +8,7 @@ from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, g
 from crosscheck.stability.spectrum import growth_rate
 from flexmb.scene.build import SceneBuilder, linear
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 SPIN, TRANSVERSE = 1.0, 1.0  # rad/s, kg m^2

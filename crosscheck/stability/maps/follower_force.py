@@ -13,7 +13,7 @@ from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import BeamStation, Modes, Scene, TipMass
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 LENGTH, STIFFNESS, MASS = 1.0, 1.0, 1.0  # m, N m^2, kg/m: loads are P L^2/EI, times sqrt(mass L^4/EI)

@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, digit_kinds
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 

@@ -8,7 +8,7 @@ from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, d
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 ALGORITHMS: tuple[Algorithm, ...] = ("articulated", "composite", "frisch")

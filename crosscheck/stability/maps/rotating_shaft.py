@@ -9,7 +9,7 @@ from crosscheck.stability.map import Axis, Measurement, Overlay, StabilityMap, g
 from flexmb.scene.build import SceneBuilder, angular, linear
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 MASS, OMEGA = 1.0, 1.0  # kg, rad/s: the disc and its critical speed

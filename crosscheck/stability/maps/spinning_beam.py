@@ -9,7 +9,7 @@ from crosscheck.stability.spectrum import growth_rate, states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamStation, Modes, Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 LEVELS = ("ruthless", "linear", "full", "stiffened")

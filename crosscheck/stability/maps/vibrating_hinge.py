@@ -11,7 +11,7 @@ from crosscheck.stability.spectrum import states_of
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Sine
 from flexmb.scene.schema import Scene
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 GRAVITY, LENGTH = 9.81, 1.0

@@ -15,7 +15,7 @@ from flexmb.scene.check.profiles import functions
 from flexmb.scene.check.topology import tree
 from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
 from flexmb.scene.convert import plain, to_struct
-from flexmb.scene.problems import Problem, SceneError
+from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.schema import Scene
 
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
@@ -47,9 +47,9 @@ def check_run(scene: Scene, t_end: float) -> None:
         raise SceneError(scene.name, problems)
 
 
-def _run_time(t_end: float | None) -> Iterator[Problem]:
+def _run_time(t_end: float | None) -> Iterator[Defect]:
     if t_end is not None and not (isfinite(t_end) and t_end > 0.0):
-        yield Problem("t_end", f"the run ends at {t_end} s", "give a positive, finite time")
+        yield Defect("t_end", f"the run ends at {t_end} s", "give a positive, finite time")
 
 
-__all__ = ["Problem", "SceneError", "check_run", "check_scene"]
+__all__ = ["Defect", "SceneError", "check_run", "check_scene"]

@@ -8,7 +8,7 @@ from math import sqrt
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes
 from flexmb.scene.check import inertia
 from flexmb.scene.check.walk import sound
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
@@ -21,7 +21,7 @@ STIFFNESS = ("EA_N", "EIy_Nm2", "EIz_Nm2", "GJ_Nm2")
 SHEAR = ("GAy_N", "GAz_N")
 
 
-def beams(scene: Scene) -> Iterator[Problem]:
+def beams(scene: Scene) -> Iterator[Defect]:
     """Problems of every beam body."""
     for place, body in sound(scene, "bodies"):
         if isinstance(body, BeamBody):
@@ -36,92 +36,92 @@ def mode_count(body: BeamBody) -> int:
     return body.modes.count + (_attachments(body) if body.modes.static else 0)
 
 
-def _mesh(place: Place, body: BeamBody) -> Iterator[Problem]:
+def _mesh(place: Place, body: BeamBody) -> Iterator[Defect]:
     if body.length_m <= 0.0:
-        yield Problem(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
+        yield Defect(str(place.key("length_m")), f"the length is {body.length_m:g} m", "give a positive length")
     if body.elements < 1:
-        yield Problem(str(place.key("elements")), f"{body.elements} elements", "use one element at least")
+        yield Defect(str(place.key("elements")), f"{body.elements} elements", "use one element at least")
 
 
-def _stations(place: Place, body: BeamBody) -> Iterator[Problem]:
+def _stations(place: Place, body: BeamBody) -> Iterator[Defect]:
     positions = [station.x_m for station in body.stations]
     spot = place.key("stations")
     if any(left > right for left, right in zip(positions, positions[1:], strict=False)):
-        yield Problem(str(spot), "the stations are not in order", "sort them by x_m")
+        yield Defect(str(spot), "the stations are not in order", "sort them by x_m")
     elif len(positions) < 2 or positions[0] != 0.0 or positions[-1] != body.length_m:
         covered = f"{positions[0]:g} m to {positions[-1]:g} m" if positions else "nothing"
         remedy = f"give the section at x_m = 0 and at x_m = {body.length_m!r}; a uniform beam has the same one twice"
-        yield Problem(str(spot), f"the stations cover {covered}, the beam 0 m to {body.length_m:g} m", remedy)
+        yield Defect(str(spot), f"the stations cover {covered}, the beam 0 m to {body.length_m:g} m", remedy)
     for i, station in enumerate(body.stations):
         for key in (*STIFFNESS, "mass_per_length_kg_m"):
             if (value := getattr(station, key)) <= 0.0:
-                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
+                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
         for key in ("rotary_y_kg_m", "rotary_z_kg_m"):
             if (value := getattr(station, key)) < 0.0:
-                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a rotary inertia of at least zero")
+                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a rotary inertia of at least zero")
         for key in SHEAR:
             value = getattr(station, key)
             if body.theory == "timoshenko" and value is None:
-                yield Problem(str(spot.key(i)), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
+                yield Defect(str(spot.key(i)), f"a Timoshenko beam needs {key}", f"add {key}, or use euler-bernoulli")
             elif value is not None and value <= 0.0:
-                yield Problem(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
+                yield Defect(str(spot.key(i, key)), f"{key} is {value:g}", "give a positive value")
         if all(getattr(station, key) > 0.0 for key in (*STIFFNESS, "mass_per_length_kg_m")):
             yield from _plausible(spot.key(i), station, body.length_m)
 
 
-def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Problem]:
+def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Defect]:
     """Problems that look like a slip of units in one of the stiffnesses, or between stiffness and mass."""
     check = "check the units, a factor of 1000 for instance"
     speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
     if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
         what = f"waves would run along the beam at {speed:.3g} m/s: no material does that"
         window = f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
-        yield Problem(str(spot.key("EA_N")), what, f"{check}: {window}")
+        yield Defect(str(spot.key("EA_N")), what, f"{check}: {window}")
         return
     for key in ("EIy_Nm2", "EIz_Nm2"):
         gyration = sqrt(getattr(station, key) / station.EA_N)
         if gyration > THICKEST * length > 0.0:
             what = f"the section's radius of gyration would be {gyration:.3g} m in a beam of {length:.3g} m"
-            yield Problem(str(spot.key(key)), what, f"{check}: sqrt(EI / EA) is a fraction of the section's width")
+            yield Defect(str(spot.key(key)), what, f"{check}: sqrt(EI / EA) is a fraction of the section's width")
     for key, limit in (("GJ_Nm2", station.EIy_Nm2 + station.EIz_Nm2), ("GAy_N", station.EA_N), ("GAz_N", station.EA_N)):
         value = getattr(station, key)
         if value is not None and value > STIFFEST_SHEAR * limit:
             counterpart = "EIy + EIz" if key == "GJ_Nm2" else "EA"
             what = f"{key} is {value / limit:.3g} times {counterpart}"
-            yield Problem(str(spot.key(key)), what, f"{check}: G is smaller than E in every isotropic material")
+            yield Defect(str(spot.key(key)), what, f"{check}: G is smaller than E in every isotropic material")
 
 
-def _along(place: Place, body: BeamBody) -> Iterator[Problem]:
+def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
     for key in ("nodes", "tip_masses"):
         for i, item in enumerate(getattr(body, key)):
             if not 0.0 <= item.x_m <= body.length_m:
                 what = f"x_m = {item.x_m:g} m is not on the beam"
-                yield Problem(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
+                yield Defect(str(place.key(key, i, "x_m")), what, f"choose 0 <= x_m <= {body.length_m:g}")
     for i, lump in enumerate(body.tip_masses):
         yield from inertia.mass(place.key("tip_masses", i, "mass_kg"), lump.mass_kg, zero=False)
         yield from inertia.tensor(place.key("tip_masses", i, "inertia_kg_m2"), lump.inertia_kg_m2)
 
 
-def _modes(place: Place, body: BeamBody) -> Iterator[Problem]:
+def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     modes = body.modes
     if not modes.families or len(set(modes.families)) < len(modes.families):
-        yield Problem(str(place.key("families")), f"the families are {modes.families}", "list each wanted family once")
+        yield Defect(str(place.key("families")), f"the families are {modes.families}", "list each wanted family once")
     if modes.count < 0 or mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
-        yield Problem(str(place.key("count")), f"{modes.count} modes", remedy)
+        yield Defect(str(place.key("count")), f"{modes.count} modes", remedy)
     elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
-        yield Problem(str(place.key("count")), what, "use more elements, more families, or fewer modes")
+        yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
     yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
 
 
-def _damping(place: Place, modes: Modes, count: int) -> Iterator[Problem]:
+def _damping(place: Place, modes: Modes, count: int) -> Iterator[Defect]:
     ratios = modes.damping_ratio
     if isinstance(ratios, tuple) and len(ratios) != count:
         what = f"{len(ratios)} damping ratios for {count} modes"
-        yield Problem(str(place), what, "give one ratio for all modes, or one for each")
+        yield Defect(str(place), what, "give one ratio for all modes, or one for each")
     if any(ratio < 0.0 for ratio in (ratios if isinstance(ratios, tuple) else (ratios,))):
-        yield Problem(str(place), "a negative damping ratio feeds energy into the mode", "give ratios of at least zero")
+        yield Defect(str(place), "a negative damping ratio feeds energy into the mode", "give ratios of at least zero")
 
 
 def _attachments(body: BeamBody) -> int:

@@ -12,14 +12,14 @@ from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
 NOT_NEGATIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
 
 
-def hinges(scene: Scene) -> Iterator[Problem]:
+def hinges(scene: Scene) -> Iterator[Defect]:
     """Springs and dampers that dissipate or store, motors that can act, gimbal sequences that exist."""
     for place, hinge in sound(scene, "hinges"):
         yield from _springs(place, hinge)
@@ -28,15 +28,15 @@ def hinges(scene: Scene) -> Iterator[Problem]:
             yield from _gimbal(place, hinge)
 
 
-def closures(scene: Scene) -> Iterator[Problem]:
+def closures(scene: Scene) -> Iterator[Defect]:
     """A closure of a kind without an axis must not be given one."""
     for place, closure in sound(scene, "closures"):
         if closure.axis != Z_AXIS and closure.type not in WITH_AXIS:
             what = f"a {closure.type} closure has no axis of its own"
-            yield Problem(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
+            yield Defect(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
 
 
-def wheels(scene: Scene) -> Iterator[Problem]:
+def wheels(scene: Scene) -> Iterator[Defect]:
     """A wheel has a possible inertia and either a motor or a prescribed spin."""
     for place, wheel in sound(scene, "wheels"):
         yield from inertia.mass(place.key("mass_kg"), wheel.mass_kg)
@@ -45,36 +45,36 @@ def wheels(scene: Scene) -> Iterator[Problem]:
         yield from _drive(place, wheel, ("angle_rad", "speed_rad_s"), "torque_Nm", "prescribed_rad")
 
 
-def point_masses(scene: Scene) -> Iterator[Problem]:
+def point_masses(scene: Scene) -> Iterator[Defect]:
     """A point mass has mass, at most three orthogonal directions, and a coordinate for each if any."""
     for place, item in sound(scene, "point_masses"):
         yield from inertia.mass(place.key("mass_kg"), item.mass_kg, zero=False)
         count = len(item.directions)
         if count > 3:
-            yield Problem(str(place.key("directions")), f"{count} directions in space", "give three at most")
+            yield Defect(str(place.key("directions")), f"{count} directions in space", "give three at most")
         product = np.array(item.directions).reshape(-1, 3) @ np.array(item.directions).reshape(-1, 3).T
         skew = np.abs(np.triu(product, 1)) > UNIT_LENGTH
         for i, j in np.argwhere(skew):
             what = f"directions {i} and {j} are not orthogonal: their product is {product[i, j]:.3g}"
-            yield Problem(str(place.key("directions")), what, "give orthonormal directions")
+            yield Defect(str(place.key("directions")), what, "give orthonormal directions")
         if count == 3 and np.linalg.det(item.directions) < 0.0:
             remedy = "swap two of them, and their coordinates"
-            yield Problem(str(place.key("directions")), "the three directions are left-handed", remedy)
+            yield Defect(str(place.key("directions")), "the three directions are left-handed", remedy)
         if item.coordinates and len(item.coordinates) != count:
             what = f"{len(item.coordinates)} coordinates for {count} directions"
-            yield Problem(str(place.key("coordinates")), what, "give one coordinate for each direction, or none")
+            yield Defect(str(place.key("coordinates")), what, "give one coordinate for each direction, or none")
         yield from _coordinates(place, item)
 
 
-def _springs(place: Place, item: SceneStruct) -> Iterator[Problem]:
+def _springs(place: Place, item: SceneStruct) -> Iterator[Defect]:
     for key in NOT_NEGATIVE:
         value = getattr(item, key, 0.0)
         if value < 0.0:
             noun = key.split("_")[0]
-            yield Problem(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
+            yield Defect(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
 
 
-def _coordinates(place: Place, item: Any) -> Iterator[Problem]:
+def _coordinates(place: Place, item: Any) -> Iterator[Defect]:
     for name, coordinate in coordinates(item):
         spot = Place(f"{place.path}.{name}", place.names)
         yield from _springs(spot, coordinate)
@@ -87,35 +87,35 @@ def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
     return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
 
 
-def _drive(place: Place, item: SceneStruct, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Problem]:
+def _drive(place: Place, item: SceneStruct, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Defect]:
     profile = getattr(item, motion)
     if profile is None:
         return
     if getattr(item, motor) is not None:
         what = f"{motor} on a prescribed coordinate cannot change the motion"
-        yield Problem(str(place.key(motor)), what, f"leave out {motor} or {motion}; the drive load is an output")
+        yield Defect(str(place.key(motor)), what, f"leave out {motor} or {motion}; the drive load is an output")
     yield from initial_motion(place, item, keys, profile)
 
 
-def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Problem]:
+def _gimbal(place: Place, hinge: Gimbal) -> Iterator[Defect]:
     sequence = hinge.sequence
     if len(sequence) not in (2, 3) or set(sequence) - set("xyz"):
         what = f'"{sequence}" is not a sequence of two or three axes'
-        yield Problem(str(place.key("sequence")), what, 'write two or three of x, y, z, for example "zxz"')
+        yield Defect(str(place.key("sequence")), what, 'write two or three of x, y, z, for example "zxz"')
     elif any(first == second for first, second in zip(sequence, sequence[1:], strict=False)):
         what = f'"{sequence}" repeats an axis: two successive rotations about it are one'
-        yield Problem(str(place.key("sequence")), what, "let neighbouring axes differ")
+        yield Defect(str(place.key("sequence")), what, "let neighbouring axes differ")
     if len(hinge.rotations) != len(sequence):
         what = f'{len(hinge.rotations)} rotations for the {len(sequence)} axes of "{sequence}"'
-        yield Problem(str(place.key("rotations")), what, "give one rotation for each axis")
+        yield Defect(str(place.key("rotations")), what, "give one rotation for each axis")
 
 
-def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Problem]:
+def _wheel_inertia(place: Place, wheel: Wheel) -> Iterator[Defect]:
     axial, transverse = wheel.axial_inertia_kg_m2, wheel.transverse_inertia_kg_m2
     if axial <= 0.0:
         what = f"the axial inertia is {axial:g} kg m²"
-        yield Problem(str(place.key("axial_inertia_kg_m2")), what, "give a positive one: a wheel stores spin")
+        yield Defect(str(place.key("axial_inertia_kg_m2")), what, "give a positive one: a wheel stores spin")
     elif axial > 2.0 * transverse * (1.0 + inertia.PRINTED):
         what = f"the axial inertia {axial:g} exceeds twice the transverse inertia {transverse:g} kg m²"
         remedy = f"no wheel has this: the transverse inertia is {axial / 2.0:g} kg m² at least (a flat disc)"
-        yield Problem(str(place.key("transverse_inertia_kg_m2")), what, remedy)
+        yield Defect(str(place.key("transverse_inertia_kg_m2")), what, remedy)

@@ -9,14 +9,14 @@ from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import RigidBody
 from flexmb.scene.check.walk import sound
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
 # Tensors printed to ten digits fulfil symmetry and the triangle inequality (an equality for a flat body) this well.
 PRINTED = 1e-9
 
 
-def rigid_bodies(scene: Scene) -> Iterator[Problem]:
+def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     """A mass that is not negative, and a tensor that some distribution of that mass has."""
     for place, body in sound(scene, "bodies"):
         if isinstance(body, RigidBody):
@@ -24,18 +24,18 @@ def rigid_bodies(scene: Scene) -> Iterator[Problem]:
             yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2)
             if body.mass_kg == 0.0 and np.any(body.inertia_kg_m2):
                 what = "a body without mass cannot have inertia"
-                yield Problem(str(place.key("mass_kg")), what, "give its mass, or set its inertia to zero too")
+                yield Defect(str(place.key("mass_kg")), what, "give its mass, or set its inertia to zero too")
 
 
-def mass(place: Place, value: float, *, zero: bool = True) -> Iterator[Problem]:
+def mass(place: Place, value: float, *, zero: bool = True) -> Iterator[Defect]:
     """A mass is not negative, and positive where `zero` is not allowed."""
     if value < 0.0:
-        yield Problem(str(place), f"the mass is negative: {value:g} kg", "give a mass of at least zero")
+        yield Defect(str(place), f"the mass is negative: {value:g} kg", "give a mass of at least zero")
     elif value == 0.0 and not zero:
-        yield Problem(str(place), "the mass is zero", "give a positive mass, or leave the item out")
+        yield Defect(str(place), "the mass is zero", "give a positive mass, or leave the item out")
 
 
-def tensor(place: Place, value: ArrayLike) -> Iterator[Problem]:
+def tensor(place: Place, value: ArrayLike) -> Iterator[Defect]:
     """An inertia tensor is symmetric, positive semidefinite, and its moments fulfil J1 + J2 >= J3."""
     inertia = np.asarray(value, dtype=np.float64)
     slack = PRINTED * float(np.max(np.abs(inertia), initial=0.0))
@@ -43,13 +43,13 @@ def tensor(place: Place, value: ArrayLike) -> Iterator[Problem]:
     if np.any(gap > slack):
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
         what = f"the inertia is not symmetric: [{i}][{j}] is {inertia[i, j]:g}, [{j}][{i}] is {inertia[j, i]:g}"
-        yield Problem(str(place), what, "give the same value on both sides of the diagonal")
+        yield Defect(str(place), what, "give the same value on both sides of the diagonal")
         return
     low, middle, high = np.linalg.eigvalsh(inertia)
     moments = f"its principal moments are {low:.6g}, {middle:.6g}, {high:.6g} kg m²"
     if low < -slack:
         remedy = "check the signs of the products: the tensor's off-diagonal elements are -∫ x y dm"
-        yield Problem(str(place), f"the inertia is not positive semidefinite: {moments}", remedy)
+        yield Defect(str(place), f"the inertia is not positive semidefinite: {moments}", remedy)
     elif low + middle < high - slack:
         remedy = "no mass distribution has this tensor: the two smaller moments must add up to the largest at least"
-        yield Problem(str(place), f"the inertia breaks the triangle inequality: {moments}", remedy)
+        yield Defect(str(place), f"the inertia breaks the triangle inequality: {moments}", remedy)

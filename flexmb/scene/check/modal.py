@@ -14,7 +14,7 @@ from flexmb.scene.check.beams import mode_count
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -24,7 +24,7 @@ PRINTED = 1e-9  # matrices printed to ten digits are symmetric, and modes zero a
 SPEED = (1e-3, 20_000.0)
 
 
-def modal_bodies(scene: Scene) -> Iterator[Problem]:
+def modal_bodies(scene: Scene) -> Iterator[Defect]:
     """Problems of every raw modal body."""
     for place, body in sound(scene, "bodies"):
         if isinstance(body, ModalBody):
@@ -36,7 +36,7 @@ def modal_bodies(scene: Scene) -> Iterator[Problem]:
                 yield from second_order(place, body, arrays)
 
 
-def modal_states(scene: Scene) -> Iterator[Problem]:
+def modal_states(scene: Scene) -> Iterator[Defect]:
     """Initial modal coordinates belong to a flexible body and number as many as its modes."""
     bodies = {body.name: body for body in scene.bodies}
     for place, state in entries(scene, "modal_states"):
@@ -44,13 +44,13 @@ def modal_states(scene: Scene) -> Iterator[Problem]:
         if body is None or isinstance(body, SidBody):
             continue
         if isinstance(body, RigidBody) or body.level == "rigid":
-            yield Problem(str(place.key("body")), f'body "{body.name}" is rigid: it has no modes', "leave it out")
+            yield Defect(str(place.key("body")), f'body "{body.name}" is rigid: it has no modes', "leave it out")
             continue
         count = mode_count(body) if isinstance(body, BeamBody) else _inline_modes(body)
         for key, given, required in (("coordinates", state.coordinates, True), ("rates", state.rates, False)):
             if count is not None and len(given) != count and (given or required):
                 what = f'{len(given)} modal {key} for the {count} modes of body "{body.name}"'
-                yield Problem(str(place.key(key)), what, f"give {count} values")
+                yield Defect(str(place.key(key)), what, f"give {count} values")
 
 
 def _inline_modes(body: ModalBody) -> int | None:
@@ -60,31 +60,31 @@ def _inline_modes(body: ModalBody) -> int | None:
         return None  # reported with the body
 
 
-def _read(place: Place, body: ModalBody) -> Generator[Problem, None, ModalArrays | None]:
+def _read(place: Place, body: ModalBody) -> Generator[Defect, None, ModalArrays | None]:
     """Yields what is wrong with the data and returns its arrays, or None."""
     if bool(body.points) == (body.file is not None):
         what = "both points and file are given" if body.points else "neither points nor file is given"
-        yield Problem(str(place), what, "give the points inline, or the name of an .npz file")
+        yield Defect(str(place), what, "give the points inline, or the name of an .npz file")
         return None
     spot = place.key("file" if body.file is not None else "points")
     try:
         arrays = modal_arrays(body)
     except OSError as error:
         remedy = "put the file beside the scene file, or correct its name"
-        yield Problem(str(spot), f'cannot read "{body.file}": {error.strerror or error}', remedy)
+        yield Defect(str(spot), f'cannot read "{body.file}": {error.strerror or error}', remedy)
     except ValueError as error:
-        yield Problem(str(spot), str(error), "give arrays of the shapes that the reference of ModalBody lists")
+        yield Defect(str(spot), str(error), "give arrays of the shapes that the reference of ModalBody lists")
     else:
         huge = (name for name, array in arrays.given.items() if not np.all(np.abs(array) <= LARGEST))
         broken = next(huge, None)
         if broken is None:
             return arrays
         remedy = f"give finite numbers, of at most {LARGEST:g}"
-        yield Problem(str(spot), f'"{broken}" holds a NaN, or a number beyond {LARGEST:g}', remedy)
+        yield Defect(str(spot), f'"{broken}" holds a NaN, or a number beyond {LARGEST:g}', remedy)
     return None
 
 
-def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     spot = place.key("file" if body.file is not None else "points")
     for j, (mass, tensor) in enumerate(zip(arrays.mass, arrays.inertia, strict=True)):
         point = spot.key(j) if body.file is None else spot.named(f"point {j}")
@@ -92,17 +92,17 @@ def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Prob
         if np.any(tensor):
             yield from inertia.tensor(point, tensor)
     if not np.any(arrays.mass > 0.0):
-        yield Problem(str(spot), "the body has no mass", "give its points mass")
+        yield Defect(str(spot), "the body has no mass", "give its points mass")
 
 
-def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     m = arrays.translation_modes.shape[2]
     if m == 0:
         if body.level != "rigid":
-            yield Problem(str(place), "the body has no modes", 'make it a rigid body, or its level "rigid"')
+            yield Defect(str(place), "the body has no modes", 'make it a rigid body, or its level "rigid"')
         return
     if not np.any(arrays.stiffness):
-        yield Problem(str(place.key("stiffness")), "the modes have no stiffness", f"give the {m} x {m} modal stiffness")
+        yield Defect(str(place.key("stiffness")), "the modes have no stiffness", f"give the {m} x {m} modal stiffness")
         return
     for name, matrix in (("stiffness", arrays.stiffness), ("damping", arrays.damping)):
         slack = PRINTED * float(np.max(np.abs(matrix)))
@@ -110,20 +110,20 @@ def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Pr
         if np.any(gap > slack):
             i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
             what = f"the {name} is not symmetric: [{i}][{j}] is {matrix[i, j]:g}, [{j}][{i}] is {matrix[j, i]:g}"
-            yield Problem(str(place.key(name)), what, "give a symmetric matrix")
+            yield Defect(str(place.key(name)), what, "give a symmetric matrix")
         elif (lowest := float(np.linalg.eigvalsh(matrix)[0])) < -slack:
             what = f"the {name} is indefinite: its lowest eigenvalue is {lowest:.3g}"
-            yield Problem(str(place.key(name)), what, "give a positive semidefinite matrix: check its signs")
+            yield Defect(str(place.key(name)), what, "give a positive semidefinite matrix: check its signs")
 
 
-def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     m = arrays.translation_modes.shape[2]
     for i, node in enumerate(body.nodes):
         for key in ("translation_modes", "rotation_modes"):
             if len(getattr(node, key)) != m:
                 what = f"{len(getattr(node, key))} shapes for {m} modes"
                 spot = place.key("nodes", i, key).named(f'node "{node.name}"')
-                yield Problem(str(spot), what, "give one vector for each mode")
+                yield Defect(str(spot), what, "give one vector for each mode")
     if m == 0:
         return
     if body.boundary == "clamped-free":
@@ -134,20 +134,20 @@ def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Prob
     slack = m * len(arrays.mass) * np.finfo(float).eps
     if np.any(d <= 0.0):
         n = int(np.argmin(d))
-        yield Problem(str(place), f"mode {n} moves no mass", "leave the mode out, or give the points it moves mass")
+        yield Defect(str(place), f"mode {n} moves no mass", "leave the mode out, or give the points it moves mass")
         return
     scale = 1.0 / np.sqrt(np.outer(d, d))
     if np.linalg.eigvalsh(M * scale)[0] < slack:
-        yield Problem(str(place), "the modes are not independent: their mass matrix is singular", "drop one of them")
+        yield Defect(str(place), "the modes are not independent: their mass matrix is singular", "drop one of them")
         return
     floating = M - coupling.T @ np.linalg.pinv(rigid) @ coupling
     if body.boundary == "free-free" and np.linalg.eigvalsh(floating * scale)[0] < slack:
         remedy = "the body frame carries the rigid-body motion: remove it from the modes"
-        yield Problem(str(place), "a combination of the free-free modes is a rigid-body motion", remedy)
+        yield Defect(str(place), "a combination of the free-free modes is a rigid-body motion", remedy)
         return
     if body.boundary == "clamped-free" and _is_loose(arrays, floating, scale, slack):
         what = "a combination of the clamped modes is a rigid-body motion without strain energy"
-        yield Problem(str(place), what, "the hinge carries the rigid-body motion: remove it from the modes")
+        yield Defect(str(place), what, "the hinge carries the rigid-body motion: remove it from the modes")
         return
     yield from _frequency(place, arrays, M)
 
@@ -164,7 +164,7 @@ def _is_loose(arrays: ModalArrays, floating: Real, scale: Real, slack: float) ->
     return bool(np.any(held <= slack * float(np.max(np.abs(stiffness), initial=0.0))))
 
 
-def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     """Clamped modes must vanish at the body origin: at the node listed there, and at a point that sits there."""
     remedy = 'subtract the rigid-body part from the mode, or make the boundary "free-free"'
     size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
@@ -184,7 +184,7 @@ def _clamp(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Probl
         turned = size * np.max(np.abs(rotation), axis=0) > PRINTED * largest
         if np.any(moved) or np.any(turned):
             n = int(np.argmax(moved if np.any(moved) else turned))
-            yield Problem(str(spot), f"mode {n} moves the clamp: it has rigid-body content", remedy)
+            yield Defect(str(spot), f"mode {n} moves the clamp: it has rigid-body content", remedy)
 
 
 def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
@@ -203,7 +203,7 @@ def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
     return M[6:, 6:], M[:6, 6:], M[:6, :6]
 
 
-def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Problem]:
+def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Defect]:
     """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
     stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
     lowest = float(eigh(stiffness, M, eigvals_only=True, subset_by_index=[0, 0])[0])
@@ -214,4 +214,4 @@ def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Problem]:
     if not SPEED[0] <= frequency * size <= SPEED[1]:
         what = f"the lowest frequency is {frequency:.3g} Hz for a body of {size:.3g} m: no structure does that"
         remedy = "check the units of stiffness (N/m for modes without unit) against mass (kg): a factor of 1000, say?"
-        yield Problem(str(place.key("stiffness")), what, remedy)
+        yield Defect(str(place.key("stiffness")), what, remedy)

@@ -7,7 +7,7 @@ from typing import Any
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.check.walk import entries
-from flexmb.scene.problems import Place, Problem, closest
+from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, rest_frames
 
@@ -16,29 +16,29 @@ NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses", "closures"), ("l
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 
 
-def unique_names(scene: Scene) -> Iterator[Problem]:
+def unique_names(scene: Scene) -> Iterator[Defect]:
     """Every item has a name of its own, "ground" is the inertial frame, implicit nodes are not listed again."""
     for collections in NAMESPACES:
         yield from _unique(item for collection in collections for item in entries(scene, collection))
     for place, body in entries(scene, "bodies"):
         if body.name == GROUND:
-            yield Problem(str(place), 'the name "ground" is taken: it is the inertial frame', "rename the body")
+            yield Defect(str(place), 'the name "ground" is taken: it is the inertial frame', "rename the body")
         if isinstance(body, SidBody):
             continue
         yield from _unique((place.key("nodes", i), node) for i, node in enumerate(body.nodes))
         for i, node in enumerate(body.nodes):
             if node.name in IMPLICIT.get(type(body), ()):
                 what = f'node "{node.name}" exists without being listed'
-                yield Problem(str(place.key("nodes", i)), what, "rename the node or leave it out")
+                yield Defect(str(place.key("nodes", i)), what, "rename the node or leave it out")
     seen: dict[str, Place] = {}
     for place, state in entries(scene, "modal_states"):
         if state.body in seen:
             what = f"this body's modal state is already given at {seen[state.body].path}"
-            yield Problem(str(place), what, "merge the two")
+            yield Defect(str(place), what, "merge the two")
         seen.setdefault(state.body, place)
 
 
-def references(scene: Scene) -> Iterator[Problem]:
+def references(scene: Scene) -> Iterator[Defect]:
     """Every body and node that something refers to exists."""
     bodies = {body.name: body for body in scene.bodies}
     for place, hinge in entries(scene, "hinges"):
@@ -54,41 +54,41 @@ def references(scene: Scene) -> Iterator[Problem]:
             yield from _attachment(place, bodies, *ends, ground=True)
         if closure.body_a == closure.body_b:
             what = f'the closure joins "{closure.body_a}" to itself'
-            yield Problem(str(place), what, "give two different bodies")
+            yield Defect(str(place), what, "give two different bodies")
     for place, state in entries(scene, "modal_states"):
         yield from _body(place.key("body"), bodies, state.body)
 
 
-def _unique(items: Iterator[tuple[Place, Any]]) -> Iterator[Problem]:
+def _unique(items: Iterator[tuple[Place, Any]]) -> Iterator[Defect]:
     seen: dict[str, Place] = {}
     for place, item in items:
         if not item.name.strip() or not item.name.isprintable():
-            yield Problem(str(place.key("name")), f"{item.name!r} is not a name", "give a name of printable characters")
+            yield Defect(str(place.key("name")), f"{item.name!r} is not a name", "give a name of printable characters")
         elif item.name in seen:
             what = f'duplicate name "{item.name}": already used by {seen[item.name].path}'
-            yield Problem(str(place.key("name")), what, "rename one of the two")
+            yield Defect(str(place.key("name")), what, "rename one of the two")
         seen.setdefault(item.name, place)
 
 
 def _attachment(
     place: Place, bodies: dict[str, Body], to: tuple[str, str], at: tuple[str, str], *, ground: bool
-) -> Iterator[Problem]:
+) -> Iterator[Defect]:
     (body_key, body_name), (node_key, node) = to, at
     if body_name == GROUND and ground:
         if node != "origin":
             remedy = "leave the node out and give the offset of the hinge frame instead"
-            yield Problem(str(place.key(node_key)), f'the ground has no node "{node}"', remedy)
+            yield Defect(str(place.key(node_key)), f'the ground has no node "{node}"', remedy)
     elif body_name not in bodies:
         yield from _body(place.key(body_key), bodies, body_name, ground=ground)
     elif not isinstance(body := bodies[body_name], SidBody) and node not in (frames := rest_frames(body)):
         remedy = closest(node, frames)
         if isinstance(body, ModalBody) and node == "origin":
             remedy = 'a free-free modal body has a node "origin" only where it is listed with its mode shapes: list it'
-        yield Problem(str(place.key(node_key)), f'body "{body_name}" has no node "{node}"', remedy)
+        yield Defect(str(place.key(node_key)), f'body "{body_name}" has no node "{node}"', remedy)
 
 
-def _body(place: Place, bodies: dict[str, Body], name: str, *, ground: bool = False) -> Iterator[Problem]:
+def _body(place: Place, bodies: dict[str, Body], name: str, *, ground: bool = False) -> Iterator[Defect]:
     if name == GROUND and not ground:
-        yield Problem(str(place), "this cannot be the ground", "name a body")
+        yield Defect(str(place), "this cannot be the ground", "name a body")
     elif name not in bodies:
-        yield Problem(str(place), f'there is no body "{name}"', closest(name, [*bodies, GROUND] if ground else bodies))
+        yield Defect(str(place), f'there is no body "{name}"', closest(name, [*bodies, GROUND] if ground else bodies))

@@ -32,7 +32,7 @@ from flexmb.scene.hinges import (
     Weld,
 )
 from flexmb.scene.modal_data import modal_arrays
-from flexmb.scene.problems import Problem
+from flexmb.scene.problems import Defect
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, node_frame, ordered
 from flexmb.typing import Real
@@ -55,7 +55,7 @@ NEGLIGIBLE = 1e-12
 GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x^2
 
 
-def moved_inertia(scene: Scene) -> Iterator[Problem]:
+def moved_inertia(scene: Scene) -> Iterator[Defect]:
     """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be sound."""
     bodies = {body.name: body for body in scene.bodies}
     clusters = _clusters(scene)
@@ -65,7 +65,7 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
             continue
         if np.linalg.svd(H, compute_uv=False)[-1] <= NEGLIGIBLE:
             what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
-            yield Problem(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
+            yield Defect(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
             continue
         cluster, beyond = clusters[hinge.child]
         if cluster is None or beyond:
@@ -81,7 +81,7 @@ def moved_inertia(scene: Scene) -> Iterator[Problem]:
             noun = "mass along" if np.any(still) and not np.any(H[:3, still]) else "inertia about"
             what = f'body "{hinge.child}" and what is welded to it have no {noun} a free direction of this hinge'
             remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"
-            yield Problem(str(place), what, remedy)
+            yield Defect(str(place), what, remedy)
 
 
 def _clusters(scene: Scene) -> dict[str, Cluster]:

@@ -9,7 +9,7 @@ from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check.walk import non_finite, values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
 SAMPLES = 6  # a quintic spline needs degree + 1
@@ -19,7 +19,7 @@ MOTIONS = ("prescribed_rad", "prescribed_m")
 SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
 
 
-def functions(scene: Scene, t_end: float | None) -> Iterator[Problem]:
+def functions(scene: Scene, t_end: float | None) -> Iterator[Defect]:
     """Problems of every function in the scene; with `t_end` (s) a table must reach that far."""
     for place, key, value in values(ROOT, scene):
         if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
@@ -27,7 +27,7 @@ def functions(scene: Scene, t_end: float | None) -> Iterator[Problem]:
             if isinstance(value, Table):
                 yield from _covers(place, value, t_end)
             if isinstance(value, Pulse) and key in MOTIONS:
-                yield Problem(str(place), "a pulse jumps: no body can follow it", SMOOTH)
+                yield Defect(str(place), "a pulse jumps: no body can follow it", SMOOTH)
 
 
 def start_of(function: Function) -> tuple[float, float] | None:
@@ -52,7 +52,7 @@ def start_of(function: Function) -> tuple[float, float] | None:
     return None
 
 
-def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], function: Function) -> Iterator[Problem]:
+def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], function: Function) -> Iterator[Defect]:
     """A prescribed coordinate starts where its profile does: initial values are left out, or agree with it.
 
     `keys` are the schema keys of the initial value and rate of `item`.
@@ -64,40 +64,40 @@ def initial_motion(place: Place, item: SceneStruct, keys: tuple[str, str], funct
         given = getattr(item, key)
         if given != 0.0 and abs(given - profile) > PRINTED * max(1.0, abs(profile)):
             what = f"starts at {given:g}, but its prescribed motion at {profile:g}"
-            yield Problem(str(place.key(key)), what, f"leave {key} out: the profile says where the motion starts")
+            yield Defect(str(place.key(key)), what, f"leave {key} out: the profile says where the motion starts")
 
 
-def _well_formed(place: Place, function: Function) -> Iterator[Problem]:
+def _well_formed(place: Place, function: Function) -> Iterator[Defect]:
     duration = getattr(function, "duration_s", 1.0)
     if duration <= 0.0:
-        yield Problem(str(place.key("duration_s")), f"the duration is {duration:g} s", "give a positive duration")
+        yield Defect(str(place.key("duration_s")), f"the duration is {duration:g} s", "give a positive duration")
     if isinstance(function, Table):
         yield from _table(place, function)
 
 
-def _table(place: Place, table: Table) -> Iterator[Problem]:
+def _table(place: Place, table: Table) -> Iterator[Defect]:
     count = len(table.times_s)
     if len(table.values) != count:
         what = f"the table has {count} times but {len(table.values)} values"
-        yield Problem(str(place.key("values")), what, "give one value for each time")
+        yield Defect(str(place.key("values")), what, "give one value for each time")
     if count < SAMPLES:
         remedy = f"a quintic spline needs {SAMPLES} samples at least"
-        yield Problem(str(place.key("times_s")), f"the table has only {count} samples", remedy)
+        yield Defect(str(place.key("times_s")), f"the table has only {count} samples", remedy)
     for i in range(count - 1):
         if table.times_s[i + 1] <= table.times_s[i]:
             what = f"the table's times do not increase: {table.times_s[i]:g} s, then {table.times_s[i + 1]:g} s"
-            yield Problem(str(place.key("times_s", i + 1)), what, "sort the samples and drop repeated times")
+            yield Defect(str(place.key("times_s", i + 1)), what, "sort the samples and drop repeated times")
             return
 
 
-def _covers(place: Place, table: Table, t_end: float | None) -> Iterator[Problem]:
+def _covers(place: Place, table: Table, t_end: float | None) -> Iterator[Defect]:
     if not table.times_s:
         return
     first, last = table.times_s[0], table.times_s[-1]
     needed = 0.0 if t_end is None else t_end
     if first > 0.0 or last < needed:
         what = f"the profile covers {first:g} s to {last:g} s, but the run 0 s to {needed:g} s"
-        yield Problem(str(place.key("times_s")), what, "extend the table, or shorten the run")
+        yield Defect(str(place.key("times_s")), what, "extend the table, or shorten the run")
 
 
 def _smooth_step_start(step: SmoothStep) -> tuple[float, float]:

@@ -8,12 +8,12 @@ import numpy as np
 
 from flexmb.scene.bodies import ModalBody
 from flexmb.scene.modal_data import ModalArrays, node_arrays
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 
 FULL = 'or use level "full", which no load stiffens'
 
 
-def second_order(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def second_order(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     """Problems of the second-order data of a body and its nodes, whatever its level; that none is missing, at level
     stiffened."""
     for i, node in enumerate(body.nodes):
@@ -21,31 +21,31 @@ def second_order(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator
         try:
             given = node_arrays(node)
         except ValueError as error:
-            yield Problem(str(spot), str(error), "give three m x m matrices, or m x m vectors")
+            yield Defect(str(spot), str(error), "give three m x m matrices, or m x m vectors")
             continue
         moves = np.any(node.translation_modes) or np.any(node.rotation_modes)
         if "force_stiffness" in given and len(given) > 1:
             what = "second-order field and force_stiffness are given"
-            yield Problem(str(spot), what, "give one of them: each follows from the other")
+            yield Defect(str(spot), what, "give one of them: each follows from the other")
         elif not given and moves and body.level == "stiffened":
             remedy = f"give its second_translation (zeros, if it has none) or force_stiffness, {FULL}"
-            yield Problem(str(spot), "nothing says how a load at this node stiffens the body", remedy)
+            yield Defect(str(spot), "nothing says how a load at this node stiffens the body", remedy)
     yield from _points(place, body, arrays)
 
 
-def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Problem]:
+def _points(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
     field = [name for name in ("second_translation", "second_rotation") if name in arrays.given]
     loads = [name for name in ("gravity_stiffness", "gradient_stiffness") if name in arrays.given]
     if field and loads:
         what = f"both {field[0]} and {loads[0]} are given"
-        yield Problem(str(place), what, "give one of them: the stiffness follows from the field")
+        yield Defect(str(place), what, "give one of them: the stiffness follows from the field")
     elif field == ["second_rotation"]:
         remedy = "give second_translation too (zeros, if there is none)"
-        yield Problem(str(place), "second_rotation is given without second_translation", remedy)
+        yield Defect(str(place), "second_rotation is given without second_translation", remedy)
     elif len(loads) == 1:
         what = f"of gravity_stiffness and gradient_stiffness, only {loads[0]} is given"
-        yield Problem(str(place), what, "give both")
+        yield Defect(str(place), what, "give both")
     elif body.level == "stiffened" and not field and not loads:
         what = 'level "stiffened" needs a second-order field, and the body has none'
         remedy = "give second_translation of its points, or gravity_stiffness and gradient_stiffness"
-        yield Problem(str(place.key("level")), what, f"{remedy}, {FULL}")
+        yield Defect(str(place.key("level")), what, f"{remedy}, {FULL}")

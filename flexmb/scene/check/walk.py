@@ -9,7 +9,7 @@ from typing import Any
 import msgspec
 
 from flexmb.scene.convert import ROOT, label
-from flexmb.scene.problems import Place, Problem
+from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
 # Data printed to ten digits are unit vectors to 1e-10; what is further off than this was never normalised.
@@ -54,15 +54,15 @@ def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
     return None
 
 
-def finite_numbers(scene: Scene) -> Iterator[Problem]:
+def finite_numbers(scene: Scene) -> Iterator[Defect]:
     """No NaN, no infinity and nothing whose powers are infinite, anywhere."""
     for place, _, value in values(ROOT, scene):
         if found := non_finite(value):
             remedy = f"give a finite number, of at most {LARGEST:g}"
-            yield Problem(str(place.key(*found[0])), f"the number is {found[1]}", remedy)
+            yield Defect(str(place.key(*found[0])), f"the number is {found[1]}", remedy)
 
 
-def unit_vectors(scene: Scene) -> Iterator[Problem]:
+def unit_vectors(scene: Scene) -> Iterator[Defect]:
     """Axes and directions have unit length."""
     for place, key, value in values(ROOT, scene):
         if key in AXES and not non_finite(value):
@@ -71,20 +71,20 @@ def unit_vectors(scene: Scene) -> Iterator[Problem]:
                 spot = place.key(i) if several else place
                 length = hypot(*vector)
                 if length == 0.0:
-                    yield Problem(str(spot), "the axis has no direction: it is zero", "give a unit vector")
+                    yield Defect(str(spot), "the axis has no direction: it is zero", "give a unit vector")
                 elif abs(length - 1.0) > UNIT_LENGTH:
-                    yield Problem(str(spot), f"not a unit vector: its length is {length:.9g}", _unit(vector, length))
+                    yield Defect(str(spot), f"not a unit vector: its length is {length:.9g}", _unit(vector, length))
 
 
-def unit_quaternions(scene: Scene) -> Iterator[Problem]:
+def unit_quaternions(scene: Scene) -> Iterator[Defect]:
     """Quaternions have unit length."""
     for place, key, value in values(ROOT, scene):
         if "quaternion" in key and not non_finite(value):
             norm = hypot(*value)
             if norm == 0.0:
-                yield Problem(str(place), "the quaternion is zero", "for no rotation write (1, 0, 0, 0), scalar first")
+                yield Defect(str(place), "the quaternion is zero", "for no rotation write (1, 0, 0, 0), scalar first")
             elif abs(norm - 1.0) > UNIT_LENGTH:
-                yield Problem(str(place), f"not a unit quaternion: its norm is {norm:.9g}", _unit(value, norm))
+                yield Defect(str(place), f"not a unit quaternion: its norm is {norm:.9g}", _unit(value, norm))
 
 
 def _named_items(spot: Place, key: str, items: tuple[Any, ...]) -> Iterator[tuple[Place, Any]]:

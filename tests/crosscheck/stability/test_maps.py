@@ -16,7 +16,7 @@ from crosscheck.stability.flow import flow
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.maps import free_spin, integrators, spinning_beam, vibrating_hinge
 from crosscheck.stability.run import Finished, run_here, run_map
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from flexmb.tables.state import pack
 
 PROVIDER = "tests.crosscheck.stability.test_maps:coarse_maps"

@@ -17,7 +17,7 @@ from flexmb.scene.schema import BeamBody, BeamNode, Modes, TipMass, Weld
 from flexmb.scene.tree import ordered
 from flexmb.surrogate import modal_points, substructured
 from flexmb.surrogate.lumping import beam_piece, combine
-from flexmb.system.system import compile
+from flexmb.system.compile import compile
 from tests.flexmb.surrogate.beams import FIRST_ROOT, LENGTH, LUMP, SECTION, beam_scene, cantilever, rest_positions
 
 ALL = ("axial", "torsion", "bending_y", "bending_z")
