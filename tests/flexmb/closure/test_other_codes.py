@@ -67,13 +67,13 @@ class Loop:
 def in_exudyn(scene: s.Scene, markers: dict[str, MarkerMotion], *, closed: bool = True) -> Loop:
     """The scene of rigid bodies, revolute and ball joints at the state of its markers; `closed` with its closures."""
     from crosscheck.engines.exudyn.carriers import Workshop
-    from crosscheck.engines.exudyn.motion import Motion
+    from crosscheck.engines.exudyn.motion import FrameMotion
     from flexmb.surrogate.lumping import Inertia
 
     loop = Loop(Workshop(np.array(scene.gravity_m_s2), explicit=False))
     for body in scene.bodies:
         at = markers[body.name]
-        motion = Motion(at.position, at.rotation, at.velocity[:3], at.velocity[3:])
+        motion = FrameMotion(at.position, at.rotation, at.velocity[:3], at.velocity[3:])
         inertia = Inertia(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2))
         loop.carriers[body.name] = loop.shop.rigid(motion, np.eye(3), inertia)
     nodes = {body.name: body for body in scene.bodies}
@@ -99,7 +99,7 @@ def in_exudyn(scene: s.Scene, markers: dict[str, MarkerMotion], *, closed: bool 
 
 def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]], axis: tuple | None) -> None:
     """A joint whose markers' z is the axis, which has the same components on both sides."""
-    from crosscheck.engines.exudyn.joints import Connection
+    from crosscheck.engines.exudyn.joints import ExudynLink
 
     shop = loop.shop
     turn = np.eye(3) if ball else Rotation.align_vectors([axis], [[0.0, 0.0, 1.0]])[0].as_matrix()
@@ -108,7 +108,7 @@ def _join(loop: Loop, name: str, ball: bool, sides: list[tuple[str, np.ndarray]]
     ]
     kind = shop.items.SphericalJoint if ball else shop.items.RevoluteJointZ
     joint = shop.mbs.AddObject(kind(markerNumbers=markers))
-    loop.links[name] = Connection(name, (), ((joint, True),), markers[1])
+    loop.links[name] = ExudynLink(name, (), ((joint, True),), markers[1])
 
 
 def solved(loop: Loop) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.closure import system as closure_system
+from flexmb.closure import closures as closure_system
 from flexmb.scene import schema as s
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.shapes import beam_section

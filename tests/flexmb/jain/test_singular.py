@@ -18,7 +18,7 @@ from flexmb.system.mechanics import Mechanics
 from flexmb.tables.state import DynamicsError, PrecisionWarning, State
 from tests.bounds import gamma
 from tests.flexmb import extended
-from tests.flexmb.singular import FAMILIES, state
+from tests.flexmb.jain.singular import FAMILIES, state
 
 ALGORITHMS: tuple[Algorithm, ...] = tuple(each for each in get_args(Algorithm) if each != "frisch_as_printed")
 # By order of elimination: the body whose freedom is the last of those that move the same mass; or "base", to which

@@ -142,7 +142,7 @@ import flexmb.jit.kernel
 
 numba.config.DISABLE_JIT = 1  # from here on: the package refuses to be without its compiler
 import flexmb
-from tests.flexmb.test_system import RECIPE, SEED, numbers
+from tests.flexmb.system.test_system import RECIPE, SEED, numbers
 from tests.trees import random_scene
 
 class Row:
@@ -191,7 +191,7 @@ def numbers(system: System) -> np.ndarray:
 
 def test_interpreted_equals_compiled(system, tmp_path):
     """The compiler fuses products and sums, so the last digits may differ, and nothing else."""
-    root = Path(__file__).parents[2]
+    root = Path(__file__).parents[3]
     paths = os.pathsep.join([str(root), os.environ.get("PYTHONPATH", "")])
     subprocess.run(
         [sys.executable, "-c", INTERPRETED, str(tmp_path / "numbers.npy")], check=True, cwd=root,

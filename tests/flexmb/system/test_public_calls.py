@@ -6,14 +6,14 @@ from pathlib import Path
 
 import pytest
 
-from tests.flexmb import public_calls
-from tests.flexmb.public_calls import Call, Variant, W, faults, rows
+from tests.flexmb.system import public_calls
+from tests.flexmb.system.public_calls import Call, Variant, W, faults, rows
 
 
 def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
     """All variants of all arguments of all public calls; a crash names its place by faulthandler."""
-    program = [sys.executable, "-m", "tests.flexmb.public_calls"]
-    done = subprocess.run(program, cwd=Path(__file__).parents[2], capture_output=True, text=True)
+    program = [sys.executable, "-m", "tests.flexmb.system.public_calls"]
+    done = subprocess.run(program, cwd=Path(__file__).parents[3], capture_output=True, text=True)
     assert done.returncode == 0, done.stderr[-4000:]
     *found, summary = done.stdout.splitlines()
     assert not [line for line in found if line], "\n".join(found)

@@ -11,7 +11,7 @@ from flexmb.scene.schema import Modes
 from flexmb.scene.shapes import beam_section
 from flexmb.tables.status import Status
 from tests.bounds import observed_order
-from tests.flexmb.test_simulate import driven_arm, tumbling_pair
+from tests.flexmb.run.test_simulate import driven_arm, tumbling_pair
 from tests.trees import FULL, random_scene
 
 STIFF = [name for name, each in INTEGRATORS.items() if each.linearises]

@@ -13,7 +13,7 @@ import gc, sys
 import flexmb as fm
 from flexmb.run.warm_up import main
 from flexmb.integrate.catalogue import INTEGRATORS
-from tests.flexmb.warmed import SCENES
+from tests.flexmb.run.warmed import SCENES
 
 def compiled():
     return sum(len(x.overloads) for x in gc.get_objects() if type(x).__name__ == "CPUDispatcher"

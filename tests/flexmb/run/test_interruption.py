@@ -18,7 +18,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.warm_up import pendulum
 from flexmb.tables.status import Status
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 LIMIT_S = 600.0  # with cold kernels on a busy machine
 pytestmark = pytest.mark.skipif(os.name == "nt", reason="sends signals as POSIX does")
 

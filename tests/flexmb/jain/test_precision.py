@@ -17,7 +17,7 @@ from flexmb.system.mechanics import FEW_DIGITS
 from flexmb.tables.state import PrecisionWarning
 from tests import trees
 from tests.flexmb import extended
-from tests.flexmb.singular import FAMILIES
+from tests.flexmb.jain.singular import FAMILIES
 
 RECIPES = (
     trees.RIGID, replace(trees.FULL, carriers=("rigid", "modal")), replace(trees.FREE_FLYING, carriers=("rigid",)),
