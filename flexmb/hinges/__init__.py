@@ -10,7 +10,8 @@
 ``rate(q, i, u, j, sequence, dq)``
     Configuration rate qdot(q, u), written to dq[i:i+nq].
 ``retract(q, i, increment, j, result)``
-    The coordinates at the end of a unit of time at the constant speeds `increment`, written to result[i:i+nq].
+    The coordinates at the end of a unit of time at the constant speeds `increment`, written to result[i:i+nq]: of
+    kinds with a quaternion. Where coordinates are scalars, the increments are added to them.
 
 q, u and increment are the whole vectors; the hinge's coordinates begin at q[i], its speeds at u[j]. `sequence` (3,)
 holds the axis numbers of a gimbal. Axes of one-axis kinds are z: `reduced` turns the hinge frames so at build time.

@@ -27,7 +27,6 @@ KINDS: tuple[HingeKind, ...] = tuple(
         weld, revolute, prismatic, cylindrical, gimbal2, gimbal3, spherical, planar, translation2, translation3, free
     )
 )  # fmt: skip
-REVOLUTE, PRISMATIC = KINDS.index(revolute.HINGE), KINDS.index(prismatic.HINGE)
 
 pose = numbered("pose", [kind.pose for kind in KINDS])
 motion = numbered("motion", [kind.motion for kind in KINDS])

@@ -49,6 +49,11 @@ def no_ball(item: Any) -> tuple[float, float]:
     return 0.0, 0.0
 
 
+@helper
+def nothing_turns(q, i, increment, j, result):
+    """Without a quaternion `flexmb.motion.retraction` adds the increments itself, which is faster there."""
+
+
 @dataclass(frozen=True, eq=False)
 class HingeKind:
     """One kind of hinge. See `flexmb.hinges` for its kernels `pose`, `motion`, `rate` and `retract`.
@@ -85,13 +90,8 @@ def scalar_hinge(
         for n in range(freedoms):
             dq[i + n] = u[j + n]
 
-    @helper
-    def retract(q, i, increment, j, result):
-        for n in range(freedoms):
-            result[i + n] = q[i + n] + increment[j + n]
-
     return HingeKind(
-        name, freedoms, freedoms, pose, motion, rate, retract, reduced, axis=axis, displacements=displacements
+        name, freedoms, freedoms, pose, motion, rate, nothing_turns, reduced, axis=axis, displacements=displacements
     )
 
 

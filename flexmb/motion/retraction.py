@@ -12,7 +12,12 @@ def move(y, increment, result, c):
     in turning axes, follows its screw motion.
     """
     for k in range(c.body.shape[0]):
-        catalogue.retract(c.body[k].hinge_kind, y, c.body[k].q_index, increment, c.body[k].u_index, result)
+        i, j = c.body[k].q_index, c.body[k].u_index
+        if catalogue.quaternion_offset(c.body[k].hinge_kind) < 0:  # asking its kind would take an eighth of a step
+            for n in range(c.body[k].nv):
+                result[i + n] = y[i + n] + increment[j + n]
+        else:
+            catalogue.retract(c.body[k].hinge_kind, y, i, increment, j, result)
         for n in range(c.body[k].modes):
             i, j = c.body[k].eta_index + n, c.body[k].etad_index + n
             result[i] = y[i] + increment[j]

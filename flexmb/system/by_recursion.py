@@ -8,6 +8,7 @@ from flexmb.entry import articulated
 from flexmb.entry.observation import Outputs, observe
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -17,14 +18,18 @@ if TYPE_CHECKING:
 
 def _accelerations(system: System, t: float, y: Real) -> Real:
     c, w = system.recursion_constants, system._recursion_w
-    system._check(articulated.accelerations(t, y, c, w), int(w.fault[0]))
+    status = articulated.accelerations(t, y, c, w)
+    if status != OK:
+        system._check(status, int(w.fault[0]))
     system._trust(t, y, w)
     return w.speed["acceleration"].copy()
 
 
 def _observe(system: System, t: float, y: Real, out: Outputs) -> None:
     c, w = system.recursion_constants, system._recursion_w
-    system._check(observe(t, y, c, w, out), int(w.fault[0]))
+    status = observe(t, y, c, w, out)
+    if status != OK:
+        system._check(status, int(w.fault[0]))
     system._trust(t, y, w)
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from flexmb.hinges.catalogue import kind_of
 from flexmb.system.tree_system import System
 
 Names = tuple[tuple[str, str], ...]
@@ -12,10 +11,11 @@ def state_names(system: System) -> tuple[Names, Names]:
     """((name, unit) of every entry of q, the same of u)."""
     scene = system.scene
     q, u = [("", "")] * system.nq, [("", "")] * system.nu
-    for item in (*scene.hinges, *scene.point_masses):
-        in_q, in_u = kind_of(item)[0].names(item)
-        q[system.coordinate(item.name)] = [(f"{item.name}.{name}", unit) for name, unit in in_q]
-        u[system.speed(item.name)] = [(f"{item.name}.{name}", unit) for name, unit in in_u]
+    for link in system._links:
+        hinge = link.hinge.name
+        in_q, in_u = link.kind.names(link.hinge)
+        q[system.coordinate(hinge)] = [(f"{hinge}.{name}", unit) for name, unit in in_q]
+        u[system.speed(hinge)] = [(f"{hinge}.{name}", unit) for name, unit in in_u]
     for body in scene.bodies:
         place = system.coordinate(f"{body.name}.modes")
         modes = range(place.stop - place.start)

@@ -12,6 +12,7 @@ speeds in the same order. `system.coordinate(name)` and `system.speed(name)` giv
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
+from functools import cached_property
 
 import numpy as np
 
@@ -82,6 +83,11 @@ class System(Mechanics):
     @property
     def initial_state(self) -> State:
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
+        return self.layout.known(0.0, self._at_start.copy())
+
+    @cached_property
+    def _at_start(self) -> Real:
+        """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
         q, u = np.zeros(self.nq), np.zeros(self.nu)
         for link in self._links:
             name = link.hinge.name
@@ -95,7 +101,7 @@ class System(Mechanics):
                 u[self.speed(name)] = modal.rates or 0.0
         y = np.concatenate([q, u, [0.0]])
         self.project(0.0, y, self.constants)
-        return self.layout.known(0.0, y)
+        return y
 
     def workspace(self) -> Workspace:
         """A fresh workspace for `rhs`; one per thread."""
