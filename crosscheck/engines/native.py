@@ -33,7 +33,8 @@ from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
 _STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)

@@ -15,7 +15,7 @@ from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.run.propagate import recursion
-from flexmb.system.compile import System
+from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Real

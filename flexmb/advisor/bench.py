@@ -21,7 +21,8 @@ from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 from flexmb.tables.state import pack
 from flexmb.tables.status import Status
 

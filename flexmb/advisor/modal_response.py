@@ -32,7 +32,8 @@ from flexmb.run.trajectory import Trajectory
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.schema import Load, Marker, Scene
 from flexmb.surrogate import rigidify
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 from flexmb.typing import Real
 
 MODES = 12

@@ -13,7 +13,8 @@ from scipy.optimize import linear_sum_assignment
 from flexmb.linear.linear_model import Complex, LinearModel, Stability
 from flexmb.linear.spin import steady_spin
 from flexmb.scene.schema import Scene
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 from flexmb.typing import Real

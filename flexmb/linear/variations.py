@@ -22,7 +22,8 @@ from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.scene.schema import Scene
 from flexmb.system.closed import ClosedSystem
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.functions import pack as pack_functions
 from flexmb.tables.state import DynamicsError, State, pack

@@ -22,9 +22,10 @@ from flexmb.scene.check import check_run, check_scene
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.compile import System, assembled
+from flexmb.system.compile import assembled
 from flexmb.system.labels import state_names
 from flexmb.system.observables import Evaluation
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, NotFiniteError, PrecisionWarning
 from flexmb.tables.status import Status

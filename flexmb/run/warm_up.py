@@ -21,7 +21,8 @@ from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 
 Kind = Literal["tree", "condensed", "closed"]

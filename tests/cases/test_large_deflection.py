@@ -26,7 +26,8 @@ from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Ramp
 from flexmb.scene.schema import BeamBody, Level, Scene
 from flexmb.surrogate import substructured
-from flexmb.system.compile import System, compile
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
 
 FAMILY = Path(__file__).parents[2] / "cases" / "large_deflection"
 

@@ -21,7 +21,7 @@ from flexmb.scene.bodies import Level
 from flexmb.scene.build import angular
 from flexmb.scene.hinges import Z_AXIS, _Hinge
 from flexmb.spatial.rotation import rotation_z
-from flexmb.system.compile import System
+from flexmb.system.tree_system import System
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
 from tests import trees
 from tests.bounds import backward_error, gamma

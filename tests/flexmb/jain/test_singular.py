@@ -13,8 +13,8 @@ import flexmb
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.schema import Scene
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.compile import System
 from flexmb.system.mechanics import Mechanics
+from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, PrecisionWarning, State
 from tests.bounds import gamma
 from tests.flexmb import extended
