@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from flexmb.frisch.errata import Erratum
+from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
     from flexmb.entry.observation import Outputs
-    from flexmb.system.tree_system import System
 
 Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
 """Names of the algorithms, for type checkers: a test holds them to the list."""
@@ -36,13 +36,13 @@ class DynamicsAlgorithm:
     name: Algorithm
     summary: str
     """What it is, in one line."""
-    accelerations: Callable[[System, float, Real], Real]
+    accelerations: Callable[[Mechanics, float, Real], Real]
     """udot (nu,) of a tree."""
-    observe: Callable[[System, float, Real, Outputs], None]
+    observe: Callable[[Mechanics, float, Real, Outputs], None]
     """Fills everything observable of a tree."""
-    kernel: Callable[[System], tuple[Any, tuple[Any, ...]]]
+    kernel: Callable[[Mechanics], tuple[Any, tuple[Any, ...]]]
     """The kernel of the accelerations, and fresh tables that it takes after t and y."""
-    route: Callable[[System], Route] | None = None
+    route: Callable[[Mechanics], Route] | None = None
     """For runs of trees; None where it is for single states."""
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
     """For closed chains; None where it knows trees only."""

@@ -9,26 +9,26 @@ from flexmb.entry.observation import Outputs
 from flexmb.jain.places import matrices
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
-    from flexmb.system.tree_system import System
 
 
-def _accelerations(system: System, t: float, y: Real) -> Real:
+def _accelerations(system: Mechanics, t: float, y: Real) -> Real:
     """Drive loads are left in w.speed.drive."""
     system._check(composite.accelerations(t, y, system.constants, system._w, system._places()))
     system._trust(t, y, system._w)
     return system._w.speed["acceleration"].copy()
 
 
-def _observe(system: System, t: float, y: Real, out: Outputs) -> None:
+def _observe(system: Mechanics, t: float, y: Real, out: Outputs) -> None:
     out.rates[:], out.drives[:] = _accelerations(system, t, y), system._w.speed["drive"]
     system._observe_forced(t, y, out)
 
 
-def _tables(system: System) -> tuple[Any, ...]:
+def _tables(system: Mechanics) -> tuple[Any, ...]:
     return system.constants, system.workspace(), matrices(system.constants)
 
 

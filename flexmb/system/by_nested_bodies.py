@@ -2,28 +2,26 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from flexmb.entry.observation import Outputs
 from flexmb.frisch import evaluation
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
+from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 
 def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
-    def accelerations(system: System, t: float, y: Real) -> Real:
+    def accelerations(system: Mechanics, t: float, y: Real) -> Real:
         nested = system.nested(name)
         status, rates = nested.accelerations(t, y)
         system._check(status, nested.fault)
         system._trust(t, y, nested)
         return rates
 
-    def observe(system: System, t: float, y: Real, out: Outputs) -> None:
+    def observe(system: Mechanics, t: float, y: Real, out: Outputs) -> None:
         nested = system.nested(name)
         status, motion = nested.motion(t, y)
         system._check(status, nested.fault)
@@ -32,11 +30,11 @@ def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
         system._observe_motion(t, y, out)
         out.wheel_loads[:, :3] = motion.wheel_torques
 
-    def tables(system: System) -> tuple[Any, Any]:
+    def tables(system: Mechanics) -> tuple[Any, Any]:
         nested = system.nested(name)
         return nested.constants, nested.workspace()
 
-    def route(system: System) -> Route:
+    def route(system: Mechanics) -> Route:
         system.nested(name)  # refused here, not in the run
         return Route(lambda: tables(system), evaluation.rhs, coordinates.project)
 

@@ -8,15 +8,15 @@ from flexmb.entry import articulated
 from flexmb.entry.observation import Outputs, observe
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.system.mechanics import Mechanics
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
-    from flexmb.system.tree_system import System
 
 
-def _accelerations(system: System, t: float, y: Real) -> Real:
+def _accelerations(system: Mechanics, t: float, y: Real) -> Real:
     c, w = system.recursion_constants, system._recursion_w
     status = articulated.accelerations(t, y, c, w)
     if status != OK:
@@ -25,7 +25,7 @@ def _accelerations(system: System, t: float, y: Real) -> Real:
     return w.speed["acceleration"].copy()
 
 
-def _observe(system: System, t: float, y: Real, out: Outputs) -> None:
+def _observe(system: Mechanics, t: float, y: Real, out: Outputs) -> None:
     c, w = system.recursion_constants, system._recursion_w
     status = observe(t, y, c, w, out)
     if status != OK:
@@ -33,7 +33,7 @@ def _observe(system: System, t: float, y: Real, out: Outputs) -> None:
     system._trust(t, y, w)
 
 
-def _tables(system: System) -> tuple[Any, Any]:
+def _tables(system: Mechanics) -> tuple[Any, Any]:
     return system.recursion_constants, system.recursion_workspace()
 
 

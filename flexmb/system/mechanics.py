@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
-from typing import NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
+from flexmb.entry.observation import Outputs, observe_motion
+from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.system.factors import MassMatrixFactors
@@ -69,10 +71,12 @@ class Mechanics:
     """Everything that a `System` can be asked about its equations of motion. It writes into one workspace."""
 
     constants: Constants
+    recursion_constants: Constants  # the same with bodies eliminated as chosen
     layout: Layout
     nq: int
     nu: int
     _w: Workspace
+    _recursion_w: Workspace
 
     def __init__(self) -> None:
         self._matrices: Matrices | None = None
@@ -83,9 +87,17 @@ class Mechanics:
         """Bodies in the order of the dynamics, point masses last."""
         raise NotImplementedError
 
-    def workspace(self) -> Workspace:
-        """A fresh workspace; one per thread."""
+    def nested(self, algorithm: Any = "frisch") -> NestedSystem:
+        """Frisch's equations of this scene."""
         raise NotImplementedError
+
+    def workspace(self) -> Workspace:
+        """A fresh workspace for `rhs`; one per thread."""
+        return workspace(self.constants, self.nq, self.nu)
+
+    def recursion_workspace(self) -> Workspace:
+        """A fresh workspace for `rhs` with `recursion_constants`, whose bodies are eliminated as chosen."""
+        return workspace(self.recursion_constants, self.nq, self.nu)
 
     def composite_workspace(self) -> composite.CompositeWorkspace:
         """A fresh workspace for runs by composite bodies; one per thread."""
@@ -176,6 +188,15 @@ class Mechanics:
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
         articulated.inverse_dynamics(t, y, rates, self.constants, self._w, tau, loads)
         return tau, loads
+
+    def _observe_motion(self, t: float, y: Real, out: Outputs) -> None:
+        """Markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
+        observe_motion(t, y, self.constants, self._w, out)
+
+    def _observe_forced(self, t: float, y: Real, out: Outputs) -> None:
+        """The same, and the loads of hinges by inverse dynamics."""
+        out.loads[:] = self._inverse(t, y, out.rates)[1]
+        self._observe_motion(t, y, out)
 
     def _places(self) -> Matrices:
         """Made when first asked for: they are as large as the mass matrix."""

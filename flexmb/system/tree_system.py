@@ -20,7 +20,6 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.entry.observation import Outputs, observe_motion
 from flexmb.frisch.nested_system import NestedSystem, Partitions
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
@@ -31,9 +30,7 @@ from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.mechanics import Mechanics
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
-from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
-from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 
@@ -102,14 +99,6 @@ class System(Mechanics):
         y = np.concatenate([q, u, [0.0]])
         self.project(0.0, y, self.constants)
         return y
-
-    def workspace(self) -> Workspace:
-        """A fresh workspace for `rhs`; one per thread."""
-        return workspace(self.constants, self.nq, self.nu)
-
-    def recursion_workspace(self) -> Workspace:
-        """A fresh workspace for `rhs` with `recursion_constants`, whose bodies are eliminated as chosen."""
-        return workspace(self.recursion_constants, self.nq, self.nu)
 
     @property
     def elimination(self) -> dict[str, str]:
@@ -206,15 +195,6 @@ class System(Mechanics):
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         algorithms.chosen(algorithm).observe(self, t, y, self._observation.out)
         return self._observation.evaluation(t)
-
-    def _observe_motion(self, t: float, y: Real, out: Outputs) -> None:
-        """Markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
-        observe_motion(t, y, self.constants, self._w, out)
-
-    def _observe_forced(self, t: float, y: Real, out: Outputs) -> None:
-        """The same, and the loads of hinges by inverse dynamics."""
-        out.loads[:] = self._inverse(t, y, out.rates)[1]
-        self._observe_motion(t, y, out)
 
     def _wheel_names(self) -> Iterator[str]:
         yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))
