@@ -8,6 +8,7 @@ import msgspec
 import numpy as np
 import pytest
 
+from crosscheck.judging.case_verdicts import CLOCK
 from crosscheck.judging.results import RUNGS
 from crosscheck.judging.verdict import GRAVITY, STATUSES
 from crosscheck.records.kinds import RunStatus
@@ -266,6 +267,7 @@ def test_an_expectation_without_bounds_in_old_records_is_not_as_expected() -> No
     [
         ({"times": pack(2.0 * TIMES)}, "at other times: 11 samples to 1 s, and 11 to 2 s"),
         ({"times": pack(TIMES**2)}, "at other times"),
+        ({"times": pack((1.0 + 2.0 * CLOCK) * TIMES)}, "at other times"),
         ({"scene": "t"}, "different scenes"),
     ],
 )
@@ -273,3 +275,40 @@ def test_results_of_other_times_or_scenes_are_not_compared(changes: dict, said: 
     other = [msgspec.structs.replace(run, **changes) for run in ladder("two", {TIP: way()})]
     verdict = single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *other]))
     assert (verdict.status, said in verdict.reason) == ("failed", True), verdict.reason
+
+
+def test_clocks_are_compared_by_their_ratio_alone() -> None:
+    def found(one: float, two: float) -> str:
+        """The verdict on runs of nanoseconds, say, whose clocks show these times at the end."""
+        runs = [
+            msgspec.structs.replace(run, times=pack(end * TIMES))
+            for name, end in (("one", one), ("two", two))
+            for run in ladder(name, {TIP: way()})
+        ]
+        return single(judged(ONE_PAIR, runs)).status
+
+    assert (found(1e-9, 1e-9), found(1e-9, 1.5e-9), found(1.0, 1.0 + 0.5 * CLOCK)) == ("agree", "failed", "agree")
+
+
+def test_two_variants_may_be_of_two_scenes() -> None:
+    text = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one"]').split("[[comparison]]")[0]
+    text += '''
+[[variant]]
+name = "other"
+engines = ["two"]
+
+[[comparison]]
+name = "across"
+a = { engine = "one", variant = "rigid" }
+b = { engine = "two", variant = "other" }
+goals = { "marker:tip.position" = 1e-3 }
+'''
+    runs = ladder("two", {TIP: way()}, variant="other")
+    other = [msgspec.structs.replace(run, scene="t") for run in runs]
+    assert single(judged(text, [*ladder("one", {TIP: way()}), *other])).status == "agree"
+
+
+def test_where_nothing_is_judged_no_scale_is_unused() -> None:
+    text = ONE_PAIR.replace(TIP, "load:pivot") + 'scales = { "marker:top.position" = 2.0 }\n'
+    runs = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+    assert single(judged(text, runs)).status == "did not run"

@@ -72,6 +72,8 @@ def test_a_channel_with_accepted_figures_does_not_vanish_in_silence(gone: str) -
     assert judged(text, runs(gone)).ok
     (lost,) = judged(text, runs(gone), accepted).unexpected
     assert (lost.channel, lost.status) == (gone, "did not run")
+    why = "it has accepted figures and is not judged any more: take them out of accepted.toml if that is meant"
+    assert (lost.reason, lost.outside) == (why, why)
     missing = msgspec.structs.replace(runs()[0], status="crashed", effort="", channels={}, times=None)
     assert {each.status for each in judged(text, [*runs()[3:], missing], accepted).unexpected} == {"crashed"}
 
@@ -88,5 +90,8 @@ scales = { "marker:top.position" = 1.0 }
 """
     faulty = ladder("one", {TIP: way(1.1)}, role="control:too heavy")[-1]
     last = judged(ONE_PAIR + control, [*PAIR, faulty]).all[-1]
-    assert (last.kind, last.channel, last.ok) == ("control", "marker:top.position", False)
+    assert (last.kind, last.channel, last.ok, last.goal) == ("control", "marker:top.position", False, 0.0)
+    assert last.reason == 'a scale is given for "marker:top.position", which is no channel judged here'
+    (without,) = (each for each in judged(ONE_PAIR + control, [*PAIR[:3], faulty]).all if each.kind == "control")
+    assert (without.channel, without.status) == (TIP, "did not run")
     assert judged(ONE_PAIR + control.replace("top", "tip"), [*PAIR, faulty]).ok
