@@ -1,6 +1,7 @@
 """How kernels are compiled, kept and counted: all of the project that knows numba.
 
 kernel.py       `kernel`, `helper`, `by_bundle`, `by_number`: what the mechanics is written with
+numbered.py     one helper for several, chosen by a number in front
 bundle.py       many arrays as one argument
 pointer.py      kernels as arguments of kernels
 parts.py        helpers are compiled into their callers only
@@ -8,7 +9,7 @@ cache.py        compiled kernels on disk
 fingerprint.py  the key of a compiled kernel: the code that it reaches
 folder.py       where compiled kernels are kept, and for how long
 hooks.py        which of numba's internals are used, and what is done without them
-counting.py     operations of a kernel, by interpreting it; the only file here that needs no numba
+counting.py     operations of a kernel, by interpreting it; it needs no numba
 
 Numba documents as its extension API, and we take for granted: `njit`, `cfunc`, `overload`, types of one's own with
 `register_model`, `unbox` and the lowering of attributes, `WrapperAddressProtocol`, and compilers with other passes.
