@@ -121,7 +121,9 @@ def _check_shapes(record: RunRecord) -> None:
         if rows is None or len(packed.shape) != 2 or packed.shape[:1] != rows or packed.shape[1] == 0:
             raise ValueError(f"{name} of shape {packed.shape} does not belong to times of shape {rows}")
         part = part_of(name)
-        if part is not None and part.width not in (None, packed.shape[1]):
+        if part is None:
+            raise ValueError(f'there is no channel "{name}"')
+        if part.width not in (None, packed.shape[1]):
             raise ValueError(f"{name} has {packed.shape[1]} columns")
 
 

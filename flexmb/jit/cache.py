@@ -70,7 +70,7 @@ class KernelCache(NullCache):
         if data.library.has_dynamic_globals:  # addresses of this process
             return
         file, contents = self._file(sig, data.codegen), dumps(data._reduce())
-        written = file.with_suffix(f".{uuid.uuid4().hex[:16]}")
+        written = file.with_name(f"{file.name}.{uuid.uuid4().hex[:16]}")
         try:
             self._folder.mkdir(parents=True, exist_ok=True)
             written.write_bytes(_digest(file, contents) + contents)

@@ -24,10 +24,11 @@ _UNUSED = 60 * 24 * 3600.0  # s since a file was last used
 def cache_directory() -> Path | None:
     """Where kernels are kept; None where nothing can be written.
 
-    Below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user.
+    Below the directory that NUMBA_CACHE_DIR names, or else below numba's own cache directory of the user. Its name is
+    one that nothing else has: a checkout or a program called flexmb may be there, too.
     """
     root = Path(config.CACHE_DIR or _of_the_user())
-    directory = root / __name__.partition(".")[0]
+    directory = root / "flexmb-kernels"
     try:
         if directory.is_file():
             directory.unlink()
@@ -59,10 +60,10 @@ def mark_used(file: Path) -> None:
 
 @cache
 def delete_unused(directory: Path) -> None:
-    """Delete, once in a process, the files that nobody has used for two months."""
+    """Delete, once in a process, kernels that nobody has used for two months, and what their writers left behind."""
     oldest = time.time() - _UNUSED
     with suppress(OSError):
-        for file in directory.iterdir():
+        for file in directory.glob("*.kernel*"):
             with suppress(OSError):
                 if file.stat().st_mtime < oldest:
                     file.unlink()

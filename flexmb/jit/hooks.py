@@ -83,7 +83,7 @@ def _text(version: tuple[int, int]) -> str:
 def _hooks() -> Hooks:
     try:
         return _by_internals()
-    except (ImportError, AttributeError) as problem:
+    except (ImportError, AttributeError, ValueError) as problem:  # ValueError: a build without a number
         warn_once(
             f"numba {__version__} is not one that flexmb knows from inside ({problem}): compilation takes longer and "
             f"every process does it anew; results are the same. Install numba>={_text(OLDEST)},<={_text(NEWEST)}.*"

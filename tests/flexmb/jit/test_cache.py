@@ -165,16 +165,24 @@ def test_a_file_in_place_of_the_folder_is_replaced(tmp_path, monkeypatch):
 def test_kernels_that_nobody_uses_are_forgotten_when_others_are_compiled(tmp_path, monkeypatch):
     hits(tmp_path, monkeypatch)
     earlier = tmp_path / "sources" / "of-earlier-sources.kernel"
-    earlier.write_text("")
+    unfinished, strange = earlier.with_name("killed.kernel.0123"), earlier.with_name("README.md")
+    for file in (earlier, unfinished, strange):
+        file.write_text("")
     compiled = sorted((tmp_path / "sources").glob("weighted-*"))
-    for file in (earlier, *compiled):
+    for file in (earlier, unfinished, strange, *compiled):
         os.utime(file, (0, 0))
     assert hits(tmp_path, monkeypatch) == 2
     assert earlier.exists()  # nothing was compiled
     compiled[0].unlink()
     assert hits(tmp_path, monkeypatch) == 1
-    assert not earlier.exists()
+    assert (earlier.exists(), unfinished.exists(), strange.exists()) == (False, False, True)
     assert kernels(tmp_path) == compiled
+
+
+def test_a_checkout_beside_the_cache_is_no_part_of_it(tmp_path, monkeypatch):
+    """NUMBA_CACHE_DIR may be where somebody keeps the project."""
+    monkeypatch.setattr(folders.config, "CACHE_DIR", str(tmp_path))
+    assert cache_directory.__wrapped__() not in (tmp_path / "flexmb", tmp_path)
 
 
 def test_where_nothing_can_be_written_a_warning_says_so_and_kernels_run(tmp_path):

@@ -92,6 +92,7 @@ print(solve(HARMONIC, [0.0, 1.0], step=1e-2).last.tolist())
 """
 HIDDEN = {
     "another version": "numba.__version__ = '0.99.1'",
+    "a build without a number": "numba.__version__ = '0+unknown'",
     "a linker of another name": "import numba.core.codegen; del numba.core.codegen.JITCodeLibrary",
     "a cache of another name": "import numba.core.caching; del numba.core.caching.NullCache",
 }
