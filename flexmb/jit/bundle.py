@@ -14,12 +14,12 @@ from functools import cache
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
-from llvmlite import ir
 from numba import from_dtype, types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
-from numba.np.arrayobj import populate_array
+
+from flexmb.jit.tables import BYTE, WORD, TableType, table
 
 Class = TypeVar("Class", bound=type)
 
@@ -60,9 +60,9 @@ def _describe(self: Any) -> None:
 
 
 @cache
-def _array_type(dtype: np.dtype, dimensions: int) -> types.Array:
+def _array_type(dtype: np.dtype, dimensions: int) -> TableType:
     """Kept, because numba takes a tenth of a millisecond to describe a record."""
-    return types.Array(from_dtype(dtype), dimensions, "C")
+    return TableType(from_dtype(dtype), dimensions)
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
@@ -124,34 +124,20 @@ class _BundleAttribute(AttributeTemplate):
 
 @lower_getattr_generic(BundleType)
 def _member_of(context, builder, typ, value, attr):
-    """A bundle's address, or the array structure built from its row.
+    """A bundle's address, or the table of its row.
 
     "invariant" lets LLVM load each address once per function.
     """
     place = typ.place(attr)
     kind = typ.kinds[place][1]
-    word = ir.IntType(64)
-    table = builder.bitcast(value, word.as_pointer())
+    words = builder.bitcast(value, WORD.as_pointer())
 
     def load(column):
-        loaded = builder.load(builder.gep(table, [word(place * _ROW + column)]))
+        loaded = builder.load(builder.gep(words, [WORD(place * _ROW + column)], inbounds=True))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
     if isinstance(kind, BundleType):
         return builder.inttoptr(load(0), value.type)
-    array = context.make_array(kind)(context, builder)
-    shape = [load(1 + i) for i in range(kind.ndim)]
-    itemsize = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
-    strides = [itemsize]
-    for extent in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], extent))
-    populate_array(
-        array,
-        data=builder.inttoptr(load(0), array.data.type),
-        shape=cgutils.pack_array(builder, shape, ty=word),
-        strides=cgutils.pack_array(builder, strides, ty=word),
-        itemsize=itemsize,
-        meminfo=None,
-    )
-    return array._getvalue()
+    address = builder.inttoptr(load(0), BYTE.as_pointer())
+    return table(context, builder, kind, address, [load(1 + i) for i in range(kind.ndim)])

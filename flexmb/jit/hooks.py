@@ -67,7 +67,9 @@ def _by_internals() -> Hooks:
     def address(kernel: Any, signature: Any) -> int:
         return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())
 
-    parts = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler}
+    parts = {
+        "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True, "pipeline_class": PartCompiler
+    }  # fmt: skip
     return Hooks(parts, keep, address)
 
 
