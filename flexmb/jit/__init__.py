@@ -3,6 +3,10 @@
 kernel.py       `kernel`, `helper`, `by_bundle`, `by_number`: what the mechanics is written with
 numbered.py     one helper for several, chosen by a number in front
 bundle.py       many arrays as one argument
+tables.py       arrays of bundles inside kernels
+lanes.py        eight copies of a number as one value, and masks: how kernels run eight scenes at once
+lane_functions.py  their elementary functions
+lane_arrays.py  arrays of them
 pointer.py      kernels as arguments of kernels
 parts.py        helpers are compiled into their callers only
 cache.py        compiled kernels on disk

@@ -95,9 +95,8 @@ class _SinCos(AbstractTemplate):
             return signature(types.UniTuple(LANE, 2), LANE)
 
 
-@lower_builtin(sincos, LaneType)
-def _sincos(context, builder, sig, args):
-    [x] = args
+def _both(context: Any, builder: Any, x: Any) -> tuple[Any, Any]:
+    """(sin x, cos x)."""
     size = _instruction(builder, "fabs", x)
     near = builder.bitcast(builder.fcmp_ordered("<", size, _number(_FARTHEST)), ir.IntType(LANES))
     sine, cosine = (cgutils.alloca_once(builder, _NUMBERS) for _ in range(2))
@@ -108,7 +107,22 @@ def _sincos(context, builder, sig, args):
         with some_far:
             builder.store(_lane_by_lane(context, builder, math.sin, x), sine)
             builder.store(_lane_by_lane(context, builder, math.cos, x), cosine)
-    return context.make_tuple(builder, sig.return_type, [builder.load(sine), builder.load(cosine)])
+    return builder.load(sine), builder.load(cosine)
+
+
+@lower_builtin(sincos, LaneType)
+def _sincos(context, builder, sig, args):
+    return context.make_tuple(builder, sig.return_type, _both(context, builder, *args))
+
+
+@lower_builtin(math.sin, LaneType)
+def _sin(context, builder, sig, args):
+    return _both(context, builder, *args)[0]
+
+
+@lower_builtin(math.cos, LaneType)
+def _cos(context, builder, sig, args):
+    return _both(context, builder, *args)[1]
 
 
 @infer_global(math.atan2)

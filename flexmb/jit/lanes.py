@@ -39,6 +39,8 @@ BYTES = 8 * LANES  # of a lane value, and what its address must be a multiple of
 class LaneType(types.Type):
     """Eight float64; floats and integers become one by repetition."""
 
+    bitwidth = 8 * BYTES
+
     def __init__(self) -> None:
         super().__init__(name=f"f64x{LANES}")
 
@@ -134,13 +136,11 @@ def _real(context, builder, kind, value):
 
 def _is_lanes(*kinds: types.Type) -> bool:
     """Whether some are lanes, and all can be."""
-    return any(kind == LANE for kind in kinds) and all(
-        kind == LANE or isinstance(kind, types.Float | types.Integer) for kind in kinds
-    )
+    return LANE in kinds and all(kind == LANE or isinstance(kind, types.Float | types.Integer) for kind in kinds)
 
 
 def _is_mask(*kinds: types.Type) -> bool:
-    return any(kind == MASK for kind in kinds) and all(kind == MASK or isinstance(kind, types.Boolean) for kind in kinds)
+    return MASK in kinds and all(kind == MASK or isinstance(kind, types.Boolean) for kind in kinds)
 
 
 def _on(operands: types.Type, fits: Any, result: types.Type, *functions: Any) -> None:
@@ -193,7 +193,7 @@ _comparison("==", operator.eq)
 _comparison("!=", operator.ne, lower_ordered=False)  # a NaN differs from everything
 _connective("and_", operator.and_)
 _connective("or_", operator.or_)
-_on(LANE, _is_lanes, LANE, operator.neg, math.sqrt)
+_on(LANE, _is_lanes, LANE, operator.neg, math.sqrt, math.sin, math.cos)
 _on(MASK, _is_mask, MASK, operator.invert)
 
 
