@@ -249,7 +249,9 @@ class Mechanics:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
             place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
-            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error = DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error.status = Status(status)
+            raise error
 
 
 def _owner(c: Constants, speed: int) -> int:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -32,6 +33,9 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.system.batch import Batch, BatchAccelerations
 
 
 class System(Mechanics):
@@ -144,6 +148,23 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         return finite_result(self._accelerations(t, y, algorithm), t)
+
+    def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
+        """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.
+
+            udot, status = system.accelerations_batch(q, u)     q (n,nq), u (n,nu), t (s) one or (n,)
+
+        A state that has no accelerations fails no other one: its row is NaN. Raises ValueError or TypeError for arrays
+        that do not fit.
+        """
+        return self._batch.accelerations(q, u, t, threads=threads)
+
+    @cached_property
+    def _batch(self) -> Batch:
+        """Copies of this system."""
+        from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+
+        return Batch([self])
 
     def _accelerations(self, t: float, y: Real, algorithm: Algorithm) -> Real:
         return algorithms.chosen(algorithm).accelerations(self, t, y)
