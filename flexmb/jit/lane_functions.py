@@ -140,3 +140,8 @@ def _arc_tangent(context, builder, sig, args):
 @lower_builtin(math.sqrt, LaneType)
 def _square_root(context, builder, sig, args):
     return _instruction(builder, "sqrt", args[0])
+
+
+@lower_builtin(abs, LaneType)
+def _absolute(context, builder, sig, args):
+    return _instruction(builder, "fabs", args[0])

@@ -193,7 +193,7 @@ _comparison("==", operator.eq)
 _comparison("!=", operator.ne, lower_ordered=False)  # a NaN differs from everything
 _connective("and_", operator.and_)
 _connective("or_", operator.or_)
-_on(LANE, _is_lanes, LANE, operator.neg, math.sqrt, math.sin, math.cos)
+_on(LANE, _is_lanes, LANE, operator.neg, abs, math.sqrt, math.sin, math.cos)
 _on(MASK, _is_mask, MASK, operator.invert)
 
 
