@@ -37,7 +37,8 @@ from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 class LaneControl(NamedTuple):
     """What each lane (LANES,) knows of its own run: time, proposed step, end and length of the step it tries (s), last
-    time of a stage, error norm, whether the step before was rejected, segment, and its status; RUNNING until it ends.
+    time of a stage, error norm, whether the step before was rejected, segment, number of its segments, and its status,
+    RUNNING until it ends.
     """
 
     t: np.ndarray
@@ -48,10 +49,17 @@ class LaneControl(NamedTuple):
     error: np.ndarray
     rejected: np.ndarray
     segment: np.ndarray
+    ends: np.ndarray
     status: np.ndarray
 
 
 RUNNING = -1
+
+
+def lane_control(ends: np.ndarray) -> LaneControl:
+    """For runs with so many (LANES,) segments."""
+    floats, integers = np.zeros((6, LANES)), np.zeros((2, LANES), np.int64)
+    return LaneControl(*floats, *integers, ends, np.full(LANES, RUNNING))
 
 
 @helper
@@ -282,7 +290,7 @@ def _begin(problem, s, entries, control, clock, out, counts):
 def _enter(control, segment_ends, lane):
     """The next segment of a lane, or its end."""
     segment = control.segment[lane]
-    if segment == segment_ends.shape[1]:
+    if segment == control.ends[lane]:
         control.status[lane] = OK
     else:
         control.end[lane] = segment_ends[lane, segment]

@@ -10,8 +10,9 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from flexmb.integrate.control import EVALUATIONS
+from flexmb.integrate.dop853_tableau import STAGES_DENSE
 from flexmb.jit.bundle import AnyBundle, bundle
-from flexmb.jit.kernel import helper, written_out
+from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lane_arrays import lane_zeros
 from flexmb.jit.lanes import LANES, select
 from flexmb.jit.pointer import NOTHING, STATUS, Pointer, pointer
@@ -63,8 +64,9 @@ class LaneProblem(NamedTuple):
     workspace: AnyBundle
 
 
-def lane_stages(n: int, stages: int) -> LaneStages:
+def lane_stages(n: int, method: str) -> LaneStages:
     """For states of n numbers; one per thread."""
+    stages = STAGES_DENSE if method == "dop853" else 4
     shapes = {"time": (1,), "k": (stages, n), "f": (7, n), "h": (1,), "fraction": (1,), "norm": (3,), "chosen": (1,)}
     shapes |= {name: (n,) for name in ("trial", "y", "y_new")}
     return LaneStages(**{name: lane_zeros(shape) for name, shape in shapes.items()})
@@ -133,3 +135,11 @@ def mark_finite(values, mark):
     mark[0] = select(total == 0.0, 1.0, 0.0)
 
 
+@kernel
+def first_derivative(problem, s, entries, t, counts):
+    """Put the states s.y on their manifold at time t and evaluate their slopes; returns a status code."""
+    set_all(entries.time, t)
+    lane_copy(s.y, s.trial)
+    problem.project(problem.stages, problem.constants)
+    lane_copy(s.trial, s.y)
+    return lane_derivative(problem, 0, counts)
