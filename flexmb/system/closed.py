@@ -16,6 +16,7 @@ from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.evaluator import Evaluator
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -57,6 +58,12 @@ class ClosedSystem(System):
         t, y = self.layout.entering(state)
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
+    def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
+        """Evaluators are of trees."""
+        raise NotImplementedError(
+            f'scene "{self.scene.name}" has closures, and an evaluator is for trees: use accelerations(state)'
+        )
+
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         found = self._on_chains(algorithm)(self.closures, t, y)
         self._trust(t, y, self.closures)
@@ -73,9 +80,9 @@ class ClosedSystem(System):
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""
-        motion, out = self._motion(t, y, algorithm), self._observation.out
+        motion, out = self._motion(t, y, algorithm), self._out
         out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
-        self._observe_motion(t, y, out)
+        self._observe_motion(t, y)
         found = self._observation.evaluation(t)
         closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
         return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
