@@ -122,4 +122,4 @@ def _operations(system: System, algorithm: Algorithm) -> int:
         chain = system.closures.chain(algorithm)
         return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
     chosen = ALGORITHMS[algorithm]
-    return count(chosen.kernel, 0.0, y, *chosen.fresh(system)).operations.total
+    return count(chosen.kernel(), 0.0, y, *chosen.fresh(system)).operations.total

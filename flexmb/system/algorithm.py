@@ -35,8 +35,8 @@ class DynamicsAlgorithm:
     name: Algorithm
     summary: str
     """What it is, in one line."""
-    kernel: Any
-    """The kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves udot in
+    kernel: Callable[[], Any]
+    """Gives the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves udot in
     w.speed.acceleration and returns a status code."""
     own: Callable[[Mechanics], tuple[Any, ...]]
     """These tables with the system's workspace."""
@@ -46,6 +46,9 @@ class DynamicsAlgorithm:
     """Fills everything observable of a tree, the system's `Outputs`."""
     route: Callable[[Mechanics], Route] | None = None
     """For runs of trees; None where it is for single states."""
+    observing: Any = None
+    """The kernel that observes a tree, of t, y, tables as `route` makes them, and `Outputs`; it returns a status code.
+    None where Python stands between several."""
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
     """For closed chains; None where it knows trees only."""
     jacobian: bool = False

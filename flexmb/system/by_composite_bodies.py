@@ -34,7 +34,7 @@ def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
 ALGORITHM = DynamicsAlgorithm(
     "composite",
     "the mass matrix and its Cholesky factors",
-    composite.accelerations,
+    lambda: composite.accelerations,
     _own,
     _fresh,
     _observe,

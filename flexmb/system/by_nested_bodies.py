@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexmb.frisch import evaluation
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -13,6 +12,11 @@ from flexmb.typing import Real
 
 
 def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
+    def kernel() -> Any:
+        from flexmb.frisch import evaluation  # who uses the recursion waits for none of it
+
+        return evaluation.accelerations
+
     def own(system: Mechanics) -> tuple[Any, Any]:
         nested = system.nested(name)
         return nested.constants, nested.own_workspace
@@ -31,10 +35,12 @@ def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
         out.wheel_loads[:, :3] = motion.wheel_torques
 
     def route(system: Mechanics) -> Route:
+        from flexmb.frisch import evaluation
+
         system.nested(name)  # refused here, not in the run
         return Route(lambda: fresh(system), evaluation.rhs, coordinates.project)
 
-    return DynamicsAlgorithm(name, summary, evaluation.accelerations, own, fresh, observe, route=route, **more)
+    return DynamicsAlgorithm(name, summary, kernel, own, fresh, observe, route=route, **more)
 
 
 FRISCH = _declared("frisch", "the nested-body equations of 1975, corrected", errata=CORRECTED)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from flexmb.entry import articulated
+from flexmb.entry.observation import observe
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
@@ -38,11 +39,12 @@ def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
 ALGORITHM = DynamicsAlgorithm(
     "articulated",
     "the O(N) recursion",
-    articulated.accelerations,
+    lambda: articulated.accelerations,
     _own,
     _fresh,
     _observe,
     route=lambda system: Route(lambda: _fresh(system), articulated.rhs, coordinates.project),
+    observing=observe,
     closed_motion=_closed_motion,
     jacobian=True,
 )

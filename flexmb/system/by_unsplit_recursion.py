@@ -25,7 +25,7 @@ def _observe(system: Mechanics, t: float, y: Real) -> None:
 ALGORITHM = DynamicsAlgorithm(
     "unsplit",
     "the recursion with modes and hinge of a body eliminated together, for single states",
-    unsplit.accelerations,
+    lambda: unsplit.accelerations,
     _own,
     _fresh,
     _observe,

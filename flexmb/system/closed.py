@@ -80,12 +80,21 @@ class ClosedSystem(System):
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""
+        closures = self._observe(t, y, algorithm)
+        found = self._observation.evaluation(t)
+        loads = zip(self._observation.names.closures, finite_result(closures, t), strict=True)
+        return replace(found, loads=found.loads | dict(loads))
+
+    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+        """As of a tree, with the loads of closures."""
+        self._observation.fill(row, t, self._observe(t, y, algorithm))
+
+    def _observe(self, t: float, y: Real, algorithm: Algorithm) -> Real:
+        """Fills the outputs; loads (C,6) of closures."""
         motion, out = self._motion(t, y, algorithm), self._out
         out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
         self._observe_motion(t, y)
-        found = self._observation.evaluation(t)
-        closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
-        return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
+        return motion.closures
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.

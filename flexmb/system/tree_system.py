@@ -26,14 +26,16 @@ from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
-from flexmb.system import algorithms
+from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
-from flexmb.system.mechanics import Mechanics
+from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
+
+_NO_CLOSURES = np.zeros((0, 6))
 
 
 class System(Mechanics):
@@ -53,11 +55,14 @@ class System(Mechanics):
         self.recursion_constants = with_elimination(self.constants, elimination)
         self._recursion_w = self.recursion_workspace()
         hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
-        self._observation = Observation(Names(markers, hinges, wheels, self._driven([*hinges, *wheels])), self.nu)
+        closures, driven = [closure.name for closure in scene.closures], self._driven([*hinges, *wheels])
+        self._observation = Observation(Names(markers, hinges, wheels, closures, driven), self.nu)
         self._out = self._observation.out
         self.rhs, self.project = articulated.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
         self._evaluators: dict[str, Evaluator] = {}
+        self.kept: dict[Any, Any] = {}
+        """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
 
     @property
@@ -158,13 +163,23 @@ class System(Mechanics):
         call. NotImplementedError for closed chains.
         """
         chosen = algorithms.chosen(algorithm)
-        return Evaluator(self, chosen.kernel, chosen.fresh(self))
+        return Evaluator(self, chosen.kernel(), chosen.fresh(self))
 
     def _evaluator(self, algorithm: Any) -> Evaluator:
         chosen = algorithms.chosen(algorithm)
         if chosen.name not in self._evaluators:
-            self._evaluators[chosen.name] = Evaluator(self, chosen.kernel, chosen.own(self))
+            self._evaluators[chosen.name] = Evaluator(self, chosen.kernel(), chosen.own(self))
         return self._evaluators[chosen.name]
+
+    @cached_property
+    def start_precision(self) -> Precision:
+        """`precision` of the initial state, found once."""
+        return self.precision(self.initial_state)
+
+    @cached_property
+    def state_names(self) -> tuple[labels.Names, labels.Names]:
+        """((name, unit) of every entry of q, the same of u)."""
+        return labels.names_of_states(self)
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
         """The algorithm as runs see it; `stabilise` is for closed chains.
@@ -213,6 +228,14 @@ class System(Mechanics):
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         algorithms.chosen(algorithm).observe(self, t, y)
         return self._observation.evaluation(t)
+
+    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+        """Everything observable at y = [q, u, work], which is not checked, into a row as `Observation.columns` has it.
+
+        Raises DynamicsError as `evaluate` does.
+        """
+        algorithms.chosen(algorithm).observe(self, t, y)
+        self._observation.fill(row, t, _NO_CLOSURES)
 
     def _wheel_names(self) -> Iterator[str]:
         yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))

@@ -11,7 +11,7 @@ import pytest
 import flexmb as fm
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.samples import sample_bytes
-from flexmb.run.switching import switch_times
+from flexmb.run.switching import timing
 from flexmb.tables.status import Status
 from tests.trees import random_scene
 
@@ -166,7 +166,8 @@ def test_steps_stop_where_a_load_switches():
         .force("kick", "cart", direction=(1.0, 0.0, 0.0), function=fm.Pulse(value=4.0, start_s=0.3, duration_s=0.2))
         .scene()
     )
-    assert switch_times(scene, 1.0) == [0.3, 0.5]
+    assert timing(scene).before(1.0) == [0.3, 0.5]
+    assert timing(scene).before(0.5) == [0.3]
     for options in ({}, {"method": "rk4", "step": 0.07}):
         run = fm.simulate(scene, 1.0, samples=[0.0, 0.4, 1.0], **options)
         assert run.u[:, 0] == pytest.approx([0.0, 0.2, 0.4], abs=20 * EPS)
