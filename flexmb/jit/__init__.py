@@ -13,7 +13,8 @@ hooks.py        which of numba's internals are used, and what is done without th
 counting.py     operations of a kernel, by interpreting it; it needs no numba
 
 Numba documents as its extension API, and we take for granted: `njit`, `cfunc`, `overload`, types of one's own with
-`register_model`, `unbox` and the lowering of attributes, `type_callable` and `lower_builtin`, `WrapperAddressProtocol`, and compilers with other passes.
+`register_model`, `unbox` and the lowering of attributes, `type_callable` and `lower_builtin`,
+`WrapperAddressProtocol`, and compilers with other passes.
 
 Internal to numba, with something in their place (see hooks.py), are: that the code of a function can be left
 unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, and what a compiled

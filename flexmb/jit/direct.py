@@ -30,6 +30,17 @@ class Direct(partial):
 
     held: tuple[Any, ...]
 
+    def __reduce__(self) -> Any:
+        """Neither pickled nor copied: addresses are of one process, and of these bundles."""
+        raise TypeError("a call by address cannot be copied: make another one for the bundles of the copy")
+
+
+def bound(entry: Any, where: tuple[int, ...], *held: Any) -> Direct:
+    """An entry whose first arguments are addresses, with what they are the addresses of."""
+    function = Direct(entry, *where)
+    function.held = held
+    return function
+
 
 def direct(compiled: Any, returned: Any, *arguments: Any) -> Direct:
     """A kernel for these arguments, each a bundle or one of the types of `pointer.py`: called with those of a type.
@@ -40,9 +51,7 @@ def direct(compiled: Any, returned: Any, *arguments: Any) -> Direct:
     is_given = tuple(isinstance(argument, types.Type) for argument in arguments)
     given = [argument for argument in arguments if isinstance(argument, types.Type)]
     entry = settled(_entry(returned, is_given), *[ADDRESS] * (1 + is_given.count(False)), *given)
-    function = Direct(entry, *addresses(compiled, returned, *arguments))
-    function.held = arguments
-    return function
+    return bound(entry, addresses(compiled, returned, *arguments), *arguments)
 
 
 def addresses(compiled: Any, returned: Any, *arguments: Any) -> tuple[int, ...]:

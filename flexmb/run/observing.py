@@ -1,16 +1,15 @@
-"""What is observed at the samples of a run, as rows of numbers: many at once in compiled code where that is possible."""
+"""What is observed at the samples of a run, as rows of numbers; in compiled code where that is possible."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import partial
 from time import perf_counter
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.entry.sampling import observe_samples
-from flexmb.jit.direct import ADDRESS, addresses, settled
+from flexmb.jit.direct import ADDRESS, addresses, bound, settled
 from flexmb.jit.pointer import INDEX, MATRIX, REAL, STATUS, VECTOR
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
@@ -35,9 +34,8 @@ def batch(system: System, kernel: Any, constants: Any, workspace: Any) -> Batch:
     out = system._observation.outputs()
     entry = settled(observe_samples, *[ADDRESS] * 4, INDEX, VECTOR, MATRIX, MATRIX)
     behind = addresses(kernel, STATUS, REAL, VECTOR, constants, workspace, out)
-    found = partial(entry, *behind, workspace.doubt)
-    found.held = constants, workspace, out  # type: ignore[attr-defined]
-    return found
+    call = bound(entry, behind, constants, workspace, out)
+    return lambda times, states, rows: call(workspace.doubt, times, states, rows)
 
 
 def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Batch | None) -> Rows:
@@ -54,9 +52,8 @@ def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sam
                 many = 2 * many if perf_counter() - start < PATIENCE / 2.0 else max(1, many // 2)
                 if done == some.stop:
                     continue
-            system.observe_row(float(times[done]), states[done], algorithm, rows[done])
+            system._observe_row(float(times[done]), states[done], algorithm, rows[done])
             done += 1
     except (DynamicsError, KeyboardInterrupt) as trouble:
         return Rows(rows[:done], trouble)
     return Rows(rows, None)
-

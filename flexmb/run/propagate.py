@@ -73,7 +73,9 @@ class Integration:
 
 
 @contextmanager
-def integration(system: System, algorithm: Algorithm, stabilise: float, integrator: Integrator) -> Iterator[Integration]:
+def integration(
+    system: System, algorithm: Algorithm, stabilise: float, integrator: Integrator
+) -> Iterator[Integration]:
     """One that nobody else uses meanwhile; kept for the next run, but of closed chains, which remember their branch.
 
     ValueError and others for what does not go together: see `System.route`.

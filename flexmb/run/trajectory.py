@@ -151,7 +151,7 @@ def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
         "wheel_loads": _by_name(names.wheels, found["wheel_loads"]),
         "drives": {name: found["drives"][:, places] for name, places in names.driven.items()},
         "energy": _by_name(ENERGIES, found["energy"]),
-        "momentum": found["momentum"],
+        "momentum": found["momentum"].copy(),
     }
 
 

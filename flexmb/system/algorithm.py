@@ -36,8 +36,8 @@ class DynamicsAlgorithm:
     summary: str
     """What it is, in one line."""
     kernel: Callable[[], Any]
-    """Gives the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves udot in
-    w.speed.acceleration and returns a status code."""
+    """Gives the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves
+    udot in w.speed.acceleration and returns a status code."""
     own: Callable[[Mechanics], tuple[Any, ...]]
     """These tables with the system's workspace."""
     fresh: Callable[[Mechanics], tuple[Any, ...]]

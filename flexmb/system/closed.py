@@ -32,9 +32,7 @@ class ClosedSystem(System):
         super().__init__(scene)
         own = closure_constants(scene, self.constants, self._closure_ports)
         slowest = slowest_mode(self._links)
-        self.closures = Closures(
-            scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check
-        )
+        self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
         self._start: State | None = None
 
     @property
@@ -85,7 +83,7 @@ class ClosedSystem(System):
         loads = zip(self._observation.names.closures, finite_result(closures, t), strict=True)
         return replace(found, loads=found.loads | dict(loads))
 
-    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """As of a tree, with the loads of closures."""
         self._observation.fill(row, t, self._observe(t, y, algorithm))
 

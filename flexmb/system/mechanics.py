@@ -96,6 +96,10 @@ class Mechanics:
         """Frisch's equations of this scene."""
         raise NotImplementedError
 
+    def evaluator(self, algorithm: Any = "articulated") -> Evaluator:
+        """Of an algorithm, with a workspace of its own."""
+        raise NotImplementedError
+
     def _evaluator(self, algorithm: Any) -> Evaluator:
         """Of an algorithm that there is, with this system's workspace."""
         raise NotImplementedError

@@ -50,8 +50,7 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Names:
-    """Of what is observed: (body, port) of markers; hinges, wheels and closures in order; places in u of what is driven.
-    """
+    """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven."""
 
     markers: dict[str, tuple[int, int]]
     hinges: Sequence[str]
@@ -89,11 +88,8 @@ class Observation:
         row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
 
     def columns_of(self, rows: Real) -> dict[str, Real]:
-        """Parts of rows (T,width) by the names in `columns`, (T, ...) each."""
-        return {
-            name: np.ascontiguousarray(rows[:, place]).reshape(len(rows), *shape)
-            for name, (place, shape) in self.columns.items()
-        }
+        """Parts of rows (T,width) by the names in `columns`, (T, ...) each, which are views."""
+        return {name: rows[:, place].reshape(len(rows), *shape) for name, (place, shape) in self.columns.items()}
 
     def evaluation(self, t: float) -> Evaluation:
         """A copy of what was filled last; DynamicsError where a number is not finite."""

@@ -24,6 +24,7 @@ from flexmb.entry import articulated
 from flexmb.frisch.nested_system import NestedSystem, Partitions
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jain.operators import Operators, SpatialOperators
+from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms, labels
@@ -64,6 +65,11 @@ class System(Mechanics):
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what holds addresses: a copy finds its own."""
+        kept = {name: value for name, value in self.__dict__.items() if not isinstance(value, Direct)}
+        return kept | {"_evaluators": {}, "kept": {}}
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -163,12 +169,12 @@ class System(Mechanics):
         call. NotImplementedError for closed chains.
         """
         chosen = algorithms.chosen(algorithm)
-        return Evaluator(self, chosen.kernel(), chosen.fresh(self))
+        return Evaluator(self, chosen, chosen.fresh(self))
 
     def _evaluator(self, algorithm: Any) -> Evaluator:
         chosen = algorithms.chosen(algorithm)
         if chosen.name not in self._evaluators:
-            self._evaluators[chosen.name] = Evaluator(self, chosen.kernel(), chosen.own(self))
+            self._evaluators[chosen.name] = Evaluator(self, chosen, chosen.own(self))
         return self._evaluators[chosen.name]
 
     @cached_property
@@ -229,7 +235,7 @@ class System(Mechanics):
         algorithms.chosen(algorithm).observe(self, t, y)
         return self._observation.evaluation(t)
 
-    def observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """Everything observable at y = [q, u, work], which is not checked, into a row as `Observation.columns` has it.
 
         Raises DynamicsError as `evaluate` does.

@@ -52,9 +52,7 @@ except KeyboardInterrupt as stopped:
     run = stopped.trajectory
     print(time.process_time() - pressed, run.status.name, run.stopped_at, len(run.t), run.t[-1], stopped)
 """
-METHODS = {
-    name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()
-}
+METHODS = {name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -86,7 +84,7 @@ def test_the_command_line_writes_what_was_reached_and_says_130(tmp_path):
 def test_outputs_that_are_evaluated_are_kept_too(algorithm, monkeypatch):
     """By the compiled loop, which Python calls again and again, and by single states."""
     system, seen = fm.compile(pendulum()), 0
-    whole = type(system).observe_row
+    whole = type(system)._observe_row
 
     def observe_row(self, *given):
         nonlocal seen
@@ -98,7 +96,7 @@ def test_outputs_that_are_evaluated_are_kept_too(algorithm, monkeypatch):
     def nothing_at_once(times, states, rows):
         return 0
 
-    monkeypatch.setattr(type(system), "observe_row", observe_row)
+    monkeypatch.setattr(type(system), "_observe_row", observe_row)
     monkeypatch.setattr(propagation, "batch", lambda *given: nothing_at_once)
     with pytest.raises(fm.Interrupted) as stopped:
         fm.simulate(system, 1.0, samples=11, algorithm=algorithm)

@@ -141,7 +141,10 @@ import numpy as np
 import flexmb.jit.direct as direct
 
 numba.config.DISABLE_JIT = 1  # from here on: the package refuses to be without its compiler
-direct.addresses = lambda function, returned, *given: (function, *(x for x in given if not isinstance(x, numba.types.Type)))
+def addresses(function, returned, *given):
+    return function, *(each for each in given if not isinstance(each, numba.types.Type))
+
+direct.addresses = addresses
 direct.settled = lambda function, *kinds: function
 import flexmb
 from tests.flexmb.system.test_system import RECIPE, SEED, numbers
