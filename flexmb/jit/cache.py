@@ -24,6 +24,7 @@ from typing import Any
 
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 
 from flexmb.jit.fingerprint import fingerprint
@@ -50,7 +51,7 @@ class KernelCache(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The version for a signature, or None where there is none that is sound."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # no more: numba's registries, which only its compiler needs, take 0.4 s
         file = self._file(sig, target_context.codegen())
         try:
             data = file.read_bytes()

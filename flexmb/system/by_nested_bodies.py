@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 from flexmb.entry.observation import Outputs
-from flexmb.frisch import evaluation
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -34,14 +33,18 @@ def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
         nested = system.nested(name)
         return nested.constants, nested.workspace()
 
+    def kernel(system: Mechanics) -> tuple[Any, tuple[Any, ...]]:
+        from flexmb.frisch import evaluation  # who uses the recursion waits for none of it
+
+        return evaluation.accelerations, tables(system)
+
     def route(system: Mechanics) -> Route:
+        from flexmb.frisch import evaluation
+
         system.nested(name)  # refused here, not in the run
         return Route(lambda: tables(system), evaluation.rhs, coordinates.project)
 
-    return DynamicsAlgorithm(
-        name, summary, accelerations, observe,
-        kernel=lambda system: (evaluation.accelerations, tables(system)), route=route, **more,
-    )  # fmt: skip
+    return DynamicsAlgorithm(name, summary, accelerations, observe, kernel=kernel, route=route, **more)
 
 
 FRISCH = _declared("frisch", "the nested-body equations of 1975, corrected", errata=CORRECTED)

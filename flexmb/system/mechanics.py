@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
 from flexmb.entry.observation import Outputs, observe_motion
-from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.system.factors import MassMatrixFactors
@@ -22,6 +21,9 @@ from flexmb.tables.state import DynamicsError, Layout, PrecisionWarning, State, 
 from flexmb.tables.status import OK, Status
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem
 
 FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
 

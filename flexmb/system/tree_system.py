@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,9 +21,7 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.frisch.nested_system import NestedSystem, Partitions
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
-from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
@@ -32,6 +31,10 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem, Partitions
+    from flexmb.jain.operators import Operators, SpatialOperators
 
 
 class System(Mechanics):
@@ -113,6 +116,8 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
+        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
+
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
             self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
@@ -126,6 +131,8 @@ class System(Mechanics):
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
         t, _ = self.layout.entering(state)
+        from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
+
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
         found = self._operators.at(t, state.q, state.u)
