@@ -21,6 +21,7 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
+from flexmb.entry.observation import free_loads
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
@@ -173,9 +174,16 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            return self._evaluate(t, y, "articulated").loads
+            return self._by_hinge(finite_result(self._free_loads(t, y), t))
         rates = self.layout.rates("accelerations", accelerations)
         return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+
+    def _free_loads(self, t: float, y: Real) -> Real:
+        """(N,6) of the free motion, World axes."""
+        loads, w = np.zeros((len(self._links), 6)), self._recursion_w
+        self._check(free_loads(t, y, self.recursion_constants, w, loads), int(w.fault[0]))
+        self._trust(t, y, w)
+        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
