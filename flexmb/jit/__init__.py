@@ -17,10 +17,9 @@ Numba documents as its extension API, and we take for granted: `njit`, `cfunc`, 
 `register_model`, `unbox` and the lowering of attributes, `WrapperAddressProtocol`, and compilers with other passes.
 
 Internal to numba, with something in their place (see hooks.py), are: that the code of a function can be left
-unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, and what a compiled
-version is as bytes (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock` and `normalize_signature`, in cache.py);
-and the address of a compiled version
-(`CompileResultWAP`, in hooks.py).
+unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, what a compiled
+version is as bytes, and what it needs to run (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock`,
+`normalize_signature`, in cache.py); and the address of a compiled version (`CompileResultWAP`, in hooks.py).
 
 Internal to numba, with nothing in their place, are four names in bundle.py: the protocol `_numba_type_`,
 `AttributeTemplate`, `populate_array`, and the structure of an array that `make_array` gives. All numba versions that
