@@ -21,9 +21,8 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.frisch.nested_system import NestedSystem, Partitions
+from flexmb.entry.observation import free_loads
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
-from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
@@ -37,7 +36,10 @@ from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem, Partitions
+    from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.system.batch import Batch, BatchAccelerations
+
 _NO_CLOSURES = np.zeros((0, 6))
 
 
@@ -130,6 +132,8 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
+        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
+
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
             self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
@@ -143,6 +147,8 @@ class System(Mechanics):
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
         t, _ = self.layout.entering(state)
+        from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
+
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
         found = self._operators.at(t, state.q, state.u)
@@ -224,9 +230,16 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            return self._evaluate(t, y, "articulated").loads
+            return self._by_hinge(finite_result(self._free_loads(t, y), t))
         rates = self.layout.rates("accelerations", accelerations)
         return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+
+    def _free_loads(self, t: float, y: Real) -> Real:
+        """(N,6) of the free motion, World axes."""
+        loads, w = np.zeros((len(self._links), 6)), self._recursion_w
+        self._check(free_loads(t, y, self.recursion_constants, w, loads), int(w.fault[0]))
+        self._trust(t, y, w)
+        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
