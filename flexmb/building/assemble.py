@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -112,6 +112,9 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     body["axis"] = [link.kind.axis for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
     body["q_index"] = [numbering.q[link.hinge.name].start for link in chain]
+    body["quaternion"] = [
+        -1 if link.kind.quaternion < 0 else numbering.q[link.hinge.name].start + link.kind.quaternion for link in chain
+    ]
     body["u_index"] = [numbering.u[link.hinge.name].start for link in chain]
     body["nv"] = [link.kind.speeds for link in chain]
     body["modes"] = [link.model.mode_count for link in chain]
@@ -141,7 +144,9 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         **inertia,
         **points,
     )
-    constants.speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
+    speed = speed.copy()  # those in the constants are read-only
+    speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
+    constants = replace(constants, speed=speed)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
 

@@ -16,8 +16,8 @@ DEPENDENT = 1e-9
 @helper
 def norm(x):
     total = 0.0
-    for value in x:
-        total += value * value
+    for i in range(x.shape[0]):
+        total += x[i] * x[i]
     return sqrt(total)
 
 

@@ -24,13 +24,16 @@ from flexmb.jain.doubt import note_hinge
 from flexmb.jain.explicit import cholesky
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.variants import to_parent
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, outer_inertia, sum_inertia
 from flexmb.spatial.pivots import is_rounding, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
+from flexmb.tables.features import AXIS, PRESCRIBED, SEVERAL
 
+LINEAR = f"{AXIS} {LINEAR_Z}"  # the feature of hinges that slide along a single axis
 SINGLE = -1  # free_count of a hinge with a single axis
 
 
@@ -63,18 +66,20 @@ def eliminate(c, w, k):
 
     Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k in w.body.hinge_inertia and hinge_force.
     """
-    impose(c, w, k)
+    if has(c, PRESCRIBED):
+        impose(c, w, k)
     P = load_inertia(w.body[k].hinge_inertia, 0)
     z = sum6(vec6(w.body[k].hinge_force, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
-    j, axis = c.body[k].u_index, c.body[k].axis
-    if axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
-        return _eliminate_several(c, w, k, P, z)
-    PH = inertia_column(P, ANGULAR_Z if axis == ANGULAR_Z else LINEAR_Z)  # the compiler sees that there are but two
-    D = _along(axis, PH)
-    before = w.body[k].inertia[2 if axis == ANGULAR_Z else 17]
+    j = c.body[k].u_index
+    if has(c, SEVERAL):
+        if c.body[k].axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
+            return _eliminate_several(c, w, k, P, z)
+    PH = inertia_column(P, ANGULAR_Z if _turns(c, k) else LINEAR_Z)  # the compiler sees that there are but two
+    D = _along(c, k, PH)
+    before = w.body[k].inertia[2 if _turns(c, k) else 17]
     if is_small(c, w, j, D, before) and is_rounding(D, before):
         return False
-    epsilon = w.speed[j].applied - _along(axis, z)
+    epsilon = w.speed[j].applied - _along(c, k, z)
     s = 1.0 / D
     w.body[k].free_count = SINGLE
     w.body[k].hinge_factor[0, 0] = D
@@ -124,10 +129,10 @@ def accelerate(c, w, k, A):
     """Rates of the free speeds from alpha^+ and what `eliminate` left; returns alpha^+ + H' udot + a_m (64)."""
     j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
     moved = sum6(A, vec6(w.body[k].bias, 0))
-    if free == SINGLE:
+    if not has(c, SEVERAL) or free == SINGLE:
         udot = less6(w.body[k].hinge_residual[0], vec6(G[0], 0), A)
         w.speed[j].acceleration = udot
-        return _move_along(c.body[k].axis, moved, udot)
+        return _move_along(c, k, moved, udot)
     for a in range(free - 1, -1, -1):
         udot = less6(w.body[k].hinge_residual[a], vec6(G[a], 0), A)
         for b in range(a + 1, free):
@@ -143,7 +148,7 @@ def accelerate(c, w, k, A):
 def add_innovations(c, w, x, k):
     """Further forces T have the innovations y: what `eliminate` left is as if they had been there."""
     j = c.body[k].u_index
-    if w.body[k].free_count == SINGLE:
+    if not has(c, SEVERAL) or w.body[k].free_count == SINGLE:
         w.body[k].hinge_residual[0] += x.speed[j] / sqrt(w.body[k].hinge_factor[0, 0])
     for a in range(w.body[k].free_count):
         w.body[k].hinge_residual[a] += x.speed[j + w.body[k].free_speed[a]]
@@ -153,8 +158,8 @@ def add_innovations(c, w, x, k):
 def innovate(c, w, x, k, z):
     """y = L^-1 (T - H z) in place of T; returns z^+ (55)."""
     j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
-    if free == SINGLE:
-        epsilon = x.speed[j] - _along(c.body[k].axis, z)
+    if not has(c, SEVERAL) or free == SINGLE:
+        epsilon = x.speed[j] - _along(c, k, z)
         x.speed[j] = epsilon / sqrt(D[0, 0])
         return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
     _hold(c, x, k)
@@ -171,9 +176,9 @@ def innovate(c, w, x, k, z):
 def synthesise(c, w, x, k, z):
     """T = L y + H z in place of y; returns z^+ (54)."""
     j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
-    if free == SINGLE:
+    if not has(c, SEVERAL) or free == SINGLE:
         epsilon = sqrt(D[0, 0]) * x.speed[j]
-        x.speed[j] = epsilon + _along(c.body[k].axis, z)
+        x.speed[j] = epsilon + _along(c, k, z)
         return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
     gained = _gained(c, w, x, k, z)
     for a in range(free - 1, -1, -1):
@@ -190,10 +195,10 @@ def synthesise(c, w, x, k, z):
 def solve(c, w, x, k, A):
     """x = L'^-1 (y - (G L)'alpha^+) in place of y; returns alpha^+ + H' x (56)."""
     j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
-    if free == SINGLE:
+    if not has(c, SEVERAL) or free == SINGLE:
         rate = less6(x.speed[j] / sqrt(D[0, 0]), vec6(G[0], 0), A)
         x.speed[j] = rate
-        return _move_along(c.body[k].axis, A, rate)
+        return _move_along(c, k, A, rate)
     for a in range(free - 1, -1, -1):
         rate = less6(x.speed[j + w.body[k].free_speed[a]], vec6(G[a], 0), A)
         for b in range(a + 1, free):
@@ -207,10 +212,10 @@ def solve(c, w, x, k, A):
 def excite(c, w, x, k, A):
     """y = L' x + (G L)'alpha^+ in place of x; returns alpha^+ + H' x."""
     j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
-    if free == SINGLE:
+    if not has(c, SEVERAL) or free == SINGLE:
         rate = x.speed[j]
         x.speed[j] = sqrt(D[0, 0]) * (rate + dot6(vec6(G[0], 0), A))
-        return _move_along(c.body[k].axis, A, rate)
+        return _move_along(c, k, A, rate)
     spread = _spread(c, w, x, k, A)
     for a in range(free):
         total = dot6(vec6(G[a], 0), A)
@@ -233,16 +238,24 @@ def log_determinant(w, k):
 
 
 @helper
-def _along(axis, F):
-    """H F of a single axis."""
-    return F[0][2] if axis == ANGULAR_Z else F[1][2]
+def _turns(c, k):
+    """Whether a single axis is one of rotation."""
+    if not has(c, LINEAR):
+        return True
+    return c.body[k].axis == ANGULAR_Z
 
 
 @helper
-def _move_along(axis, A, rate):
+def _along(c, k, F):
+    """H F of a single axis."""
+    return F[0][2] if _turns(c, k) else F[1][2]
+
+
+@helper
+def _move_along(c, k, A, rate):
     """A + H' rate of a single axis."""
     alpha, a = A
-    if axis == ANGULAR_Z:
+    if _turns(c, k):
         return (alpha[0], alpha[1], alpha[2] + rate), a
     return alpha, (a[0], a[1], a[2] + rate)
 

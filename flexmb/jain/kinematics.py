@@ -6,6 +6,7 @@ accelerations are classical (of the hinge point), not spatial; the body order is
 
 from flexmb.hinges import catalogue
 from flexmb.jain.ports import move_port, port_bias, port_velocity
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.spatial_vector import (
@@ -32,6 +33,7 @@ from flexmb.spatial.vector import (
     transpose,
     vec3,
 )
+from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
 @helper
@@ -43,13 +45,14 @@ def velocity_sweep(c, w, shape, rates):
     """
     displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
-        exact = not is_at_rest(c.body[k].level)
-        if exact or displaced:
-            for n in range(c.body[k].modes):
-                w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-                w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
-            for i in range(c.body[k].port_start, c.body[k].port_stop):
-                move_port(c, w, k, i)
+        if has(c, MODES):
+            exact = not is_at_rest(c.body[k].level)
+            if exact or displaced:
+                for n in range(c.body[k].modes):
+                    w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+                    w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+                for i in range(c.body[k].port_start, c.body[k].port_stop):
+                    move_port(c, w, k, i)
         _cross_hinge(c, w, k)
     w.displaced[0] = 1 if shape or rates else 0
 
@@ -58,9 +61,10 @@ def velocity_sweep(c, w, shape, rates):
 def _inboard(c, w, k):
     """O+ of body k in parent axes (7): velocity and bias of the parent's reference, arm from it to O+, R_parent_O+."""
     p = c.body[k].parent
-    i = c.body[k].inboard_port
-    if i >= 0:
-        return port_velocity(w, p, i), port_bias(w, p, i), (0.0, 0.0, 0.0), mat3(w.port[i].R, 0)
+    if has(c, INBOARD_NODES):
+        i = c.body[k].inboard_port
+        if i >= 0:
+            return port_velocity(w, p, i), port_bias(w, p, i), (0.0, 0.0, 0.0), mat3(w.port[i].R, 0)
     arm = vec3(c.body[k].placement_position, 0)
     R = mat3(c.body[k].placement_rotation, 0)
     if p < 0:
@@ -73,8 +77,8 @@ def _cross_hinge(c, w, k):
     """Velocity and bias of body k from its parent through the hinge (8), (9), (25)."""
     V_parent, A_parent, arm, R_inboard = _inboard(c, w, k)
     i, j, kind = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind
-    R_hinge, p_hinge = catalogue.pose(kind, w.q, i, c.body[k].sequence)
-    V_rel, A_rel = catalogue.motion(kind, w.q, i, w.u, j, c.body[k].sequence, w.body[k].hinge_map)
+    R_hinge, p_hinge = catalogue.pose(c, kind, w.q, i, c.body[k].sequence)
+    V_rel, A_rel = catalogue.motion(c, kind, w.q, i, w.u, j, c.body[k].sequence, w.body[k].hinge_map)
     arm = add(arm, times(R_inboard, p_hinge))
     R = matmul(R_inboard, R_hinge)
     # O as a point of the parent, in outboard axes
@@ -85,7 +89,7 @@ def _cross_hinge(c, w, k):
     A = sum6(sum6(A, coriolis), A_rel)
     V = sum6(V, V_rel)
     store3(w.body[k].arm, 0, arm)
-    if c.body[k].outboard_port >= 0:
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         R, V, A = _from_deforming_node(c, w, k, R, V, A)
     store9(w.body[k].rotation, 0, R)
     store6(w.body[k].velocity, 0, V)
@@ -126,7 +130,7 @@ def store_column(H, n, V):
 @helper
 def motion_column(c, w, k, n):
     """Column n of H' in body axes: the motion of O that speed n of the hinge is."""
-    if c.body[k].outboard_port >= 0:
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         return column(w.body[k].motion, n)
     return column(w.body[k].hinge_map, n)
 
@@ -141,13 +145,13 @@ def pose_sweep(c, w):
         R = mat3(w.body[k].rotation, 0)
         if p >= 0:
             R_parent = mat3(w.body[p].pose_rotation, 0)
-            if i >= 0:
+            if has(c, INBOARD_NODES) and i >= 0:
                 arm = add(arm, vec3(w.port[i].r, 0))
             position = add(vec3(w.body[p].pose_position, 0), times(R_parent, arm))
             R = matmul(R_parent, R)
         else:
             position = arm
-        if c.body[k].outboard_port >= 0:
+        if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
             position = sub(position, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
         store9(w.body[k].pose_rotation, 0, R)
         store3(w.body[k].pose_position, 0, position)

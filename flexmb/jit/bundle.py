@@ -32,7 +32,7 @@ def bundle(cls: Class) -> Class:
     """Make a class of annotated arrays and bundles a frozen dataclass that kernels take as one argument.
 
     Inside a kernel `b.name` is the array or bundle; in Python too. The arrays must be C-contiguous; kernels may
-    write to them.
+    write to them. A method `features` says what is in them: a frozenset of names, part of the type of the bundle.
     """
     cls.__post_init__ = _describe  # type: ignore[attr-defined]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
@@ -40,7 +40,11 @@ def bundle(cls: Class) -> Class:
 
 
 def _describe(self: Any) -> None:
-    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers."""
+    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers.
+
+    Where the type says which features the arrays have, they are made read-only: what is not there must not come later.
+    """
+    features = self.features() if hasattr(self, "features") else frozenset()
     names = [field.name for field in fields(self)]
     table, kinds = np.zeros((len(names), _ROW), np.int64), list[tuple[str, types.Type]]()
     for name, row in zip(names, table, strict=True):
@@ -54,9 +58,11 @@ def _describe(self: Any) -> None:
         row[0] = array.ctypes.data
         row[1 : 1 + array.ndim] = array.shape
         kinds.append((name, _array_type(array.dtype, array.ndim)))
+        if features:
+            array.setflags(write=False)
     object.__setattr__(self, "_table", table)
     object.__setattr__(self, "_address", table.ctypes.data)
-    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds)))
+    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds), features))
 
 
 @cache
@@ -71,12 +77,17 @@ def _reduce(self: Any) -> tuple[Any, ...]:
 
 
 class BundleType(types.Type):
-    """Type of a bundle: its class, the names and types of its members. Its name is short, for it is part of symbols."""
+    """Type of a bundle: its class, the names and types of its members, and its features (see `flexmb.jit.features`).
 
-    def __init__(self, of: type, kinds: tuple[tuple[str, types.Type], ...]) -> None:
-        self.of, self.kinds = of, kinds
-        contents = of.__module__, of.__qualname__, [(key, str(kind)) for key, kind in kinds]
-        super().__init__(name=f"{of.__name__}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:8]}")
+    Its name is short, for it is part of symbols.
+    """
+
+    def __init__(
+        self, of: type, kinds: tuple[tuple[str, types.Type], ...], features: frozenset[str] = frozenset()
+    ) -> None:
+        self.of, self.kinds, self.features = of, kinds, features
+        contents = of.__module__, of.__qualname__, [(key, str(kind)) for key, kind in kinds], sorted(features)
+        super().__init__(name=f"{of.__name__}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:12]}")
 
     def place(self, name: str) -> int:
         """Row of a member in the table."""

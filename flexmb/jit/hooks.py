@@ -46,6 +46,7 @@ class Hooks:
     """How helpers and kernels are compiled: as here, by what numba documents, or by its internals."""
 
     parts: dict[str, Any] = field(default_factory=dict)  # options of njit for a helper
+    kernels: dict[str, Any] = field(default_factory=dict)  # of a kernel
     keep: Callable[[Any, FunctionType], None] = _compiled_anew  # (dispatcher, its function)
     address: Callable[[Any, Any], int] = _through_cfunc  # of (dispatcher, signature), once it is compiled for it
 
@@ -57,7 +58,7 @@ def _by_internals() -> Hooks:
     from numba.core.types.function_type import CompileResultWAP
 
     from flexmb.jit.cache import KernelCache
-    from flexmb.jit.parts import PartCompiler
+    from flexmb.jit.parts import KernelCompiler, PartCompiler
 
     def keep(compiled: Any, function: FunctionType) -> None:
         directory = cache_directory()
@@ -70,7 +71,7 @@ def _by_internals() -> Hooks:
     parts = {
         "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True, "pipeline_class": PartCompiler
     }  # fmt: skip
-    return Hooks(parts, keep, address)
+    return Hooks(parts, {"pipeline_class": KernelCompiler}, keep, address)
 
 
 def _version() -> tuple[int, int]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
@@ -63,10 +62,9 @@ def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
     for name, body in zip(system.body_names, equations.constants.body, strict=True):
         modes = slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
         named[modes] = coordinates[int(body["eta_index"]) : int(body["eta_index"] + body["modes"])]
-        start = quaternion_offset.py_func(int(body["hinge_kind"]))
-        if start >= 0:
+        if body["quaternion"] >= 0:
             hinge = next(hinge.name for hinge in system.scene.hinges if hinge.child == name)
-            labels = _ROTATION if start == 0 else _ROTATION + _POSITION
+            labels = _ROTATION if body["quaternion"] == body["q_index"] else _ROTATION + _POSITION
             j = int(body["u_index"])
             named[j : j + len(labels)] = [(f"{hinge}.{label}", unit) for label, unit in labels]
     chosen = [named[j] for j in equations.free]

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jit.bundle import bundle
+from flexmb.tables import features
 from flexmb.typing import Index, Real, Record
 
 EXPLICIT, WOODBURY, CONDENSED = range(3)
@@ -35,6 +36,7 @@ BODY = _record(
     ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
+    ("quaternion", _I),  # where the quaternion of its hinge begins in q, -1 where there is none
     ("u_index", _I),  # first hinge speed in u
     ("nv", _I),  # number of hinge speeds
     ("modes", _I),  # number of modes
@@ -150,6 +152,10 @@ class Constants:
     speed: Record  # (nu,) SPEED
     function: Record  # (F,) FUNCTION
     table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
+
+    def features(self) -> frozenset[str]:
+        """What kernels for these constants contain."""
+        return features.features(self)
 
 
 # Every reduced body has nodes i = 0..C-1 where outboard bodies are hinged; vectors of all of them are stacked (6C).
