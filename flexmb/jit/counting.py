@@ -121,6 +121,8 @@ def _counting(value: Any, scalar: Any) -> Any:
         copy = object.__new__(type(value))  # a bundle's own constructor takes addresses of arrays
         for field in fields(value):
             object.__setattr__(copy, field.name, _counting(getattr(value, field.name), scalar))
+        if hasattr(value, "_numba_type_"):  # a bundle's features are part of its type
+            object.__setattr__(copy, "_numba_type_", value._numba_type_)
         return copy
     if isinstance(value, tuple):
         parts = [_counting(part, scalar) for part in value]
