@@ -10,6 +10,7 @@ from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.tables import Recursion
 from flexmb.closure.unit_loads import apply_load, half_solve, pass_inward
 from flexmb.jain import hinge_solve, innovations
+from flexmb.jain.explicit import about_hinge
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.response import clear, read_speeds, write_speeds
@@ -54,7 +55,7 @@ def _accelerate(route, s):
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
             w.mode[k, n].zf -= cw.response.speed[c.body[k].etad_index + n]
-        add6(w.body[k].hinge_force, 0, vec6(cw.response.body[k].force, 0))
+        add6(about_hinge(c, w, k)[1], 0, vec6(cw.response.body[k].force, 0))
         hinge_solve.add_innovations(c, w, cw.response, k)
     outward(c, w)
     drive_loads(c, w)

@@ -163,7 +163,6 @@ def speed_power(c, w):
             f = c.speed[j].motor
             if f >= 0:
                 total += w.function[f, 0] * rate
-        if has(c, PRESCRIBED):
-            if c.speed[j].prescribed >= 0:
-                total += w.speed[j].drive * rate
+        if has(c, PRESCRIBED) and c.speed[j].prescribed >= 0:
+            total += w.speed[j].drive * rate
     return total
