@@ -120,7 +120,7 @@ def displace(t, y, s):
     load_state(t, y, c, w)
     for j in range(w.u.shape[0]):
         w.u[j] = s.cw.step[j]
-    configuration_rate(c, w)
+    configuration_rate(c, w, w.rate)
     for i in range(w.q.shape[0]):
         y[i] += w.rate[i]
     normalise_quaternions(y, c)
