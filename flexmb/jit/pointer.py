@@ -11,6 +11,7 @@ from functools import cache
 from typing import Any
 
 from numba import types
+from numba.experimental import function_type  # noqa: F401  (how numba sees the type of a `Pointer`)
 from numba.types import WrapperAddressProtocol
 
 from flexmb.jit.bundle import AnyBundle, BundleType

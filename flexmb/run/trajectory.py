@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
+from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -174,7 +174,7 @@ def _continuous_quaternions(rotations: Real) -> Real:
     """Scalar-first quaternions of (T,3,3) rotations, each with the sign that is closer to the one before."""
     if not len(rotations):
         return np.empty((0, 4))
-    quaternions = Rotation.from_matrix(rotations).as_quat(canonical=True, scalar_first=True)
+    quaternions = quaternion_of(rotations)
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
 

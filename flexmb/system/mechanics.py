@@ -12,7 +12,6 @@ from numpy.typing import NDArray
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
 from flexmb.entry.observation import Outputs, observe, observe_motion
-from flexmb.frisch.nested_system import NestedSystem
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.jit.direct import Direct, direct
@@ -26,6 +25,7 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem
     from flexmb.system.evaluator import Evaluator
 
 FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
@@ -293,7 +293,9 @@ class Mechanics:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
             place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
-            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error = DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error.status = Status(status)
+            raise error
 
 
 def _owner(c: Constants, speed: int) -> int:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
+from flexmb.scene.quaternions import quaternion_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
 
@@ -27,7 +27,7 @@ class MarkerMotion:
     @property
     def quaternion(self) -> Real:
         """Scalar first, unit."""
-        return Rotation.from_matrix(self.rotation).as_quat(scalar_first=True, canonical=True)
+        return quaternion_of(self.rotation)
 
 
 @dataclass(frozen=True)

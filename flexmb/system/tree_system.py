@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -21,9 +21,8 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.frisch.nested_system import NestedSystem, Partitions
+from flexmb.entry.observation import free_loads
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
-from flexmb.jain.operators import Operators, SpatialOperators
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
@@ -35,6 +34,11 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem, Partitions
+    from flexmb.jain.operators import Operators, SpatialOperators
+    from flexmb.system.batch import Batch, BatchAccelerations
 
 _NO_CLOSURES = np.zeros((0, 6))
 
@@ -128,6 +132,8 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
+        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
+
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
             self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
@@ -141,6 +147,8 @@ class System(Mechanics):
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
         t, _ = self.layout.entering(state)
+        from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
+
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
         found = self._operators.at(t, state.q, state.u)
@@ -161,6 +169,23 @@ class System(Mechanics):
             self.layout.owning(state)
         evaluator = self._evaluators.get(algorithm) or self._evaluator(algorithm)
         return evaluator(state.t, state.q, state.u).copy()
+
+    def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
+        """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.
+
+            udot, status = system.accelerations_batch(q, u)     q (n,nq), u (n,nu), t (s) one or (n,)
+
+        A state that has no accelerations fails no other one: its row is NaN. Raises ValueError or TypeError for arrays
+        that do not fit.
+        """
+        return self._batch.accelerations(q, u, t, threads=threads)
+
+    @cached_property
+    def _batch(self) -> Batch:
+        """Copies of this system."""
+        from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+
+        return Batch([self])
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
@@ -205,9 +230,16 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            return self._evaluate(t, y, "articulated").loads
+            return self._by_hinge(finite_result(self._free_loads(t, y), t))
         rates = self.layout.rates("accelerations", accelerations)
         return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+
+    def _free_loads(self, t: float, y: Real) -> Real:
+        """(N,6) of the free motion, World axes."""
+        loads, w = np.zeros((len(self._links), 6)), self._recursion_w
+        self._check(free_loads(t, y, self.recursion_constants, w, loads), int(w.fault[0]))
+        self._trust(t, y, w)
+        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}

@@ -13,17 +13,22 @@ import numpy as np
 
 from flexmb.tables import arguments
 from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
+from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
 _NONE: Index = np.zeros(0, np.int64)
 
 
 class DynamicsError(ArithmeticError):
-    """The accelerations do not exist at this state; the message names the body and the remedy."""
+    """The accelerations do not exist at this state; the message names the body and the remedy, `status` the kind."""
+
+    status = Status.NOT_POSITIVE_DEFINITE
 
 
 class NotFiniteError(DynamicsError):
     """A state is finite, but its accelerations or other results overflow."""
+
+    status = Status.NONFINITE
 
 
 class PrecisionWarning(UserWarning):
