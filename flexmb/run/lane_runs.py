@@ -17,7 +17,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
 from flexmb.motion import coordinates
 from flexmb.run.propagate import Integration
-from flexmb.run.switching import switch_times
+from flexmb.run.switching import timing_of
 from flexmb.system.algorithm import Route
 from flexmb.system.batch import Batch, in_threads
 from flexmb.system.tree_system import System
@@ -58,7 +58,7 @@ class BatchRun:
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
-        self._ends = [np.array([*switch_times(s.scene, times[-1]), times[-1]]) for s in batch.systems]
+        self._ends = [np.array([*timing_of(s).before(times[-1]), times[-1]]) for s in batch.systems]
 
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
