@@ -8,12 +8,14 @@ from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import kept, some
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
     load_inertia,
     outer_inertia,
     rotate_inertia,
+    rotate_without,
     shift_inertia,
     store_inertia,
     sum_inertia,
@@ -73,9 +75,10 @@ def cholesky(a, n):
         floor = SINGULAR * d
         for i in range(j):
             d -= a[j, i] * a[j, i]
-        if not d.real > floor.real:
+        sound = d.real > floor.real
+        if not some(sound):
             return False
-        d = sqrt(d)
+        d = sqrt(kept(sound, d))
         a[j, j] = d
         d = 1.0 / d
         for m in range(j + 1, n):
@@ -143,10 +146,14 @@ def refer_rigid(c, w, k):
 
 
 @helper
-def to_parent(c, w, k, P, F):
-    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+def to_parent(c, w, k, P, F, row):
+    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+.
+
+    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then; it is negative for all other hinges.
+    """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
-    gamma = shift_inertia(rotate_inertia(R, P), arm)
+    rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)
+    gamma = shift_inertia(rotated, arm)
     F_parent = shift_force(times6(R, F), arm)
     _add_inertia(c, w, k, gamma)
     _add_force(c, w, w, k, F_parent)

@@ -17,7 +17,7 @@ from numba.types import WrapperAddressProtocol
 from flexmb.jit.bundle import AnyBundle, BundleType
 from flexmb.jit.hooks import HOOKS
 
-REAL, VECTOR, MATRIX = types.float64, types.float64[::1], types.float64[:, ::1]
+REAL, VECTOR, MATRIX, INDEX = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
 STATUS, NOTHING = types.int64, types.none
 
 

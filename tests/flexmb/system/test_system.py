@@ -143,9 +143,14 @@ from dataclasses import fields
 from types import SimpleNamespace
 import numba
 import numpy as np
-import flexmb.jit.kernel
+import flexmb.jit.direct as direct
 
 numba.config.DISABLE_JIT = 1  # from here on: the package refuses to be without its compiler
+def addresses(function, returned, *given):
+    return function, *(each for each in given if not isinstance(each, numba.types.Type))
+
+direct.addresses = addresses
+direct.settled = lambda function, *kinds: function
 import flexmb
 from tests.flexmb.system.test_system import RECIPE, SEED, numbers
 from tests.trees import random_scene
