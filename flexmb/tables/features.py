@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexmb.jit.features import GENERAL
-
 from flexmb.typing import Flags, Record
 
 if TYPE_CHECKING:
