@@ -33,6 +33,7 @@ from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
+from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -203,9 +204,15 @@ class System(Mechanics):
         return self._evaluators[chosen.name]
 
     @cached_property
-    def start_precision(self) -> Precision:
-        """`precision` of the initial state, found once."""
-        return self.precision(self.initial_state)
+    def start_precision(self) -> Precision | None:
+        """`precision` of the initial state, found once; None where no pivot there is so small that it may be rounding.
+
+        Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
+        """
+        initial, w = self.initial_state, self._recursion_w
+        t, y = self.layout.entering(initial)
+        status = articulated.rhs(t, y, np.empty_like(y), self.recursion_constants, w)
+        return None if status == OK and not w.doubt[0] else self.precision(initial)
 
     @cached_property
     def state_names(self) -> tuple[labels.Names, labels.Names]:
