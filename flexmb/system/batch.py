@@ -169,9 +169,10 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
 
 def _refuse_other_structure(i: int, system: System, first: System) -> None:
     if system.layout != first.layout:
-        strange = {*system.layout.q.items()} ^ {*first.layout.q.items()}
+        one, other = first.layout.q, system.layout.q
+        strange = sorted(name for name in {**one, **other} if one.get(name) != other.get(name))
         raise ValueError(
-            f"scene {i} has another structure than scene 0: the coordinates of {sorted({name for name, _ in strange})}"
+            f"scene {i} has another structure than scene 0: they differ in the coordinates of {', '.join(strange[:3])}"
         )
     if system.scene.closures or first.scene.closures:
         if system.scene.closures and first.scene.closures:
