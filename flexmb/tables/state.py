@@ -92,11 +92,15 @@ class Layout:
 
         Asked by every public call: what fits costs one comparison and one small kernel.
         """
-        if type(state) is not State or state.layout is not self:
-            self._own(state)
+        self.owning(state)
         if unsound(state.y, self.quaternions):
             self._examine(state.y)
         return state.t, state.y
+
+    def owning(self, state: State) -> None:
+        """ValueError or TypeError unless a state belongs here; its numbers are not looked at."""
+        if type(state) is not State or state.layout is not self:
+            self._own(state)
 
     def packed(self, t: Any, q: Any, u: Any) -> tuple[float, Real]:
         """Time and y = [q, u, 0] of arrays, a copy; ValueError or TypeError where they do not fit."""
