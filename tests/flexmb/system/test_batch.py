@@ -149,9 +149,9 @@ def varied(seed: int, recipe: trees.Recipe, n: int) -> list[fm.Scene]:
 
 
 _NUMBERS = {
-    "mass_kg", "inertia_kg_m2", "gravity_m_s2", "parent_position_m", "child_position_m", "stiffness_Nm_rad", "damping_Nms_rad",
-    "stiffness_N_m", "damping_Ns_m", "amplitude", "end_value", "rest_angle_rad", "duration_s", "transverse_inertia_kg_m2",
-    "axial_inertia_kg_m2", "angle_rad", "rate_rad_s", "com_m",
+    "mass_kg", "inertia_kg_m2", "gravity_m_s2", "parent_position_m", "child_position_m", "com_m", "angle_rad",
+    "rate_rad_s", "stiffness_Nm_rad", "damping_Nms_rad", "stiffness_N_m", "damping_Ns_m", "rest_angle_rad", "amplitude",
+    "end_value", "duration_s", "axial_inertia_kg_m2", "transverse_inertia_kg_m2",
 }  # fmt: skip
 
 
