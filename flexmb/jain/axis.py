@@ -39,8 +39,8 @@ def pose(c, w, k, R, arm):
     """R_parent_O and the arm to O, in parent axes, from those of O+."""
     q = w.q[c.body[k].q_index]
     if turns(c, k):
-        s, c_q = sincos(q)
-        return turned_about_z(R, c_q, s), arm
+        sine, cosine = sincos(q)
+        return turned_about_z(R, cosine, sine), arm
     return R, axpy(q, (R[2], R[5], R[8]), arm)
 
 
