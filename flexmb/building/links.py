@@ -9,7 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from flexmb.hinges.catalogue import kind_of
 from flexmb.hinges.kind import HingeKind, z_to
@@ -20,6 +19,7 @@ from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
 from flexmb.scene.hinges import WITH_AXIS
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, NamedCoordinate, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -124,12 +124,7 @@ def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
 def port(model: FlexibleModel, node: str, offset: s.Vector, quaternion: s.Quaternion, turn: Real) -> Port:
     """The frame at `offset`, `quaternion` from a node, turned once more by `turn`."""
     at = model.nodes[node]
-    return Port(at, at.rotation @ np.asarray(offset, float), at.rotation @ matrix(quaternion) @ turn)
-
-
-def matrix(quaternion: s.Quaternion) -> Real:
-    """Rotation matrix of a scalar-first quaternion."""
-    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+    return Port(at, at.rotation @ np.asarray(offset, float), at.rotation @ rotation_matrix(quaternion) @ turn)
 
 
 def _ground() -> FlexibleModel:
@@ -160,7 +155,7 @@ def _level(body: s.Body) -> FidelityLevel:
 def _model(body: s.Body) -> FlexibleModel:
     """Inertia points and modes of any body; a flexible body at level rigid loses its modes."""
     if isinstance(body, s.RigidBody):
-        frames = {name: (np.array(f.position), matrix(f.quaternion)) for name, f in rest_frames(body).items()}
+        frames = {name: (np.array(f.position), rotation_matrix(f.quaternion)) for name, f in rest_frames(body).items()}
         return _rigid_model(body.mass_kg, np.array(body.com_m), np.array(body.inertia_kg_m2), frames)
     if isinstance(body, s.SidBody):
         raise NotImplementedError(f'body "{body.name}": SID files are not supported yet; use kind = "modal"')

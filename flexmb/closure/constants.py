@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.building.links import BodyLink, closure_sides, matrix
+from flexmb.building.links import BodyLink, closure_sides
 from flexmb.closure import tables as t
 from flexmb.scene import schema as s
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.tables.arrays import Constants
 
 # Suppressed rotations and translations, axes of frame A; z is the axis of a closure that has one.
@@ -38,7 +39,7 @@ def closure_constants(
             sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
             if sides[i, j]["body"] == t.ON_GROUND:
                 sides[i, j]["position"] = side.offset
-                sides[i, j]["rotation"] = (matrix(side.quaternion) @ side.turn).ravel()
+                sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
         rotations, translations = SUPPRESSED[closure.type]
         rows += [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
         rows += [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]

@@ -8,6 +8,7 @@ from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import kept, some
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
@@ -73,9 +74,10 @@ def cholesky(a, n):
         floor = SINGULAR * d
         for i in range(j):
             d -= a[j, i] * a[j, i]
-        if not d.real > floor.real:
+        sound = d.real > floor.real
+        if not some(sound):
             return False
-        d = sqrt(d)
+        d = sqrt(kept(sound, d))
         a[j, j] = d
         d = 1.0 / d
         for m in range(j + 1, n):

@@ -26,8 +26,9 @@ from flexmb.jain.kinematics import motion_column
 from flexmb.jain.variants import to_parent
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import kept, some
 from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, outer_inertia, sum_inertia
-from flexmb.spatial.pivots import is_rounding, is_small
+from flexmb.spatial.pivots import is_inertia, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
@@ -77,8 +78,11 @@ def eliminate(c, w, k):
     PH = inertia_column(P, ANGULAR_Z if _turns(c, k) else LINEAR_Z)  # the compiler sees that there are but two
     D = _along(c, k, PH)
     before = w.body[k].inertia[2 if _turns(c, k) else 17]
-    if is_small(c, w, j, D, before) and is_rounding(D, before):
-        return False
+    if is_small(c, w, j, D, before):
+        sound = is_inertia(D, before)
+        if not some(sound):
+            return False
+        D = kept(sound, D)
     epsilon = w.speed[j].applied - _along(c, k, z)
     s = 1.0 / D
     w.body[k].free_count = SINGLE

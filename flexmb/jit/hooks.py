@@ -20,6 +20,7 @@ from typing import Any
 from numba import __version__, cfunc
 
 from flexmb.jit.folder import cache_directory, warn_once
+from flexmb.jit.progress import announced
 
 OLDEST, NEWEST = (0, 60), (0, 68)  # numba versions that the hooks were tried with: tests/flexmb/jit/test_hooks.py
 
@@ -29,6 +30,17 @@ SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "
 
 def _compiled_anew(compiled: Any, function: FunctionType) -> None:
     """Without a cache: nothing is kept."""
+    compiled.compile = _announcing(compiled.compile, function)
+
+
+def _announcing(compile: Callable[[Any], Any], function: FunctionType) -> Callable[[Any], Any]:
+    """What compiles the versions of a kernel that is not kept, with a line about it where it takes long."""
+
+    def compile_anew(signature: Any) -> Any:
+        with announced(function, None):
+            return compile(signature)
+
+    return compile_anew
 
 
 def _through_cfunc(kernel: Any, signature: Any) -> int:
@@ -62,8 +74,11 @@ def _by_internals() -> Hooks:
 
     def keep(compiled: Any, function: FunctionType) -> None:
         directory = cache_directory()
-        if directory is not None:
-            compiled._cache = KernelCache(function, directory)
+        if directory is None:
+            _compiled_anew(compiled, function)
+        else:
+            compiled._cache = cache = KernelCache(function, directory)
+            compiled.compile = cache.filling(compiled)
 
     def address(kernel: Any, signature: Any) -> int:
         return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())

@@ -15,6 +15,7 @@ from numba.extending import overload
 
 from flexmb.jit.bundle import BundleType
 from flexmb.jit.hooks import HOOKS, SEMANTICS
+from flexmb.jit.lanes import LANE
 
 if config.DISABLE_JIT:
     raise ImportError(
@@ -69,18 +70,24 @@ def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any
     return choose
 
 
-def by_number(real: Callable[..., Any], tangent: Callable[..., Any]) -> Callable[..., Any]:
-    """One function for two kinds of numbers: `tangent` where an argument is complex, `real` where none is.
+def by_number(
+    real: Callable[..., Any], tangent: Callable[..., Any], lanes: Callable[..., Any] | None = None
+) -> Callable[..., Any]:
+    """One function for three kinds of numbers: `tangent` where an argument is complex, `lanes` (by default the same as
+    `real`) where one is a `flexmb.jit.lanes.LaneType`, `real` where all are floats.
 
     Decided by type, while the caller is compiled, like `by_bundle`.
     """
+    of_lanes = real if lanes is None else lanes
 
     def choose(*args: Any) -> Any:
         return (tangent if any(isinstance(x, complex) for x in args) else real)(*args)
 
     @overload(choose, jit_options=AS_PART)
     def _typed(*args):
-        choice = tangent if any(isinstance(kind, types.Complex) for kind in args) else real
+        choice = of_lanes if LANE in args else real
+        if any(isinstance(kind, types.Complex) for kind in args):
+            choice = tangent
 
         def call(*args):
             return choice(*args)

@@ -4,6 +4,7 @@ Numba's own arrays carry owners, strides and reference counts, which every funct
 compiles again. A kernel needs none of this: the bundle holds its arrays, and they are contiguous. Inside a kernel a
 table reads as an array does (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a nested array
 of a record is a table with constant extents. Indices are not checked, and negative ones do not count from the end.
+The floats of a record with a field PADDING are lanes: see `flexmb.jit.lane_arrays`.
 """
 
 from __future__ import annotations
@@ -27,7 +28,10 @@ from numba.extending import (
     register_model,
 )
 
+from flexmb.jit.lanes import LANE, LANES
+
 WORD, BYTE = ir.IntType(64), ir.IntType(8)
+PADDING = "padding"  # the last field of records whose floats are lanes
 
 
 @cache
@@ -50,6 +54,16 @@ class RowType(types.Type):
     def __init__(self, record: types.Record) -> None:
         self.record = record
         super().__init__(name=f"R{_short(record)}")
+
+    def member(self, name: str) -> tuple[types.Type, tuple[int, ...]]:
+        """Type of a field; of a nested array that of its elements, and its extents."""
+        kind, shape = self.record.fields[name].type, ()
+        if isinstance(kind, types.NestedArray):
+            kind, shape = kind.dtype, kind.shape
+        if kind == types.float64 and PADDING in self.record.fields:
+            assert shape[-1] == LANES
+            kind, shape = LANE, shape[:-1]
+        return kind, shape
 
 
 @register_model(TableType)
@@ -126,12 +140,10 @@ class _RowAttribute(AttributeTemplate):
     key = RowType
 
     def generic_resolve(self, kind, name):
-        field = kind.record.fields.get(name)
-        if field is None:
+        if name not in kind.record.fields:
             return None
-        if isinstance(field.type, types.NestedArray):
-            return TableType(field.type.dtype, field.type.ndim)
-        return field.type
+        found, shape = kind.member(name)
+        return TableType(found, len(shape)) if shape else found
 
 
 @lower_getattr(TableType, "shape")
@@ -190,20 +202,19 @@ def _setitem(context, builder, sig, args):
 
 @lower_getattr_generic(RowType)
 def _field(context, builder, kind, value, name):
-    field = kind.record.fields[name]
-    place = builder.gep(value, [WORD(field.offset)], inbounds=True)
-    if isinstance(field.type, types.NestedArray):
-        of = TableType(field.type.dtype, field.type.ndim)
-        return table(context, builder, of, place, [WORD(n) for n in field.type.shape])
-    return _load(context, builder, field.type, place)
+    place = builder.gep(value, [WORD(kind.record.offset(name))], inbounds=True)
+    found, shape = kind.member(name)
+    if shape:
+        return table(context, builder, TableType(found, len(shape)), place, [WORD(n) for n in shape])
+    return _load(context, builder, found, place)
 
 
 @lower_setattr_generic(RowType)
 def _set_field(context, builder, sig, args, name):
     kind, number = sig.args
-    field = kind.record.fields[name]
-    place = builder.gep(args[0], [WORD(field.offset)], inbounds=True)
-    _store(context, builder, field.type, context.cast(builder, args[1], number, field.type), place)
+    place = builder.gep(args[0], [WORD(kind.record.offset(name))], inbounds=True)
+    found, _ = kind.member(name)
+    _store(context, builder, found, context.cast(builder, args[1], number, found), place)
 
 
 def _load(context, builder, kind, place):

@@ -7,7 +7,6 @@ import numpy as np
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
-from flexmb.system.labels import state_names
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -35,7 +34,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     state = equations.on_functions(state)
     at, mass, n = equations.variations(state), equations.mass(state), len(free)
     names, units = displacement_names(equations)
-    speeds = [state_names(system)[1][j] for j in free]
+    speeds = [system.state_names[1][j] for j in free]
     driven = _driven(equations)
     B = np.zeros((2 * n, len(driven)))
     B[n:] = np.linalg.solve(mass, np.eye(n)[:, driven])
@@ -55,7 +54,7 @@ def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
     """Names and units of xi: those of the coordinates, "<hinge>.rotation.x" and "<hinge>.position.x" of quaternions."""
     system = equations.system
     named = [("", "")] * system.nu
-    coordinates = state_names(system)[0]
+    coordinates = system.state_names[0]
     for j, speed in enumerate(equations.constants.speed):
         if speed["coordinate"] >= 0:
             named[j] = coordinates[speed["coordinate"]]

@@ -7,6 +7,7 @@ Both algorithms, Jain's recursion and Frisch's matrices, start here.
 from flexmb.hinges import catalogue
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.lanes import some
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.scalar import sqrt
 from flexmb.tables.features import (
@@ -143,7 +144,7 @@ def hinge_forces(c, w):
 def _ball_springs(c, w):
     """Take the torques of isotropic springs of spherical hinges off w.speed.applied."""
     for k in range(c.body.shape[0]):
-        if c.body[k].ball_spring != 0.0:
+        if some(c.body[k].ball_spring != 0.0):
             i = c.body[k].q_index
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             for n in range(3):

@@ -12,7 +12,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
 from flexmb.scene.check.profiles import start_of
@@ -33,11 +32,12 @@ from flexmb.scene.hinges import (
 )
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
+from flexmb.scene.quaternions import about, rotation_matrix
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, node_frame, ordered
 from flexmb.typing import Real
 
-Pose = tuple[Rotation, Real]
+Pose = tuple[Real, Real]
 
 
 class Cluster(NamedTuple):
@@ -165,16 +165,16 @@ def _sum(inertias: Iterable[Real]) -> Real:
 
 
 def _end(body: Body, node: str, position: Vector, quaternion: Quaternion) -> Pose:
-    """Rotation and origin, in the body frame, of the frame offset from a node."""
+    """Rotation (3,3) and origin, in the body frame, of the frame offset from a node."""
     frame = node_frame(body, node)
-    turn = Rotation.from_quat(frame.quaternion, scalar_first=True)
-    return turn * Rotation.from_quat(quaternion, scalar_first=True), np.add(frame.position, turn.apply(position))
+    turn = rotation_matrix(frame.quaternion)
+    return turn @ rotation_matrix(quaternion), np.add(frame.position, turn @ np.asarray(position, dtype=float))
 
 
 def _motion(pose: Pose) -> Real:
     """X (6,6): spatial velocity [w; v] of the body frame to that of the frame at `pose`, in that frame's axes."""
     turn, position = pose
-    R = turn.as_matrix().T
+    R = turn.T
     return np.block([[R, np.zeros((3, 3))], [-R @ np.cross(np.eye(3), position), R]])
 
 
@@ -191,8 +191,8 @@ def _free_directions(hinge: Hinge) -> Real:
             columns = {"rotation": (*hinge.axis, 0.0, 0.0, 0.0), "translation": (0.0, 0.0, 0.0, *hinge.axis)}
             directions = [columns[name] for name, _ in coordinates(hinge)]
         case Planar():
-            back = Rotation.from_euler("z", -_start(hinge.rotation))
-            directions = [(0.0, 0.0, 0.0, *back.apply(axis)) for axis in np.eye(3)[:2]] + [angular[2]]
+            back = about("z", -_start(hinge.rotation))
+            directions = [(0.0, 0.0, 0.0, *axis) for axis in back.T[:2]] + [angular[2]]
         case Universal():
             directions = _carried("xy", hinge)
         case Gimbal():
@@ -212,10 +212,10 @@ def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Real]:
     angles = [_start(coordinate) for _, coordinate in coordinates(hinge)]
     directions = []
     for k, letter in enumerate(sequence):
-        after = Rotation.identity()
+        after = np.eye(3)
         for axis, angle in zip(sequence[k + 1 :], angles[k + 1 :], strict=True):
-            after = after * Rotation.from_euler(axis, angle)
-        directions.append(np.concatenate([after.inv().apply(np.eye(3)["xyz".index(letter)]), np.zeros(3)]))
+            after = after @ about(axis, angle)
+        directions.append(np.concatenate([after["xyz".index(letter)], np.zeros(3)]))
     return directions
 
 
