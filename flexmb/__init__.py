@@ -26,8 +26,8 @@ if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
     from flexmb.linear.linearize import linearize
     from flexmb.linear.spin import SteadySpin, steady_spin
-    from flexmb.run.interruption import Interrupted
     from flexmb.run.batch_trajectory import BatchTrajectory
+    from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
     from flexmb.run.trajectory import Trajectory

@@ -8,6 +8,7 @@ from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANES
 from flexmb.tables.status import NONFINITE, OK
 
+
 @helper
 def _advance(s, slope, h):
     """s.trial = y + h slope."""

@@ -20,5 +20,5 @@ def note_hinge(c, w, k, L, first):
         diagonal = 0.0
         for b in range(first + a + 1):
             diagonal += L[first + a, b] * L[first + a, b]
-        j = c.body[k].u_index + w.body[k].free_speed[a]
+        j = c.body[k].u_index + w.hinge[k].free_speed[a]
         is_small(c, w, j, L[first + a, first + a] * L[first + a, first + a], diagonal)

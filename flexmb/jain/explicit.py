@@ -15,6 +15,7 @@ from flexmb.spatial.inertia import (
     load_inertia,
     outer_inertia,
     rotate_inertia,
+    rotate_without,
     shift_inertia,
     store_inertia,
     sum_inertia,
@@ -145,10 +146,14 @@ def refer_rigid(c, w, k):
 
 
 @helper
-def to_parent(c, w, k, P, F):
-    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+def to_parent(c, w, k, P, F, row):
+    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+.
+
+    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then; it is negative for all other hinges.
+    """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
-    gamma = shift_inertia(rotate_inertia(R, P), arm)
+    rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)
+    gamma = shift_inertia(rotated, arm)
     F_parent = shift_force(times6(R, F), arm)
     _add_inertia(c, w, k, gamma)
     _add_force(c, w, w, k, F_parent)

@@ -16,6 +16,16 @@ def rotation_z(angle):
 
 
 @helper
+def turned_about_z(m, c, s):
+    """M R_z, by cosine and sine of the angle."""
+    return (
+        c * m[0] + s * m[1], c * m[1] - s * m[0], m[2],
+        c * m[3] + s * m[4], c * m[4] - s * m[3], m[5],
+        c * m[6] + s * m[7], c * m[7] - s * m[6], m[8],
+    )  # fmt: skip
+
+
+@helper
 def rotation_axis(axis, angle):
     """Rotation by `angle` about coordinate axis 0, 1 or 2."""
     s, c = sincos(angle)

@@ -25,7 +25,7 @@ from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
 from flexmb.tables.state import DynamicsError
-from flexmb.tables.status import NONFINITE, OK, Status
+from flexmb.tables.status import NONFINITE, OK
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:

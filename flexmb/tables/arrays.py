@@ -183,8 +183,6 @@ class ReducedConstants(Constants):
 BODY_STATE = _record(
     ("rotation", _F, (9,)),  # R_parent_body
     ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
-    ("hinge_map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
-    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
     ("velocity", _F, (6,)),  # of the body frame, body axes
     ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
     ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
@@ -195,13 +193,20 @@ BODY_STATE = _record(
     ("force", _F, (6,)),  # rigid part of the bias force
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
-    # by free speed; of a hinge with a single axis as flexmb.jain.hinge_solve has it
-    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)'
-    ("hinge_factor", _F, (6, 6)),  # Cholesky factor L of D_R
-    ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
-    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
+    # of a hinge with a single axis, as flexmb.jain.hinge_solve has it
+    ("gain", _F, (6,)),  # G
+    ("inertia_along", _F),  # D_R
+    ("rate_at_rest", _F),  # D_R^-1 epsilon_R
     ("free_count", _I),
     ("load", _F, (6,)),  # load across the hinge on the body about O, body axes
+)
+HINGE_STATE = _record(  # by free speed
+    ("map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
+    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
+    ("gain", _F, (6, 6)),  # L^-1 (P_R H)'
+    ("factor", _F, (6, 6)),  # Cholesky factor L of D_R
+    ("residual", _F, (6,)),  # L^-1 epsilon_R
+    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
 )
 MODE_STATE = _record(  # mode n of a body
     ("eta", _F),  # as the level sees it: 0 for ruthless
@@ -234,6 +239,7 @@ class Workspace:
     rate: Real  # (nq,) qdot
     ground: Real  # (3,) acceleration of the ground, World axes: -gravity
     body: Record  # (N,) BODY_STATE
+    hinge: Record  # (N,) HINGE_STATE; not touched where every hinge has a single axis
     mode: Record  # (N,m) MODE_STATE
     pff: Real  # (N,m,m) modal block of the articulated inertia, then its Cholesky factor
     port: Record  # (P,) PORT_STATE

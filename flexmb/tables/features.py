@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flexmb.jit.features import GENERAL
-
 from flexmb.typing import Flags, Record
 
 if TYPE_CHECKING:
@@ -21,8 +20,8 @@ if TYPE_CHECKING:
 
 HINGE = "hinge"  # "hinge 1": the number of a kind in flexmb.hinges.catalogue
 LEVEL = "level"  # "level 1": the number of a level in flexmb.levels.body
-AXIS = "axis"  # "axis 2": hinges with one speed along z, free, with O as the body frame; the number of BODY's `axis`
-SEVERAL = "several"  # all other hinges: of several speeds or none, prescribed, or with O on a deforming node
+AXIS = "axis"  # "axis 2": the number of BODY's `axis`
+SEVERAL = "several"  # hinges of several speeds or none, prescribed, or with O on a deforming node
 QUATERNIONS = "quaternions"
 INBOARD_NODES = "inboard nodes"  # hinges whose inboard frame sits on a deforming node
 OUTBOARD_NODES = "outboard nodes"  # hinges whose outboard frame does
@@ -45,9 +44,8 @@ def features(c: Constants) -> frozenset[str]:
     if os.environ.get("FLEXMB_KERNELS") == "general":
         return frozenset({GENERAL})
     body, speed, pair = c.body, c.speed, c.pair
-    single = single_axis(body, speed)
     found = {
-        SEVERAL: not np.all(single),
+        SEVERAL: not np.all(_single(body, speed)),
         QUATERNIONS: np.any(body["quaternion"] >= 0),
         INBOARD_NODES: np.any(body["inboard_port"] >= 0),
         OUTBOARD_NODES: np.any(body["outboard_port"] >= 0),
@@ -65,12 +63,12 @@ def features(c: Constants) -> frozenset[str]:
         MODAL_DAMPING: np.any(pair["damping"] != 0.0),
     }
     numbered = {f"{HINGE} {n}" for n in np.unique(body["hinge_kind"])}
-    numbered |= {f"{AXIS} {n}" for n in np.unique(body["axis"][single])}
+    numbered |= {f"{AXIS} {n}" for n in np.unique(body["axis"])}
     numbered |= {f"{LEVEL} {n}" for n in np.unique(body["level"])}
     return frozenset(name for name, there in found.items() if there) | numbered
 
 
-def single_axis(body: Record, speed: Record) -> Flags:
+def _single(body: Record, speed: Record) -> Flags:
     """(N,) Whether a hinge has one speed, free, along z, and O is the body frame."""
     found = (body["axis"] >= 0) & (body["outboard_port"] < 0)
     found[found] = speed["prescribed"][body["u_index"][found]] < 0
