@@ -27,7 +27,7 @@ def main(
         bool, typer.Option("--write", help="Keep the measurements; write the page and its pictures.")
     ] = False,
     from_kept: Annotated[bool, typer.Option("--from-kept", help="Measure nothing: show what is kept.")] = False,
-    scaling: Annotated[bool, typer.Option("--scaling", help="With --write: measure the pictures' curves, too.")] = False,
+    scaling: Annotated[bool, typer.Option("--scaling", help="With --write: measure the curves of pictures.")] = False,
 ) -> None:
     """Measure the rows of what must hold, each against its rival in turns."""
     console = Console()
