@@ -14,16 +14,16 @@ from flexmb.typing import Real
 from tests.bounds import gamma
 from tests.trees import RIGID, Recipe, random_scene
 
-RUTHLESS_CHAIN = Recipe(
-    bodies=3, carriers=("beam",), levels=("ruthless",), hinges=("revolute",), conservative=True, wheels=0, point_masses=0
-)
+FEW = {"conservative": True, "wheels": 0, "point_masses": 0}
+AXES = Recipe(bodies=4, carriers=("rigid",), hinges=("revolute", "prismatic"), **FEW)
+RUTHLESS_CHAIN = Recipe(bodies=3, carriers=("beam",), levels=("ruthless",), hinges=("revolute",), **FEW)
 EVERYTHING = Recipe(bodies=8, levels=("full", "ruthless", "linear", "stiffened"))
 
 
 def chain(bodies: int = 2, **hinge: float) -> fm.SceneBuilder:
     builder = SceneBuilder("chain", gravity=(0, 0, -9.81))
     for k in range(bodies):
-        builder.rigid_body(f"b{k}", mass=1.0, inertia=(0.1, 0.2, 0.3), com=(0.2, 0.1, 0.0), nodes={"tip": (1.0, 0.0, 0.0)})
+        builder.rigid_body(f"b{k}", mass=1.0, inertia=(0.1, 0.2, 0.3), com=(0.2, 0.1, 0), nodes={"tip": (1.0, 0, 0)})
         inboard, at = ("ground", {}) if k == 0 else (f"b{k - 1}", {"parent_node": "tip"})
         builder.revolute(f"h{k}", inboard, f"b{k}", axis=(0, 1, 0), **at, **hinge)
     return builder
@@ -73,7 +73,7 @@ def slope(scene: fm.System, scale: float) -> Real:
 @pytest.mark.parametrize(
     "recipe",
     [
-        Recipe(bodies=4, carriers=("rigid",), hinges=("revolute", "prismatic"), conservative=True, wheels=0, point_masses=0),
+        AXES,
         RUTHLESS_CHAIN,
         pytest.param(RIGID, marks=pytest.mark.slow),
         pytest.param(EVERYTHING, marks=pytest.mark.slow),
