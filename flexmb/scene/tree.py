@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.columns import struct_keys
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
 from flexmb.scene.schema import PointMass, Scene
 
@@ -92,7 +93,7 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
     if isinstance(item, PointMass) and not item.coordinates:
         return tuple(NamedCoordinate(f"coordinates[{i}]", LinearCoordinate()) for i in range(len(item.directions)))
     found: list[NamedCoordinate] = []
-    for key in item.__struct_fields__:
+    for key in struct_keys(type(item)):  # a hinge holds no other structs
         match getattr(item, key):
             case AngularCoordinate() | LinearCoordinate() as coordinate:
                 found.append(NamedCoordinate(key, coordinate))
