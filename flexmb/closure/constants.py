@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from flexmb.building.links import BodyLink, closure_sides, matrix
+from flexmb.building.links import BodyLink, closure_sides
+from flexmb.building.models import matrix
 from flexmb.closure import tables as t
 from flexmb.scene import schema as s
 from flexmb.tables.arrays import Constants
@@ -77,6 +78,8 @@ def slowest_mode(chain: list[BodyLink]) -> float:
     """The lowest frequency (rad/s) of a mode by itself, body held; infinite where none has stiffness."""
     found = [np.inf]
     for link in chain:
+        if link.mode_count == 0:
+            continue
         m = link.model
         mass = np.einsum("p,pan->n", m.mass, m.translation**2)
         mass += np.einsum("pan,pab,pbn->n", m.rotation, m.inertia, m.rotation)
