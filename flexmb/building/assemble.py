@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
-from operator import attrgetter
-from typing import Any, TypeVar
+from typing import TypeVar
 
 import numpy as np
 
@@ -246,15 +244,15 @@ def _speeds(
             body["ball_spring"][k], out["damping"][u : u + 3] = stiffness, damping
         for n, (_, c) in enumerate(link.scalar):
             if isinstance(c, s.AngularCoordinate):
-                spring, load, motion = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), c.torque_Nm, c.prescribed_rad
+                law, load, motion = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), c.torque_Nm, c.prescribed_rad
             else:
-                spring, load, motion = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
+                law, load, motion = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
             at.append(u + n)
-            rows.append((q + n, functions.number(load), functions.number(motion), *spring))
+            rows.append((q + n, functions.number(load), functions.number(motion), *law))
     for wheel in wheels:
         at.append(numbering.u[wheel.name].start)
-        turned = numbering.q[wheel.name].start, functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)
-        rows.append((*turned, 0.0, wheel.friction_Nms_rad, 0.0))
+        motor, motion = functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)
+        rows.append((numbering.q[wheel.name].start, motor, motion, 0.0, wheel.friction_Nms_rad, 0.0))
     keys = ("coordinate", "motor", "prescribed", "stiffness", "damping", "rest")
     for key, values in zip(keys, np.array(rows, float).reshape(-1, len(keys)).T, strict=True):
         out[key][at] = values

@@ -46,6 +46,9 @@ class Port:
         return curved or bool(np.any(self.node.translation) or np.any(self.node.rotation_modes))
 
 
+_RIGID = s.RigidBody, s.PointMass
+
+
 class End(NamedTuple):
     """Where a hinge frame is: a node of a body and the fixed offsets from it, in node axes."""
 
@@ -77,7 +80,7 @@ class BodyLink:
     @property
     def is_rigid(self) -> bool:
         """Whether it is a rigid body or a point mass of the scene."""
-        return isinstance(self.body, s.RigidBody | s.PointMass)
+        return isinstance(self.body, _RIGID)
 
     @property
     def mass_properties(self) -> tuple[float, s.Vector, s.Matrix3]:
@@ -155,9 +158,7 @@ def links(scene: s.Scene) -> list[BodyLink]:
         level, parent = level_of(body), hinge.parent
         if isinstance(body, s.SidBody):
             models[body.name]  # says that they are not supported
-        found.append(
-            BodyLink(body.name, hinge, parent, level, kind, sequence, turn, inboard, outboard, body, models)
-        )
+        found.append(BodyLink(body.name, hinge, parent, level, kind, sequence, turn, inboard, outboard, body, models))
     return found + [_point_mass(mass, models) for mass in scene.point_masses]
 
 

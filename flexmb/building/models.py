@@ -1,4 +1,4 @@
-"""Inertia points, modes and nodes of the bodies of a scene, each in its body's own frame, found when first asked for."""
+"""Inertia points, modes and nodes of the bodies of a scene, in the bodies' own frames, found when first asked for."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Models:
 
     def node(self, name: str, node: str) -> FlexibleNode:
         """A node of a body, without making the model of a rigid one."""
-        if not isinstance(self.body.get(name), s.RigidBody | None):
+        if name != GROUND and not isinstance(self.body[name], s.RigidBody):
             return self[name].nodes[node]
         if node == "origin":
             return ORIGIN

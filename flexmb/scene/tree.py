@@ -53,7 +53,8 @@ def ordered(scene: Scene) -> tuple[Branch, ...]:
         hinge = waiting.pop()
         branches.append(Branch(bodies[hinge.child], hinge))
         waiting.extend(reversed(outboard[hinge.child]))
-    if sorted(branch.body.name for branch in branches) != sorted(body.name for body in scene.bodies):
+    reached = {branch.body.name for branch in branches}
+    if not len(reached) == len(branches) == len(scene.bodies):
         raise ValueError(f'scene "{scene.name}" is not a tree rooted at "ground": run check_scene for the details')
     return tuple(branches)
 

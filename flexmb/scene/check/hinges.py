@@ -38,7 +38,7 @@ def _to_examine(scene: Scene) -> set[int]:
             found.update(owners)
         for key in kind.__struct_fields__:
             if key in NOT_NEGATIVE:
-                found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0))
+                found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0).tolist())
             elif key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
                 found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
     return found

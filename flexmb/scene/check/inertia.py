@@ -19,8 +19,8 @@ PRINTED = 1e-9
 
 def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     """A mass that is not negative, and a tensor that some distribution of that mass has."""
-    rigid = [i for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)]
-    doubtful = _doubtful([scene.bodies[i] for i in rigid])
+    rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
+    doubtful = _doubtful(list(rigid.values()))
     for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
         yield from mass(place.key("mass_kg"), body.mass_kg)
         yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2)

@@ -21,7 +21,7 @@ def unique_names(scene: Scene) -> Iterator[Defect]:
     for collections in NAMESPACES:
         if not _are_names([item.name for collection in collections for item in getattr(scene, collection)]):
             yield from _unique(item for collection in collections for item in entries(scene, collection))
-    with_nodes = [i for i, body in enumerate(scene.bodies) if body.name == GROUND or getattr(body, "nodes", ())]
+    with_nodes = [i for i, body in enumerate(scene.bodies) if body.name == GROUND or _nodes(body)]
     for place, body in entries(scene, "bodies", with_nodes):
         if body.name == GROUND:
             yield Defect(str(place), 'the name "ground" is taken: it is the inertial frame', "rename the body")
@@ -66,6 +66,10 @@ def references(scene: Scene) -> Iterator[Defect]:
             yield Defect(str(place), what, "give two different bodies")
     for place, state in entries(scene, "modal_states"):
         yield from _body(place.key("body"), bodies.named, state.body)
+
+
+def _nodes(body: Body) -> tuple[Any, ...]:
+    return () if isinstance(body, SidBody) else body.nodes
 
 
 def _are_names(names: list[str]) -> bool:

@@ -106,8 +106,10 @@ class _Nodes:
         return self._frames[body][node]
 
     def frames(self, hinges: Sequence[Hinge], side: str) -> tuple[Real, Real]:
-        """Rotations (n,3,3) and origins (n,3), body axes, of the frames of hinges on their `side`, parent or child; not of
-        SID bodies, whose nodes are in their files."""
+        """Rotations (n,3,3) and origins (n,3), body axes, of the frames of hinges on their `side`, parent or child.
+
+        Not on SID bodies, whose nodes are in their files.
+        """
         R = rotation_matrices(column(hinges, f"{side}_quaternion", 4))
         p = column(hinges, f"{side}_position_m", 3)
         for i, hinge in enumerate(hinges):

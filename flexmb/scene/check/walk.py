@@ -150,8 +150,8 @@ def _not_unit(group: Alike, key: str) -> list[int]:
         length = np.linalg.norm(np.array(values, float), axis=-1)
     except (TypeError, ValueError, OverflowError):  # tuples of several
         return [owner for owner, value in zip(group.owners, values, strict=True) if value]
-    off = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, for `hypot` rounds otherwise
-    return [group.owners[i] for i in np.flatnonzero(~off.reshape(len(values), -1).all(axis=1))]
+    unit = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, for `hypot` rounds otherwise
+    return [group.owners[i] for i in np.flatnonzero(~unit.reshape(len(values), -1).all(axis=1)).tolist()]
 
 
 def _named_items(
