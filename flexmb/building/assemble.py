@@ -26,8 +26,6 @@ from flexmb.tables.functions import pack
 DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
 
 
-KIND_NUMBER = {kind: number for number, kind in enumerate(KINDS)}
-LEVEL_NUMBER = {level: number for number, level in enumerate(LEVELS)}
 Item = TypeVar("Item", s.Wheel, s.Load)
 
 
@@ -126,8 +124,8 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     points["point"]["second"], second_shape = second_order_rows(of_points, len(of_ports), m)
     body = inertia.pop("body")
     body["parent"] = parent
-    body["level"] = [LEVEL_NUMBER[link.level] for link in chain]
-    body["hinge_kind"] = [KIND_NUMBER[link.kind] for link in chain]
+    body["level"] = [LEVELS.index(link.level) for link in chain]
+    body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
     body["axis"] = [link.kind.axis for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
     body["q_index"], body["u_index"] = np.array(numbering.hinges).reshape(-1, 2).T

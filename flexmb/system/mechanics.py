@@ -213,7 +213,7 @@ class Mechanics:
     def _is_modal(self) -> NDArray[np.bool_]:
         """Which entries of u (nu,) are modal."""
         found = np.zeros(self.nu, bool)
-        for k in np.flatnonzero(self.constants.body["modes"]):
+        for k in np.flatnonzero(self.constants.body["modes"]).tolist():
             found[self._modes(k)] = True
         return found
 
