@@ -26,9 +26,12 @@ if TYPE_CHECKING:
     from flexmb.linear.linear_model import LinearModel
     from flexmb.linear.linearize import linearize
     from flexmb.linear.spin import SteadySpin, steady_spin
+    from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.interruption import Interrupted
     from flexmb.run.simulate import simulate
+    from flexmb.run.simulate_batch import simulate_batch
     from flexmb.run.trajectory import Trajectory
+    from flexmb.system.batch import Batch, compile_batch
     from flexmb.system.compile import compile
     from flexmb.system.observables import Evaluation
     from flexmb.system.tree_system import System
@@ -49,6 +52,10 @@ _LATER = {
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
     "simulate": "flexmb.run.simulate",
+    "simulate_batch": "flexmb.run.simulate_batch",
+    "BatchTrajectory": "flexmb.run.batch_trajectory",
+    "Batch": "flexmb.system.batch",
+    "compile_batch": "flexmb.system.batch",
     "Status": "flexmb.tables.status",
     "DynamicsError": "flexmb.tables.state",
     "Evaluation": "flexmb.system.observables",
@@ -60,10 +67,11 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "Interrupted",
+    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "Interrupted",
     "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System",
     "Trajectory", "advise",
-    "campbell", "check_scene", "compile", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "simulate_batch",
     "steady_spin",
     *schema.__all__,
 ]  # fmt: skip

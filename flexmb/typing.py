@@ -7,4 +7,5 @@ from numpy.typing import NDArray
 
 Real = NDArray[np.float64]
 Index = NDArray[np.int64]
+Flags = NDArray[np.bool_]
 Record = NDArray[np.void]

@@ -121,5 +121,5 @@ def _operations(system: System, algorithm: Algorithm) -> int:
     if isinstance(system, ClosedSystem):
         chain = system.closures.chain(algorithm)
         return count(closed.rhs, 0.0, y, np.zeros_like(y), chain, 0).operations.total
-    kernel, tables = ALGORITHMS[algorithm].kernel(system)
-    return count(kernel, 0.0, y, *tables).operations.total
+    chosen = ALGORITHMS[algorithm]
+    return count(chosen.kernel(), 0.0, y, *chosen.fresh(system)).operations.total

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import accumulate
 from typing import TypeVar
@@ -129,6 +129,10 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     body["axis"] = [link.kind.axis for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
     body["q_index"], body["u_index"] = np.array(numbering.hinges).reshape(-1, 2).T
+    body["quaternion"] = [
+        -1 if link.kind.quaternion < 0 else q + link.kind.quaternion
+        for link, (q, _) in zip(chain, numbering.hinges, strict=True)
+    ]
     body["nv"] = [link.kind.speeds for link in chain]
     body["modes"] = [link.mode_count for link in chain]
     body["eta_index"], body["etad_index"] = np.array(numbering.modes).reshape(-1, 2).T
@@ -155,7 +159,9 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         **inertia,
         **points,
     )
-    constants.speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
+    speed = speed.copy()  # those in the constants are read-only
+    speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
+    constants = replace(constants, speed=speed)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
 

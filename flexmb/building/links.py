@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.building.models import ORIGIN, Models, level_of, matrix, one_point
+from flexmb.building.models import ORIGIN, Models, level_of, one_point
 from flexmb.hinges.catalogue import kind_of
 from flexmb.hinges.kind import HingeKind, z_to
 from flexmb.levels.body import BY_NAME
@@ -21,6 +21,7 @@ from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.hinges import WITH_AXIS
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import NamedCoordinate, coordinates, ordered
 from flexmb.typing import Real
 
@@ -195,4 +196,4 @@ def closure_sides(closure: s.Closure) -> tuple[Side, Side]:
 
 def port(at: FlexibleNode, offset: s.Vector, quaternion: s.Quaternion, turn: Real) -> Port:
     """The frame at `offset`, `quaternion` from a node, turned once more by `turn`."""
-    return Port(at, at.rotation @ np.asarray(offset, float), at.rotation @ matrix(quaternion) @ turn)
+    return Port(at, at.rotation @ np.asarray(offset, float), at.rotation @ rotation_matrix(quaternion) @ turn)

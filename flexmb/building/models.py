@@ -13,9 +13,8 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, with_node
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import ZERO
-from flexmb.scene.columns import rotation_matrices
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, NodeFrame, rest_frames
-from flexmb.typing import Real
 
 _NO_MODES = np.zeros((3, 0))
 ORIGIN = FlexibleNode(np.zeros(3), np.eye(3), _NO_MODES, _NO_MODES)
@@ -43,7 +42,7 @@ class Models:
         if node == "origin":
             return ORIGIN
         frame = self.frame(name, node)
-        return FlexibleNode(np.array(frame.position, float), matrix(frame.quaternion), _NO_MODES, _NO_MODES)
+        return FlexibleNode(np.array(frame.position, float), rotation_matrix(frame.quaternion), _NO_MODES, _NO_MODES)
 
     def frame(self, name: str, node: str) -> NodeFrame:
         """Rest frame of a node of a body of the scene."""
@@ -73,12 +72,6 @@ class Models:
 def level_of(body: s.Body) -> FidelityLevel:
     """The fidelity level of a body."""
     return BY_NAME["rigid" if isinstance(body, s.RigidBody) else body.level]
-
-
-def matrix(quaternion: s.Quaternion) -> Real:
-    """Rotation matrix of a scalar-first quaternion."""
-    found: Real = rotation_matrices(np.array([quaternion], float))[0]
-    return found
 
 
 def one_point(mass: float, com: s.Vector, inertia: s.Matrix3, nodes: dict[str, FlexibleNode]) -> FlexibleModel:

@@ -12,7 +12,7 @@ from flexmb.building.links import BodyLink, End
 from flexmb.building.models import Models
 from flexmb.levels.level import sixes
 from flexmb.modal.cross import cross_matrix
-from flexmb.scene.columns import rotation_matrices
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.typing import Real
 
 
@@ -39,7 +39,7 @@ def outboard_frames(links: Sequence[BodyLink]) -> Frames:
 
 
 def _frames(ends: list[End], bodies: list[str], links: Sequence[BodyLink]) -> Frames:
-    R = rotation_matrices(_numbers([end.quaternion for end in ends], 4))
+    R = rotation_matrix(_numbers([end.quaternion for end in ends], 4))
     p = _numbers([end.offset for end in ends], 3)
     for i, end in enumerate(ends):
         if end.node != "origin":
@@ -50,7 +50,7 @@ def _frames(ends: list[End], bodies: list[str], links: Sequence[BodyLink]) -> Fr
 
 def _node(models: Models, body: str, node: str) -> tuple[Real, Real]:
     frame = models.frame(body, node)
-    return rotation_matrices(np.array([frame.quaternion], float))[0], np.array(frame.position, float)
+    return rotation_matrix(frame.quaternion), np.array(frame.position, float)
 
 
 def rigid_inertia_rows(links: Sequence[BodyLink], outboard: Frames) -> Real:

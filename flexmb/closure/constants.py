@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from flexmb.building.links import BodyLink, closure_sides
-from flexmb.building.models import matrix
 from flexmb.closure import tables as t
 from flexmb.closure.groups import group_tables, groups
 from flexmb.scene import schema as s
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.tables.arrays import Constants
 
 # Suppressed rotations and translations, axes of frame A; z is the axis of a closure that has one.
@@ -36,7 +36,7 @@ def closure_constants(
             sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
             if sides[i, j]["body"] == t.ON_GROUND:
                 sides[i, j]["position"] = side.offset
-                sides[i, j]["rotation"] = (matrix(side.quaternion) @ side.turn).ravel()
+                sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
     parent = constants.body["parent"].tolist()
     paths = [sorted(_ancestors(parent, bodies), reverse=True) for bodies in sides["body"].tolist()]
     closures["path_stop"] = np.cumsum([len(path) for path in paths])

@@ -70,8 +70,8 @@ def evaluate_rows(c, w, cc, cw, accelerated):
     axes, are p_AB, R_AB, V_AB, A_AB.
     """
     fastest = 0.0
-    for rate in w.u:
-        fastest = max(fastest, abs(rate))
+    for j in range(w.u.shape[0]):
+        fastest = max(fastest, abs(w.u[j]))
     for i in range(cc.closure.shape[0]):
         A, B = cc.side[i, 0], cc.side[i, 1]
         p_WA, R_WA = pose(w, A)

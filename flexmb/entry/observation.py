@@ -96,6 +96,22 @@ def observe(t, y, c, w, out):
 
 
 @kernel
+def free_loads(t, y, c, w, loads):
+    """Loads (N,6) across all hinges in the free motion by the recursion, World axes; returns a status code.
+
+    A part of what `observe` finds, for who asks for no more: half of that is left to compile.
+    """
+    load_state(t, y, c, w)
+    status = forward_dynamics(c, w)
+    if status != OK:
+        return status
+    pose_sweep(c, w)
+    hinge_loads(c, w)
+    world_loads(c, w, loads)
+    return OK
+
+
+@kernel
 def observe_motion(t, y, c, w, out):
     """What follows from the state and given accelerations, out.rates, by kinematics and bodies' own momentum.
 

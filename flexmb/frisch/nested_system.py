@@ -120,6 +120,11 @@ class NestedSystem:
         """A fresh workspace for the right-hand side; one per thread."""
         return workspace(self.constants, self._layout.nq)
 
+    @property
+    def own_workspace(self) -> NestedWorkspace:
+        """The one that all questions here write."""
+        return self._w
+
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:
         """Status code and udot (nu,) at y = [q, u, work]."""
         status = evaluation.accelerations(*self._layout.whole(t, y), self.constants, self._w)

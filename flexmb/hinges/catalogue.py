@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from flexmb.hinges import (
     cylindrical,
     free,
@@ -18,8 +16,8 @@ from flexmb.hinges import (
     weld,
 )
 from flexmb.hinges.kind import HingeKind, Item, Reduced
-from flexmb.jit.kernel import helper
 from flexmb.jit.numbered import numbered
+from flexmb.tables.features import HINGE
 
 KINDS: tuple[HingeKind, ...] = tuple(
     module.HINGE
@@ -28,19 +26,10 @@ KINDS: tuple[HingeKind, ...] = tuple(
     )
 )  # fmt: skip
 
-pose = numbered("pose", [kind.pose for kind in KINDS])
-motion = numbered("motion", [kind.motion for kind in KINDS])
-rate = numbered("rate", [kind.rate for kind in KINDS])
-retract = numbered("retract", [kind.retract for kind in KINDS])
-
-_QUATERNION = np.array([kind.quaternion for kind in KINDS])
-
-
-@helper
-def quaternion_offset(number):
-    """Where the quaternion of a hinge begins among its coordinates; -1 where it has none."""
-    return _QUATERNION[number]
-
+pose = numbered("pose", HINGE, [kind.pose for kind in KINDS])
+motion = numbered("motion", HINGE, [kind.motion for kind in KINDS])
+rate = numbered("rate", HINGE, [kind.rate for kind in KINDS])
+retract = numbered("retract", HINGE, [kind.retract for kind in KINDS])
 
 def kind_of(item: Item) -> tuple[HingeKind, Reduced]:
     """The kind of a hinge or point mass of a scene, and its axes as the kernels of that kind take them."""

@@ -4,7 +4,7 @@ from flexmb.hinges.kind import Item, Reduced, scalar_hinge
 from flexmb.jit.kernel import helper
 from flexmb.scene.schema import Planar
 from flexmb.spatial.rotation import rotation_z
-from flexmb.spatial.scalar import cos, sin
+from flexmb.spatial.scalar import sincos
 
 
 @helper
@@ -14,8 +14,7 @@ def pose(q, i, sequence):
 
 @helper
 def motion(q, i, u, j, sequence, H):
-    c = cos(q[i + 2])
-    s = sin(q[i + 2])
+    s, c = sincos(q[i + 2])
     H[3, 0] = c
     H[4, 0] = -s
     H[3, 1] = s

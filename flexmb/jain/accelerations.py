@@ -6,9 +6,11 @@ is for accelerations that x holds: the workspace w itself, or a response to forc
 
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import mode_motion
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, times6_t, vec6
 from flexmb.spatial.vector import cross, mat3, sub, times_t, vec3
+from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
 @helper
@@ -18,8 +20,9 @@ def acceleration_sweep(c, w):
         A = sum6(inboard_acceleration(c, w, k), vec6(w.body[k].bias, 0))
         for n in range(c.body[k].nv):
             A = axpy6(w.speed[c.body[k].u_index + n].acceleration, motion_column(c, w, k, n), A)
-        for n in range(c.body[k].modes):
-            w.mode[k, n].etadd = w.speed[c.body[k].etad_index + n].acceleration
+        if has(c, MODES):
+            for n in range(c.body[k].modes):
+                w.mode[k, n].etadd = w.speed[c.body[k].etad_index + n].acceleration
         store_body_acceleration(c, w, k, A)
 
 
@@ -37,11 +40,12 @@ def carried_acceleration(c, w, x, k):
     if p < 0:
         return (0.0, 0.0, 0.0), times_t(R, vec3(x.ground, 0))
     A_parent = vec6(x.body[p].accel, 0)
-    i = c.body[k].inboard_port
-    if i >= 0:
-        A_parent = shift_motion(A_parent, vec3(w.port[i].r, 0))
-        for n in range(c.body[p].modes):
-            A_parent = axpy6(x.mode[p, n].etadd, mode_motion(w, i, n), A_parent)
+    if has(c, INBOARD_NODES):
+        i = c.body[k].inboard_port
+        if i >= 0:
+            A_parent = shift_motion(A_parent, vec3(w.port[i].r, 0))
+            for n in range(c.body[p].modes):
+                A_parent = axpy6(x.mode[p, n].etadd, mode_motion(w, i, n), A_parent)
     return times6_t(R, shift_motion(A_parent, vec3(w.body[k].arm, 0)))
 
 
@@ -55,9 +59,10 @@ def store_body_acceleration(c, w, k, A):
 @helper
 def store_origin_acceleration(c, w, x, k, A):
     """From the acceleration of O, without deformation part, to that of the body origin, kept in x."""
-    i = c.body[k].outboard_port
-    if i >= 0:
-        for n in range(c.body[k].modes):
-            A = axpy6(-x.mode[k, n].etadd, mode_motion(w, i, n), A)
-        A = A[0], sub(A[1], cross(A[0], vec3(w.port[i].r, 0)))
+    if has(c, OUTBOARD_NODES):
+        i = c.body[k].outboard_port
+        if i >= 0:
+            for n in range(c.body[k].modes):
+                A = axpy6(-x.mode[k, n].etadd, mode_motion(w, i, n), A)
+            A = A[0], sub(A[1], cross(A[0], vec3(w.port[i].r, 0)))
     store6(x.body[k].accel, 0, A)

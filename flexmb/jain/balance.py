@@ -3,6 +3,7 @@
 from flexmb.jain.forces import load_at_port
 from flexmb.jain.ports import port_velocity
 from flexmb.jain.wheels import spin_axis
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.motion.coordinates import speed_power
@@ -10,6 +11,7 @@ from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, shift_force, times6, vec6
 from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
+from flexmb.tables.features import BALL_SPRINGS, LOADS, MODAL_DAMPING, MODES, SPRINGS, WHEELS
 
 KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 
@@ -27,15 +29,17 @@ def energy_and_momentum(c, w, energy, momentum):
     for k in range(c.body.shape[0]):
         body_inertia(c, w, k)
         _body(c, w, k, energy, momentum)
-    for j in range(w.u.shape[0]):
-        i = c.speed[j].coordinate
-        if i >= 0:
-            energy[SPRING] += 0.5 * c.speed[j].stiffness * (w.q[i] - c.speed[j].rest) ** 2
-    for k in range(c.body.shape[0]):
-        if c.body[k].ball_spring != 0.0:
-            i = c.body[k].q_index
-            theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
-            energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)
+    if has(c, SPRINGS):
+        for j in range(w.u.shape[0]):
+            i = c.speed[j].coordinate
+            if i >= 0:
+                energy[SPRING] += 0.5 * c.speed[j].stiffness * (w.q[i] - c.speed[j].rest) ** 2
+    if has(c, BALL_SPRINGS):
+        for k in range(c.body.shape[0]):
+            if c.body[k].ball_spring != 0.0:
+                i = c.body[k].q_index
+                theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
+                energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)
 
 
 @helper
@@ -44,19 +48,21 @@ def _body(c, w, k, energy, momentum):
     M_rr, V = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].velocity, 0)
     h = inertia_times(M_rr, V)
     twice = dot6(h, V)
-    for n in range(c.body[k].modes):
-        M_fr, etad = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].etad
-        twice += 2.0 * etad * dot6(M_fr, V)
-        h = axpy6(etad, M_fr, h)
-        eta = w.q[c.body[k].eta_index + n]
-        for i in range(c.body[k].modes):
-            twice += etad * w.pff[k, n, i] * w.mode[k, i].etad
-            energy[STRAIN] += 0.5 * eta * c.pair[k, n, i].stiffness * w.q[c.body[k].eta_index + i]
-    for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-        axial, axis, spin = c.wheel[i].axial, spin_axis(c, w, i), w.u[c.wheel[i].u_index]
-        omega, _ = port_velocity(w, k, c.wheel[i].port)
-        twice += axial * spin * (spin + 2.0 * dot(axis, omega))
-        h = axpy(axial * spin, axis, h[0]), h[1]
+    if has(c, MODES):
+        for n in range(c.body[k].modes):
+            M_fr, etad = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].etad
+            twice += 2.0 * etad * dot6(M_fr, V)
+            h = axpy6(etad, M_fr, h)
+            eta = w.q[c.body[k].eta_index + n]
+            for i in range(c.body[k].modes):
+                twice += etad * w.pff[k, n, i] * w.mode[k, i].etad
+                energy[STRAIN] += 0.5 * eta * c.pair[k, n, i].stiffness * w.q[c.body[k].eta_index + i]
+    if has(c, WHEELS):
+        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+            axial, axis, spin = c.wheel[i].axial, spin_axis(c, w, i), w.u[c.wheel[i].u_index]
+            omega, _ = port_velocity(w, k, c.wheel[i].port)
+            twice += axial * spin * (spin + 2.0 * dot(axis, omega))
+            h = axpy(axial * spin, axis, h[0]), h[1]
     energy[KINETIC] += 0.5 * twice
     R_WB, p_WB = mat3(w.body[k].pose_rotation, 0), vec3(w.body[k].pose_position, 0)  # of the body frame in World
     _, coupling, mass = M_rr
@@ -70,11 +76,13 @@ def power(c, w):
     """Power of everything that is not conservative: motors, dampers, drives, node loads, modal damping (W)."""
     total = speed_power(c, w)
     for k in range(c.body.shape[0]):
-        for n in range(c.body[k].modes):
-            start, stop = (n, n + 1) if c.body[k].uncoupled else (0, c.body[k].modes)
-            for i in range(start, stop):
-                total -= w.u[c.body[k].etad_index + n] * c.pair[k, n, i].damping * w.u[c.body[k].etad_index + i]
-        for i in range(c.body[k].load_start, c.body[k].load_stop):
-            port, F = load_at_port(c, w, k, i)
-            total += dot6(F, port_velocity(w, k, port))
+        if has(c, MODAL_DAMPING):
+            for n in range(c.body[k].modes):
+                start, stop = (n, n + 1) if c.body[k].uncoupled else (0, c.body[k].modes)
+                for i in range(start, stop):
+                    total -= w.u[c.body[k].etad_index + n] * c.pair[k, n, i].damping * w.u[c.body[k].etad_index + i]
+        if has(c, LOADS):
+            for i in range(c.body[k].load_start, c.body[k].load_stop):
+                port, F = load_at_port(c, w, k, i)
+                total += dot6(F, port_velocity(w, k, port))
     return total

@@ -1,6 +1,7 @@
 """Pivots of the recursion that may be rounding, by body: noted in w.doubt."""
 
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import every
 from flexmb.spatial.pivots import is_small
 
 
@@ -8,7 +9,7 @@ from flexmb.spatial.pivots import is_small
 def note_modes(c, w, k, L):
     """Note small pivots of the modes of body k, of a Cholesky factor L."""
     for n in range(c.body[k].modes):
-        if not (L[n, n] * L[n, n]).real > c.speed[c.body[k].etad_index + n].doubtful:
+        if not every((L[n, n] * L[n, n]).real > c.speed[c.body[k].etad_index + n].doubtful):
             w.doubt[0] = 1
 
 
@@ -19,5 +20,5 @@ def note_hinge(c, w, k, L, first):
         diagonal = 0.0
         for b in range(first + a + 1):
             diagonal += L[first + a, b] * L[first + a, b]
-        j = c.body[k].u_index + w.body[k].free_speed[a]
+        j = c.body[k].u_index + w.hinge[k].free_speed[a]
         is_small(c, w, j, L[first + a, first + a] * L[first + a, first + a], diagonal)

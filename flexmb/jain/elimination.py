@@ -6,7 +6,6 @@ from dataclasses import dataclass, fields
 from typing import Any, Literal, get_args
 
 import numpy as np
-from scipy.linalg import qr, solve_triangular
 
 from flexmb.levels.body import LEVELS
 from flexmb.tables import arrays as a
@@ -145,6 +144,8 @@ class _Rest:
 
 def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tables: dict[str, Any]) -> None:
     """Row of body k: the constants of (B4), with the zeta = M_rf Lam M_fr and Theta they leave out; at rest."""
+    from scipy.linalg import solve_triangular  # slow to import, and only bodies that are reduced need it
+
     n = c.body["modes"][k]
     rest = _Rest.of(c, k, ports)
     inverse = solve_triangular(np.linalg.cholesky(rest.M_ff), np.eye(n), lower=True)
@@ -169,6 +170,8 @@ def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
     scale = np.linalg.norm(ups, axis=0)
     if not ups.shape[1]:
         return scale, np.zeros((0, 0)), np.zeros(0, int)
+    from scipy.linalg import qr
+
     rows, order = qr(ups / np.where(scale > 0.0, scale, 1.0), mode="r", pivoting=True)
     rows = rows[: min(ups.shape)]
     return scale, rows[np.abs(np.diag(rows)) > np.sqrt(NEGLIGIBLE)], order

@@ -6,13 +6,16 @@ After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w
 from flexmb.jain.doubt import note_modes
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import kept, some
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
     load_inertia,
     outer_inertia,
     rotate_inertia,
+    rotate_without,
     shift_inertia,
     store_inertia,
     sum_inertia,
@@ -32,30 +35,33 @@ from flexmb.spatial.spatial_vector import (
     vec6,
 )
 from flexmb.spatial.vector import cross, mat3, scale, sub, vec3
+from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
 @helper
 def eliminate_modes(c, w, k):
     """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
     nm = c.body[k].modes
-    if c.body[k].outboard_port >= 0:
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    if nm > 0 and not cholesky(w.pff[k], nm):
-        return False
-    note_modes(c, w, k, w.pff[k])
+    if has(c, MODES):
+        if nm > 0 and not cholesky(w.pff[k], nm):
+            return False
+        note_modes(c, w, k, w.pff[k])
     P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
-    for n in range(nm):
-        P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
-        for i in range(n):
-            s = -w.pff[k, n, i]
-            z += s * w.mode[k, i].zf
-            P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
-        s = 1.0 / w.pff[k, n, n]
-        P_fr, z = scale6(s, P_fr), s * z
-        store6(w.mode[k, n].pfr, 0, P_fr)
-        w.mode[k, n].zf = z
-        z_r = axpy6(-z, P_fr, z_r)
-        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
+    if has(c, MODES):
+        for n in range(nm):
+            P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
+            for i in range(n):
+                s = -w.pff[k, n, i]
+                z += s * w.mode[k, i].zf
+                P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
+            s = 1.0 / w.pff[k, n, n]
+            P_fr, z = scale6(s, P_fr), s * z
+            store6(w.mode[k, n].pfr, 0, P_fr)
+            w.mode[k, n].zf = z
+            z_r = axpy6(-z, P_fr, z_r)
+            P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
     store6(w.body[k].hinge_force, 0, z_r)
     store_inertia(w.body[k].hinge_inertia, 0, P)
     return True
@@ -69,9 +75,10 @@ def cholesky(a, n):
         floor = SINGULAR * d
         for i in range(j):
             d -= a[j, i] * a[j, i]
-        if not d.real > floor.real:
+        sound = d.real > floor.real
+        if not some(sound):
             return False
-        d = sqrt(d)
+        d = sqrt(kept(sound, d))
         a[j, j] = d
         d = 1.0 / d
         for m in range(j + 1, n):
@@ -139,10 +146,14 @@ def refer_rigid(c, w, k):
 
 
 @helper
-def to_parent(c, w, k, P, F):
-    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+."""
+def to_parent(c, w, k, P, F, row):
+    """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+.
+
+    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then; it is negative for all other hinges.
+    """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
-    gamma = shift_inertia(rotate_inertia(R, P), arm)
+    rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)
+    gamma = shift_inertia(rotated, arm)
     F_parent = shift_force(times6(R, F), arm)
     _add_inertia(c, w, k, gamma)
     _add_force(c, w, w, k, F_parent)
@@ -164,17 +175,18 @@ def force_to_parent(c, w, z, k, F):
 def _add_inertia(c, w, k, gamma):
     """P += A Gamma A' with A = [Pi'; phi] of body k's inboard port on the parent."""
     parent = c.body[k].parent
-    i = c.body[k].inboard_port
-    if i >= 0:
-        r = vec3(w.port[i].r, 0)
-        for n in range(c.body[parent].modes):
-            momentum = inertia_times(gamma, mode_motion(w, i, n))
-            for m in range(n + 1):
-                s = dot6(momentum, mode_motion(w, i, m)) + w.pff[parent, n, m]
-                w.pff[parent, n, m] = s
-                w.pff[parent, m, n] = s
-            add6(w.mode[parent, n].pfr, 0, shift_force(momentum, r))
-        gamma = shift_inertia(gamma, r)
+    if has(c, INBOARD_NODES):
+        i = c.body[k].inboard_port
+        if i >= 0:
+            r = vec3(w.port[i].r, 0)
+            for n in range(c.body[parent].modes):
+                momentum = inertia_times(gamma, mode_motion(w, i, n))
+                for m in range(n + 1):
+                    s = dot6(momentum, mode_motion(w, i, m)) + w.pff[parent, n, m]
+                    w.pff[parent, n, m] = s
+                    w.pff[parent, m, n] = s
+                add6(w.mode[parent, n].pfr, 0, shift_force(momentum, r))
+            gamma = shift_inertia(gamma, r)
     add_inertia(w.body[parent].inertia, 0, gamma)
 
 
@@ -182,7 +194,7 @@ def _add_inertia(c, w, k, gamma):
 def _add_force(c, w, z, k, F_parent):
     """z += A F with A = [Pi'; phi] of body k's inboard port on the parent, F about it in the parent's axes."""
     parent, i = c.body[k].parent, c.body[k].inboard_port
-    if i >= 0:
+    if has(c, INBOARD_NODES) and i >= 0:
         add_port_force(c, w, z, parent, i, F_parent)
     else:
         add6(z.body[parent].force, 0, F_parent)

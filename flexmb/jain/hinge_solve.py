@@ -2,7 +2,7 @@
 
 P_R and z_R are the articulated inertia and force of body k about O, without its modes; the rows of H are the motions of
 the hinge's free speeds. With epsilon = T - H z_R and G = P_R H' D_R^-1, Jain & Rodriguez (63), (64), `eliminate` leaves
-G L = P_R H' L'^-1 in `hinge_gain`, L in `hinge_factor` and L^-1 epsilon in `hinge_residual`. `accelerate` takes the
+G L = P_R H' L'^-1, L and L^-1 epsilon as `gain`, `factor` and `residual` in w.hinge. `accelerate` takes the
 residual outward. The others solve with the same factors for a response:
 
     innovate      y = L^-1 (T - H z)               z^+ = z + G L y            inward   (55)
@@ -14,22 +14,25 @@ The response holds T, y and x in one array `speed`, each in place of what it is 
 freedom: H leaves them out, and they are zero in y and x.
 
 A hinge with a single axis, one free speed along z, needs no small matrices: H picks a row, and D_R is a number. For
-such a hinge G is kept instead of G L, D_R instead of L, and D_R^-1 epsilon instead of L^-1 epsilon, so that forward
-dynamics takes no square root.
+such a hinge G, D_R and D_R^-1 epsilon are kept in w.body, so that forward dynamics takes no square root.
 """
 
 from math import log
 
+from flexmb.jain.axis import along, move_along, turns
 from flexmb.jain.doubt import note_hinge
 from flexmb.jain.explicit import cholesky
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.variants import to_parent
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import kept, some
 from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, outer_inertia, sum_inertia
-from flexmb.spatial.pivots import is_rounding, is_small
+from flexmb.spatial.pivots import is_inertia, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
-from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
+from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS
+from flexmb.tables.features import PRESCRIBED, SEVERAL
 
 SINGLE = -1  # free_count of a hinge with a single axis
 
@@ -47,11 +50,11 @@ def impose(c, w, k):
 
 @helper
 def find_free(c, w, k):
-    """The hinge's free speeds into w.body[k].free_speed; returns how many there are."""
+    """The hinge's free speeds into w.hinge[k].free_speed; returns how many there are."""
     free = 0
     for n in range(c.body[k].nv):
         if c.speed[c.body[k].u_index + n].prescribed < 0:
-            w.body[k].free_speed[free] = n
+            w.hinge[k].free_speed[free] = n
             free += 1
     w.body[k].free_count = free
     return free
@@ -63,26 +66,32 @@ def eliminate(c, w, k):
 
     Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k in w.body.hinge_inertia and hinge_force.
     """
-    impose(c, w, k)
+    if has(c, PRESCRIBED):
+        impose(c, w, k)
     P = load_inertia(w.body[k].hinge_inertia, 0)
     z = sum6(vec6(w.body[k].hinge_force, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
-    j, axis = c.body[k].u_index, c.body[k].axis
-    if axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
-        return _eliminate_several(c, w, k, P, z)
-    PH = inertia_column(P, ANGULAR_Z if axis == ANGULAR_Z else LINEAR_Z)  # the compiler sees that there are but two
-    D = _along(axis, PH)
-    before = w.body[k].inertia[2 if axis == ANGULAR_Z else 17]
-    if is_small(c, w, j, D, before) and is_rounding(D, before):
-        return False
-    epsilon = w.speed[j].applied - _along(axis, z)
+    j = c.body[k].u_index
+    if has(c, SEVERAL):
+        if c.body[k].axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
+            return _eliminate_several(c, w, k, P, z)
+    row = ANGULAR_Z if turns(c, k) else LINEAR_Z
+    PH = inertia_column(P, row)
+    D = along(c, k, PH)
+    before = w.body[k].inertia[2 if turns(c, k) else 17]
+    if is_small(c, w, j, D, before):
+        sound = is_inertia(D, before)
+        if not some(sound):
+            return False
+        D = kept(sound, D)
+    epsilon = w.speed[j].applied - along(c, k, z)
     s = 1.0 / D
     w.body[k].free_count = SINGLE
-    w.body[k].hinge_factor[0, 0] = D
-    w.body[k].hinge_residual[0] = epsilon * s
-    store6(w.body[k].hinge_gain[0], 0, scale6(s, PH))
+    w.body[k].inertia_along = D
+    w.body[k].rate_at_rest = epsilon * s
+    store6(w.body[k].gain, 0, scale6(s, PH))
     if c.body[k].parent >= 0:
         z = axpy6(epsilon * s, PH, z)
-        to_parent(c, w, k, sum_inertia(P, outer_inertia(PH[0], PH[1], -s)), z)
+        to_parent(c, w, k, sum_inertia(P, outer_inertia(PH[0], PH[1], -s)), z, row)
     return True
 
 
@@ -90,15 +99,15 @@ def eliminate(c, w, k):
 def _eliminate_several(c, w, k, P, z):
     """The general hinge, or one that is prescribed."""
     free = find_free(c, w, k)
-    D, G, residual = w.body[k].hinge_factor, w.body[k].hinge_gain, w.body[k].hinge_residual
+    D, G, residual = w.hinge[k].factor, w.hinge[k].gain, w.hinge[k].residual
     for a in range(free):
-        n = w.body[k].free_speed[a]
+        n = w.hinge[k].free_speed[a]
         H = motion_column(c, w, k, n)
         PH = inertia_times(P, H)
         store6(G[a], 0, PH)
         residual[a] = less6(w.speed[c.body[k].u_index + n].applied, H, z)
         for b in range(a + 1):
-            D[a, b] = dot6(PH, motion_column(c, w, k, w.body[k].free_speed[b]))
+            D[a, b] = dot6(PH, motion_column(c, w, k, w.hinge[k].free_speed[b]))
     if not cholesky(D, free):
         return False
     note_hinge(c, w, k, D, 0)
@@ -115,26 +124,27 @@ def _eliminate_several(c, w, k, P, z):
         P = sum_inertia(P, outer_inertia(GL[0], GL[1], -1.0))
         z = axpy6(residual[a], GL, z)
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, P, z)
+        to_parent(c, w, k, P, z, NO_AXIS)
     return True
 
 
 @helper
 def accelerate(c, w, k, A):
     """Rates of the free speeds from alpha^+ and what `eliminate` left; returns alpha^+ + H' udot + a_m (64)."""
-    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
+    j, free = c.body[k].u_index, w.body[k].free_count
     moved = sum6(A, vec6(w.body[k].bias, 0))
-    if free == SINGLE:
-        udot = less6(w.body[k].hinge_residual[0], vec6(G[0], 0), A)
+    if not has(c, SEVERAL) or free == SINGLE:
+        udot = less6(w.body[k].rate_at_rest, vec6(w.body[k].gain, 0), A)
         w.speed[j].acceleration = udot
-        return _move_along(c.body[k].axis, moved, udot)
+        return move_along(c, k, moved, udot)
+    D, G = w.hinge[k].factor, w.hinge[k].gain
     for a in range(free - 1, -1, -1):
-        udot = less6(w.body[k].hinge_residual[a], vec6(G[a], 0), A)
+        udot = less6(w.hinge[k].residual[a], vec6(G[a], 0), A)
         for b in range(a + 1, free):
-            udot -= D[b, a] * w.speed[j + w.body[k].free_speed[b]].acceleration
-        w.speed[j + w.body[k].free_speed[a]].acceleration = udot / D[a, a]
+            udot -= D[b, a] * w.speed[j + w.hinge[k].free_speed[b]].acceleration
+        w.speed[j + w.hinge[k].free_speed[a]].acceleration = udot / D[a, a]
     for a in range(free):
-        n = w.body[k].free_speed[a]
+        n = w.hinge[k].free_speed[a]
         moved = axpy6(w.speed[j + n].acceleration, motion_column(c, w, k, n), moved)
     return moved
 
@@ -143,26 +153,28 @@ def accelerate(c, w, k, A):
 def add_innovations(c, w, x, k):
     """Further forces T have the innovations y: what `eliminate` left is as if they had been there."""
     j = c.body[k].u_index
-    if w.body[k].free_count == SINGLE:
-        w.body[k].hinge_residual[0] += x.speed[j] / sqrt(w.body[k].hinge_factor[0, 0])
+    if not has(c, SEVERAL) or w.body[k].free_count == SINGLE:
+        w.body[k].rate_at_rest += x.speed[j] / sqrt(w.body[k].inertia_along)
+        return
     for a in range(w.body[k].free_count):
-        w.body[k].hinge_residual[a] += x.speed[j + w.body[k].free_speed[a]]
+        w.hinge[k].residual[a] += x.speed[j + w.hinge[k].free_speed[a]]
 
 
 @helper
 def innovate(c, w, x, k, z):
     """y = L^-1 (T - H z) in place of T; returns z^+ (55)."""
-    j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
-    if free == SINGLE:
-        epsilon = x.speed[j] - _along(c.body[k].axis, z)
-        x.speed[j] = epsilon / sqrt(D[0, 0])
-        return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
+    j, free = c.body[k].u_index, w.body[k].free_count
+    if not has(c, SEVERAL) or free == SINGLE:
+        epsilon = x.speed[j] - along(c, k, z)
+        x.speed[j] = epsilon / sqrt(w.body[k].inertia_along)
+        return axpy6(epsilon, vec6(w.body[k].gain, 0), z)
+    D = w.hinge[k].factor
     _hold(c, x, k)
     for a in range(free):
-        n = w.body[k].free_speed[a]
+        n = w.hinge[k].free_speed[a]
         epsilon = less6(x.speed[j + n], motion_column(c, w, k, n), z)
         for b in range(a):
-            epsilon -= D[a, b] * x.speed[j + w.body[k].free_speed[b]]
+            epsilon -= D[a, b] * x.speed[j + w.hinge[k].free_speed[b]]
         x.speed[j + n] = epsilon / D[a, a]
     return _gained(c, w, x, k, z)
 
@@ -170,17 +182,18 @@ def innovate(c, w, x, k, z):
 @helper
 def synthesise(c, w, x, k, z):
     """T = L y + H z in place of y; returns z^+ (54)."""
-    j, free, D = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor
-    if free == SINGLE:
-        epsilon = sqrt(D[0, 0]) * x.speed[j]
-        x.speed[j] = epsilon + _along(c.body[k].axis, z)
-        return axpy6(epsilon, vec6(w.body[k].hinge_gain[0], 0), z)
+    j, free = c.body[k].u_index, w.body[k].free_count
+    if not has(c, SEVERAL) or free == SINGLE:
+        epsilon = sqrt(w.body[k].inertia_along) * x.speed[j]
+        x.speed[j] = epsilon + along(c, k, z)
+        return axpy6(epsilon, vec6(w.body[k].gain, 0), z)
+    D = w.hinge[k].factor
     gained = _gained(c, w, x, k, z)
     for a in range(free - 1, -1, -1):
-        n = w.body[k].free_speed[a]
+        n = w.hinge[k].free_speed[a]
         T = dot6(motion_column(c, w, k, n), z)
         for b in range(a + 1):
-            T += D[a, b] * x.speed[j + w.body[k].free_speed[b]]
+            T += D[a, b] * x.speed[j + w.hinge[k].free_speed[b]]
         x.speed[j + n] = T
     _hold(c, x, k)
     return gained
@@ -189,16 +202,17 @@ def synthesise(c, w, x, k, z):
 @helper
 def solve(c, w, x, k, A):
     """x = L'^-1 (y - (G L)'alpha^+) in place of y; returns alpha^+ + H' x (56)."""
-    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
-    if free == SINGLE:
-        rate = less6(x.speed[j] / sqrt(D[0, 0]), vec6(G[0], 0), A)
+    j, free = c.body[k].u_index, w.body[k].free_count
+    if not has(c, SEVERAL) or free == SINGLE:
+        rate = less6(x.speed[j] / sqrt(w.body[k].inertia_along), vec6(w.body[k].gain, 0), A)
         x.speed[j] = rate
-        return _move_along(c.body[k].axis, A, rate)
+        return move_along(c, k, A, rate)
+    D, G = w.hinge[k].factor, w.hinge[k].gain
     for a in range(free - 1, -1, -1):
-        rate = less6(x.speed[j + w.body[k].free_speed[a]], vec6(G[a], 0), A)
+        rate = less6(x.speed[j + w.hinge[k].free_speed[a]], vec6(G[a], 0), A)
         for b in range(a + 1, free):
-            rate -= D[b, a] * x.speed[j + w.body[k].free_speed[b]]
-        x.speed[j + w.body[k].free_speed[a]] = rate / D[a, a]
+            rate -= D[b, a] * x.speed[j + w.hinge[k].free_speed[b]]
+        x.speed[j + w.hinge[k].free_speed[a]] = rate / D[a, a]
     _hold(c, x, k)
     return _spread(c, w, x, k, A)
 
@@ -206,45 +220,31 @@ def solve(c, w, x, k, A):
 @helper
 def excite(c, w, x, k, A):
     """y = L' x + (G L)'alpha^+ in place of x; returns alpha^+ + H' x."""
-    j, free, D, G = c.body[k].u_index, w.body[k].free_count, w.body[k].hinge_factor, w.body[k].hinge_gain
-    if free == SINGLE:
+    j, free = c.body[k].u_index, w.body[k].free_count
+    if not has(c, SEVERAL) or free == SINGLE:
         rate = x.speed[j]
-        x.speed[j] = sqrt(D[0, 0]) * (rate + dot6(vec6(G[0], 0), A))
-        return _move_along(c.body[k].axis, A, rate)
+        x.speed[j] = sqrt(w.body[k].inertia_along) * (rate + dot6(vec6(w.body[k].gain, 0), A))
+        return move_along(c, k, A, rate)
+    D, G = w.hinge[k].factor, w.hinge[k].gain
     spread = _spread(c, w, x, k, A)
     for a in range(free):
         total = dot6(vec6(G[a], 0), A)
         for b in range(a, free):
-            total += D[b, a] * x.speed[j + w.body[k].free_speed[b]]
-        x.speed[j + w.body[k].free_speed[a]] = total
+            total += D[b, a] * x.speed[j + w.hinge[k].free_speed[b]]
+        x.speed[j + w.hinge[k].free_speed[a]] = total
     _hold(c, x, k)
     return spread
 
 
 @helper
-def log_determinant(w, k):
+def log_determinant(c, w, k):
     """log det D_R."""
+    if not has(c, SEVERAL) or w.body[k].free_count == SINGLE:
+        return log(w.body[k].inertia_along)
     total = 0.0
-    if w.body[k].free_count == SINGLE:
-        total += log(w.body[k].hinge_factor[0, 0])
     for a in range(w.body[k].free_count):
-        total += 2.0 * log(w.body[k].hinge_factor[a, a])
+        total += 2.0 * log(w.hinge[k].factor[a, a])
     return total
-
-
-@helper
-def _along(axis, F):
-    """H F of a single axis."""
-    return F[0][2] if axis == ANGULAR_Z else F[1][2]
-
-
-@helper
-def _move_along(axis, A, rate):
-    """A + H' rate of a single axis."""
-    alpha, a = A
-    if axis == ANGULAR_Z:
-        return (alpha[0], alpha[1], alpha[2] + rate), a
-    return alpha, (a[0], a[1], a[2] + rate)
 
 
 @helper
@@ -259,8 +259,8 @@ def _hold(c, x, k):
 def _gained(c, w, x, k, z):
     """z^+ = z + G L y of a general hinge."""
     for a in range(w.body[k].free_count):
-        y = x.speed[c.body[k].u_index + w.body[k].free_speed[a]]
-        z = axpy6(y, vec6(w.body[k].hinge_gain[a], 0), z)
+        y = x.speed[c.body[k].u_index + w.hinge[k].free_speed[a]]
+        z = axpy6(y, vec6(w.hinge[k].gain[a], 0), z)
     return z
 
 
@@ -268,6 +268,6 @@ def _gained(c, w, x, k, z):
 def _spread(c, w, x, k, A):
     """alpha^+ + H' x of a general hinge."""
     for a in range(w.body[k].free_count):
-        n = w.body[k].free_speed[a]
+        n = w.hinge[k].free_speed[a]
         A = axpy6(x.speed[c.body[k].u_index + n], motion_column(c, w, k, n), A)
     return A

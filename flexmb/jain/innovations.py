@@ -153,7 +153,7 @@ def log_determinant(c, w):
                 total += log(c.wheel[i].axial)
         for n in range(c.body[k].modes):
             total += 2.0 * log(w.pff[k, n, n])
-        total += hinge_solve.log_determinant(w, k)
+        total += hinge_solve.log_determinant(c, w, k)
     return total
 
 

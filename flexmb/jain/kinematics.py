@@ -5,7 +5,9 @@ accelerations are classical (of the hinge point), not spatial; the body order is
 """
 
 from flexmb.hinges import catalogue
+from flexmb.jain import axis
 from flexmb.jain.ports import move_port, port_bias, port_velocity
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.spatial_vector import (
@@ -29,9 +31,11 @@ from flexmb.spatial.vector import (
     store9,
     sub,
     times,
+    times_t,
     transpose,
     vec3,
 )
+from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
 @helper
@@ -43,53 +47,65 @@ def velocity_sweep(c, w, shape, rates):
     """
     displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
-        exact = not is_at_rest(c.body[k].level)
-        if exact or displaced:
-            for n in range(c.body[k].modes):
-                w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-                w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
-            for i in range(c.body[k].port_start, c.body[k].port_stop):
-                move_port(c, w, k, i)
+        if has(c, MODES):
+            exact = not is_at_rest(c.body[k].level)
+            if exact or displaced:
+                for n in range(c.body[k].modes):
+                    w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+                    w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+                for i in range(c.body[k].port_start, c.body[k].port_stop):
+                    move_port(c, w, k, i)
         _cross_hinge(c, w, k)
     w.displaced[0] = 1 if shape or rates else 0
 
 
 @helper
-def _inboard(c, w, k):
-    """O+ of body k in parent axes (7): velocity and bias of the parent's reference, arm from it to O+, R_parent_O+."""
-    p = c.body[k].parent
-    i = c.body[k].inboard_port
-    if i >= 0:
-        return port_velocity(w, p, i), port_bias(w, p, i), (0.0, 0.0, 0.0), mat3(w.port[i].R, 0)
-    arm = vec3(c.body[k].placement_position, 0)
-    R = mat3(c.body[k].placement_rotation, 0)
-    if p < 0:
-        return ZERO6, ZERO6, arm, R
-    return vec6(w.body[p].velocity, 0), ZERO6, arm, R
-
-
-@helper
 def _cross_hinge(c, w, k):
     """Velocity and bias of body k from its parent through the hinge (8), (9), (25)."""
-    V_parent, A_parent, arm, R_inboard = _inboard(c, w, k)
-    i, j, kind = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind
-    R_hinge, p_hinge = catalogue.pose(kind, w.q, i, c.body[k].sequence)
-    V_rel, A_rel = catalogue.motion(kind, w.q, i, w.u, j, c.body[k].sequence, w.body[k].hinge_map)
-    arm = add(arm, times(R_inboard, p_hinge))
-    R = matmul(R_inboard, R_hinge)
-    # O as a point of the parent, in outboard axes
-    V = times6_t(R, shift_motion(V_parent, arm))
-    A = times6_t(R, shift_acceleration(A_parent, V_parent, arm))
-    # across the hinge
-    coriolis = cross(V[0], V_rel[0]), scale(2.0, cross(V[0], V_rel[1]))
-    A = sum6(sum6(A, coriolis), A_rel)
-    V = sum6(V, V_rel)
+    R, arm = _inboard(c, w, k)
+    if axis.has_axis(c, k):
+        R, arm = axis.pose(c, w, k, R, arm)
+        V, A = _carried(c, w, k, R, arm)
+        V, A = axis.cross_hinge(c, w, k, V, A)
+    else:
+        i, j, kind, sequence = c.body[k].q_index, c.body[k].u_index, c.body[k].hinge_kind, c.body[k].sequence
+        R_hinge, p_hinge = catalogue.pose(c, kind, w.q, i, sequence)
+        V_rel, A_rel = catalogue.motion(c, kind, w.q, i, w.u, j, sequence, w.hinge[k].map)
+        R, arm = matmul(R, R_hinge), add(arm, times(R, p_hinge))
+        V, A = _carried(c, w, k, R, arm)
+        coriolis = cross(V[0], V_rel[0]), scale(2.0, cross(V[0], V_rel[1]))
+        V, A = sum6(V, V_rel), sum6(sum6(A, coriolis), A_rel)
     store3(w.body[k].arm, 0, arm)
-    if c.body[k].outboard_port >= 0:
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         R, V, A = _from_deforming_node(c, w, k, R, V, A)
     store9(w.body[k].rotation, 0, R)
     store6(w.body[k].velocity, 0, V)
     store6(w.body[k].bias, 0, A)
+
+
+@helper
+def _inboard(c, w, k):
+    """R_parent_O+ of body k, and the arm to O+ from the parent's reference, which is the port where O+ sits on one."""
+    if has(c, INBOARD_NODES):
+        i = c.body[k].inboard_port
+        if i >= 0:
+            return mat3(w.port[i].R, 0), (0.0, 0.0, 0.0)
+    return mat3(c.body[k].placement_rotation, 0), vec3(c.body[k].placement_position, 0)
+
+
+@helper
+def _carried(c, w, k, R, arm):
+    """Velocity and bias of O as a point of the parent, in outboard axes (7), R = R_parent_O."""
+    p = c.body[k].parent
+    if p < 0:
+        return ZERO6, ZERO6
+    if has(c, INBOARD_NODES):
+        i = c.body[k].inboard_port
+        if i >= 0:
+            V, A = port_velocity(w, p, i), port_bias(w, p, i)
+            return times6_t(R, shift_motion(V, arm)), times6_t(R, shift_acceleration(A, V, arm))
+    V = vec6(w.body[p].velocity, 0)
+    return times6_t(R, shift_motion(V, arm)), (ZERO6[0], times_t(R, cross(V[0], cross(V[0], arm))))
 
 
 @helper
@@ -106,7 +122,7 @@ def _from_deforming_node(c, w, k, R_parent_O, V_O, A_O):
     V = omega, sub(sub(v_O, cross(omega, vec3(w.port[i].r, 0))), v_rel)
     store6(w.body[k].velocity, 0, V)
     for n in range(c.body[k].nv):
-        store_column(w.body[k].motion, n, times6(R_body_O, column(w.body[k].hinge_map, n)))
+        store_column(w.hinge[k].motion, n, times6(R_body_O, _own_column(c, w, k, n)))
     return matmul(R_parent_O, transpose(R_body_O)), V, sub6(times6(R_body_O, A_O), port_bias(w, k, i))
 
 
@@ -126,9 +142,17 @@ def store_column(H, n, V):
 @helper
 def motion_column(c, w, k, n):
     """Column n of H' in body axes: the motion of O that speed n of the hinge is."""
-    if c.body[k].outboard_port >= 0:
-        return column(w.body[k].motion, n)
-    return column(w.body[k].hinge_map, n)
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        return column(w.hinge[k].motion, n)
+    return _own_column(c, w, k, n)
+
+
+@helper
+def _own_column(c, w, k, n):
+    """The same in outboard axes."""
+    if axis.has_axis(c, k):
+        return axis.column(c, k)
+    return column(w.hinge[k].map, n)
 
 
 @helper
@@ -141,13 +165,13 @@ def pose_sweep(c, w):
         R = mat3(w.body[k].rotation, 0)
         if p >= 0:
             R_parent = mat3(w.body[p].pose_rotation, 0)
-            if i >= 0:
+            if has(c, INBOARD_NODES) and i >= 0:
                 arm = add(arm, vec3(w.port[i].r, 0))
             position = add(vec3(w.body[p].pose_position, 0), times(R_parent, arm))
             R = matmul(R_parent, R)
         else:
             position = arm
-        if c.body[k].outboard_port >= 0:
+        if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
             position = sub(position, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
         store9(w.body[k].pose_rotation, 0, R)
         store3(w.body[k].pose_position, 0, position)

@@ -6,10 +6,12 @@ A load is the total one (constraint, spring and motor) on the outboard part, abo
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jain.wheels import spin_axis
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import dot6, store6, sum6, vec6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, sub
+from flexmb.tables.features import PRESCRIBED, WHEELS
 
 
 @helper
@@ -29,12 +31,20 @@ def hinge_load(w, k):
 @helper
 def drive_loads(c, w):
     """Generalised load of every prescribed speed, H F, beyond its spring and damper, into w.speed.drive."""
-    for k in range(c.body.shape[0]):
-        for n in range(c.body[k].nv):
-            j = c.body[k].u_index + n
-            if c.speed[j].prescribed >= 0:
-                hinge_load(w, k)
-                w.speed[j].drive = dot6(motion_column(c, w, k, n), vec6(w.body[k].load, 0)) - w.speed[j].applied
+    if has(c, PRESCRIBED):
+        for k in range(c.body.shape[0]):
+            _drive_loads(c, w, k)
+
+
+@helper
+def _drive_loads(c, w, k):
+    """Those of the speeds of hinge and wheels of body k."""
+    for n in range(c.body[k].nv):
+        j = c.body[k].u_index + n
+        if c.speed[j].prescribed >= 0:
+            hinge_load(w, k)
+            w.speed[j].drive = dot6(motion_column(c, w, k, n), vec6(w.body[k].load, 0)) - w.speed[j].applied
+    if has(c, WHEELS):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
             if c.speed[j].prescribed >= 0:

@@ -1,9 +1,11 @@
 """Motion of ports: frames fixed to points of bodies that may deform, where hinges, wheels, loads and markers sit."""
 
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, scale, store3, store9, vec3
+from flexmb.tables.features import SECOND_ORDER
 
 
 @helper
@@ -14,7 +16,7 @@ def move_port(c, w, k, i):
     x = vec3(c.port[i].position, 0)
     offset = vec3(c.port[i].offset, 0)
     row = c.port[i].second
-    if row >= 0:
+    if has(c, SECOND_ORDER) and row >= 0:
         r, R, w_rel, v_rel, alpha, a = second_order_motion(
             x, offset, c.port_mode[i], c.second_shape[row], w.mode[k], c.body[k].modes, w.port_mode[i]
         )

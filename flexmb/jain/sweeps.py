@@ -11,9 +11,11 @@ from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
+from flexmb.tables.features import LOADS, MODES, WHEELS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 
@@ -34,16 +36,20 @@ def bodies(c, w):
     """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
     velocity_sweep(c, w, False, False)
-    if c.load.shape[0] > 0:
+    if has(c, LOADS):
         pose_sweep(c, w)
     for k in range(c.body.shape[0]):
-        if is_out_of_range(c, w, k):
-            w.fault[0] = k
-            return OUT_OF_RANGE
+        if has(c, MODES):
+            if is_out_of_range(c, w, k):
+                w.fault[0] = k
+                return OUT_OF_RANGE
         inertia(c, w, k)
-        elastic_forces(c, w, k)
-        node_loads(c, w, k)
-        wheel_forces(c, w, k)
+        if has(c, MODES):
+            elastic_forces(c, w, k)
+        if has(c, LOADS):
+            node_loads(c, w, k)
+        if has(c, WHEELS):
+            wheel_forces(c, w, k)
     return OK
 
 
@@ -67,7 +73,9 @@ def outward(c, w):
     """Outward half of (64): udot, modal accelerations, loads across hinges, drive loads, wheel accelerations."""
     for k in range(c.body.shape[0]):
         A = hinge_solve.accelerate(c, w, k, inboard_acceleration(c, w, k))
-        modal_accelerations(c, w, k, A)
+        if has(c, MODES):
+            modal_accelerations(c, w, k, A)
         store_body_acceleration(c, w, k, A)
-        for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
-            wheel_acceleration(c, w, k, i)
+        if has(c, WHEELS):
+            for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
+                wheel_acceleration(c, w, k, i)

@@ -15,6 +15,7 @@ from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
 from flexmb.spatial.spatial_vector import axpy6, dot6, less6, plus6, store6, sum6, vec6
+from flexmb.tables.arrays import NO_AXIS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Real
 
@@ -60,7 +61,7 @@ def _eliminate(c, w, x, k):
     _mode_rows(c, w, x, k, a)
     rows = nm + find_free(c, w, k)
     for n in range(nm, rows):
-        j = w.body[k].free_speed[n - nm]
+        j = w.hinge[k].free_speed[n - nm]
         H = motion_column(c, w, k, j)
         F = inertia_times(P, H)
         store6(gain[n], 0, F)
@@ -68,7 +69,7 @@ def _eliminate(c, w, x, k):
         for i in range(nm):
             D[n, i] = dot6(vec6(gain[i], 0), H)
         for i in range(nm, n + 1):
-            D[n, i] = dot6(F, motion_column(c, w, k, w.body[k].free_speed[i - nm]))
+            D[n, i] = dot6(F, motion_column(c, w, k, w.hinge[k].free_speed[i - nm]))
     if not cholesky(D, rows):
         return False
     note_modes(c, w, k, D)
@@ -88,7 +89,7 @@ def _eliminate(c, w, x, k):
         z = axpy6(residual[n], G, z)
     store6(w.body[k].hinge_force, 0, z)
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), z)
+        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), z, NO_AXIS)
     return True
 
 
@@ -121,7 +122,7 @@ def _accelerate(c, w, x, k):
         w.speed[c.body[k].etad_index + n].acceleration = rates[n]
     A = sum6(A_plus, vec6(w.body[k].bias, 0))
     for n in range(nm, rows):
-        j = w.body[k].free_speed[n - nm]
+        j = w.hinge[k].free_speed[n - nm]
         w.speed[c.body[k].u_index + j].acceleration = rates[n]
         A = axpy6(rates[n], motion_column(c, w, k, j), A)
     store_body_acceleration(c, w, k, A)

@@ -28,9 +28,9 @@ def _eliminate_modes(c, w, k):
 
 
 @helper
-def _to_parent(c, w, k, p, F):
+def _to_parent(c, w, k, p, F, row):
     if c.body[k].node < 0:
-        explicit.to_parent(c, w, k, p, F)
+        explicit.to_parent(c, w, k, p, F, row)
     else:
         to_node(c, w, k, p, F)
 

@@ -3,23 +3,31 @@
 kernel.py       `kernel`, `helper`, `by_bundle`, `by_number`: what the mechanics is written with
 numbered.py     one helper for several, chosen by a number in front
 bundle.py       many arrays as one argument
+tables.py       arrays of bundles inside kernels
+lanes.py        eight copies of a number as one value, and masks: how kernels run eight scenes at once
+lane_functions.py  their elementary functions
+lane_arrays.py  arrays of them
 pointer.py      kernels as arguments of kernels
+direct.py       kernels called by address, from Python and from kernels
 parts.py        helpers are compiled into their callers only
 cache.py        compiled kernels on disk
 fingerprint.py  the key of a compiled kernel: the code that it reaches
 folder.py       where compiled kernels are kept, and for how long
+once.py         of many processes, one compiles a kernel
+progress.py     a line about what takes long to compile
 hooks.py        which of numba's internals are used, and what is done without them
 counting.py     operations of a kernel, by interpreting it; it needs no numba
 
 Numba documents as its extension API, and we take for granted: `njit`, `cfunc`, `overload`, types of one's own with
-`register_model`, `unbox` and the lowering of attributes, `WrapperAddressProtocol`, and compilers with other passes.
+`register_model`, `unbox` and the lowering of attributes, `type_callable` and `lower_builtin`,
+`WrapperAddressProtocol`, and compilers with other passes.
 
 Internal to numba, with something in their place (see hooks.py), are: that the code of a function can be left
-unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, and what a compiled
-version is as bytes (`NullCache` and `CompileResult`, in cache.py); and the address of a compiled version
-(`CompileResultWAP`, in hooks.py).
+unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatcher asks its cache, what a compiled
+version is as bytes, and what it needs to run (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock`,
+`normalize_signature`, in cache.py); and the address of a compiled version (`CompileResultWAP`, in hooks.py).
 
-Internal to numba, with nothing in their place, are four names in bundle.py: the protocol `_numba_type_`,
+Internal to numba, with nothing in their place, are four names in bundle.py and direct.py: the protocol `_numba_type_`,
 `AttributeTemplate`, `populate_array`, and the structure of an array that `make_array` gives. All numba versions that
 were tried have them.
 """

@@ -14,12 +14,13 @@ from functools import cache
 from typing import Any, TypeVar, dataclass_transform
 
 import numpy as np
-from llvmlite import ir
 from numba import from_dtype, types
 from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
-from numba.np.arrayobj import populate_array
+
+from flexmb.jit.lanes import LANE
+from flexmb.jit.tables import BYTE, WORD, TableType, table
 
 Class = TypeVar("Class", bound=type)
 
@@ -32,7 +33,8 @@ def bundle(cls: Class) -> Class:
     """Make a class of annotated arrays and bundles a frozen dataclass that kernels take as one argument.
 
     Inside a kernel `b.name` is the array or bundle; in Python too. The arrays must be C-contiguous; kernels may
-    write to them.
+    write to them. A method `features` says what is in them: a frozenset of names, part of the type of the bundle. Of a
+    class with `in_lanes = True` the floats of kernels are lanes: the arrays are those of `flexmb.jit.lane_arrays`.
     """
     cls.__post_init__ = _describe  # type: ignore[attr-defined]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
@@ -40,7 +42,11 @@ def bundle(cls: Class) -> Class:
 
 
 def _describe(self: Any) -> None:
-    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers."""
+    """Table of addresses and shapes, its own address, and the type of the bundle, for the compiler and its callers.
+
+    Where the type says which features the arrays have, they are made read-only: what is not there must not come later.
+    """
+    features = self.features() if hasattr(self, "features") else frozenset()
     names = [field.name for field in fields(self)]
     table, kinds = np.zeros((len(names), _ROW), np.int64), list[tuple[str, types.Type]]()
     for name, row in zip(names, table, strict=True):
@@ -49,20 +55,24 @@ def _describe(self: Any) -> None:
             row[0] = array._address
             kinds.append((name, array._numba_type_))
             continue
-        if not array.flags.c_contiguous or array.ndim > _DIMENSIONS:
+        in_lanes = getattr(type(self), "in_lanes", False)
+        shape = array.shape[:-1] if in_lanes and array.dtype == np.float64 else array.shape
+        if not array.flags.c_contiguous or len(shape) > _DIMENSIONS:
             raise ValueError(f"{name}: a bundle holds C-contiguous arrays of at most {_DIMENSIONS} dimensions")
         row[0] = array.ctypes.data
-        row[1 : 1 + array.ndim] = array.shape
-        kinds.append((name, _array_type(array.dtype, array.ndim)))
+        row[1 : 1 + len(shape)] = shape
+        kinds.append((name, _array_type(array.dtype, len(shape), in_lanes)))
+        if features:
+            array.setflags(write=False)
     object.__setattr__(self, "_table", table)
     object.__setattr__(self, "_address", table.ctypes.data)
-    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds)))
+    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds), features))
 
 
 @cache
-def _array_type(dtype: np.dtype, dimensions: int) -> types.Array:
+def _array_type(dtype: np.dtype, dimensions: int, in_lanes: bool) -> TableType:
     """Kept, because numba takes a tenth of a millisecond to describe a record."""
-    return types.Array(from_dtype(dtype), dimensions, "C")
+    return TableType(LANE if in_lanes and dtype == np.float64 else from_dtype(dtype), dimensions)
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
@@ -71,12 +81,17 @@ def _reduce(self: Any) -> tuple[Any, ...]:
 
 
 class BundleType(types.Type):
-    """Type of a bundle: its class, the names and types of its members. Its name is short, for it is part of symbols."""
+    """Type of a bundle: its class, the names and types of its members, and its features (see `flexmb.jit.features`).
 
-    def __init__(self, of: type, kinds: tuple[tuple[str, types.Type], ...]) -> None:
-        self.of, self.kinds = of, kinds
-        contents = of.__module__, of.__qualname__, [(key, str(kind)) for key, kind in kinds]
-        super().__init__(name=f"{of.__name__}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:8]}")
+    Its name is short, for it is part of symbols.
+    """
+
+    def __init__(
+        self, of: type, kinds: tuple[tuple[str, types.Type], ...], features: frozenset[str] = frozenset()
+    ) -> None:
+        self.of, self.kinds, self.features = of, kinds, features
+        contents = of.__module__, of.__qualname__, [(key, str(kind)) for key, kind in kinds], sorted(features)
+        super().__init__(name=f"{of.__name__}_{hashlib.sha256(repr(contents).encode()).hexdigest()[:12]}")
 
     def place(self, name: str) -> int:
         """Row of a member in the table."""
@@ -124,34 +139,20 @@ class _BundleAttribute(AttributeTemplate):
 
 @lower_getattr_generic(BundleType)
 def _member_of(context, builder, typ, value, attr):
-    """A bundle's address, or the array structure built from its row.
+    """A bundle's address, or the table of its row.
 
     "invariant" lets LLVM load each address once per function.
     """
     place = typ.place(attr)
     kind = typ.kinds[place][1]
-    word = ir.IntType(64)
-    table = builder.bitcast(value, word.as_pointer())
+    words = builder.bitcast(value, WORD.as_pointer())
 
     def load(column):
-        loaded = builder.load(builder.gep(table, [word(place * _ROW + column)]))
+        loaded = builder.load(builder.gep(words, [WORD(place * _ROW + column)], inbounds=True))
         loaded.set_metadata("invariant.load", builder.module.add_metadata([]))
         return loaded
 
     if isinstance(kind, BundleType):
         return builder.inttoptr(load(0), value.type)
-    array = context.make_array(kind)(context, builder)
-    shape = [load(1 + i) for i in range(kind.ndim)]
-    itemsize = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
-    strides = [itemsize]
-    for extent in shape[:0:-1]:
-        strides.insert(0, builder.mul(strides[0], extent))
-    populate_array(
-        array,
-        data=builder.inttoptr(load(0), array.data.type),
-        shape=cgutils.pack_array(builder, shape, ty=word),
-        strides=cgutils.pack_array(builder, strides, ty=word),
-        itemsize=itemsize,
-        meminfo=None,
-    )
-    return array._getvalue()
+    address = builder.inttoptr(load(0), BYTE.as_pointer())
+    return table(context, builder, kind, address, [load(1 + i) for i in range(kind.ndim)])

@@ -16,6 +16,7 @@ import os
 import pickle
 import shutil
 import uuid
+from collections.abc import Callable
 from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
@@ -24,10 +25,15 @@ from typing import Any
 
 from numba.core.caching import NullCache
 from numba.core.compiler import CompileResult
+from numba.core.compiler_lock import global_compiler_lock
+from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
+from numba.core.sigutils import normalize_signature
 
 from flexmb.jit.fingerprint import fingerprint
 from flexmb.jit.folder import delete_unused, mark_used, warn_once
+from flexmb.jit.once import compiled_once
+from flexmb.jit.progress import announced
 
 _DIGEST = hashlib.sha256().digest_size
 
@@ -50,7 +56,7 @@ class KernelCache(NullCache):
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
         """The version for a signature, or None where there is none that is sound."""
-        target_context.refresh()
+        rtsys.initialize(target_context)  # no more: numba's registries, which only its compiler needs, take 0.4 s
         file = self._file(sig, target_context.codegen())
         try:
             data = file.read_bytes()
@@ -64,6 +70,24 @@ class KernelCache(NullCache):
             return None
         mark_used(file)
         return CompileResult._rebuild(target_context, *pickle.loads(contents))
+
+    def filling(self, kernel: Any) -> Callable[[Any], Any]:
+        """What compiles the versions of `kernel`: one that is not on disk by one process, with a line where it is long.
+
+        Numba's lock is taken first: of two threads, one must not wait for the other's lock on a file with it.
+        """
+        plain = kernel.compile
+
+        def compile_once(signature: Any) -> Any:
+            if tuple(normalize_signature(signature)[0]) in kernel.overloads:
+                return plain(signature)
+            file = self._file(signature, kernel.targetctx.codegen())
+            if file.is_file():
+                return plain(signature)
+            with global_compiler_lock, announced(self._function, self._folder), compiled_once(file):
+                return plain(signature)
+
+        return compile_once
 
     def save_overload(self, sig: Any, data: Any) -> None:
         """Keep a version; a warning where that cannot be done."""

@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 _OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
-_CHOOSERS = f"{__package__}.kernel"  # where `by_bundle` and `by_number` make functions that choose; it needs numba
+_CHOOSERS = {f"{__package__}.kernel", f"{__package__}.numbered"}  # where functions are made that choose
 
 
 @dataclass(frozen=True)
@@ -121,6 +121,8 @@ def _counting(value: Any, scalar: Any) -> Any:
         copy = object.__new__(type(value))  # a bundle's own constructor takes addresses of arrays
         for field in fields(value):
             object.__setattr__(copy, field.name, _counting(getattr(value, field.name), scalar))
+        if hasattr(value, "_numba_type_"):  # a bundle's features are part of its type
+            object.__setattr__(copy, "_numba_type_", value._numba_type_)
         return copy
     if isinstance(value, tuple):
         parts = [_counting(part, scalar) for part in value]
@@ -148,12 +150,14 @@ class _Interpreter:
         self._namespaces: dict[int, dict[str, Any]] = {}
 
     def __call__(self, thing: Any) -> Any:
-        """The twin of a function, of a module of the package, of a function of `math`; all else is its own."""
+        """The twin of a function or of several, of a module of the package, of a function of `math`; else the thing."""
         function = getattr(thing, "py_func", None)
         if isinstance(function, FunctionType):
             return self._function(function)
-        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ == _CHOOSERS:
+        if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ in _CHOOSERS:
             return self._function(thing)
+        if isinstance(thing, tuple):
+            return tuple(map(self, thing)) if all(callable(each) for each in thing) else thing
         if isinstance(thing, ModuleType) and thing.__name__.startswith(_OF_THE_PACKAGE):
             return SimpleNamespace(**self._namespace(vars(thing)))
         if isinstance(thing, BuiltinFunctionType) and thing.__module__ == "math":

@@ -20,6 +20,7 @@ from typing import Any
 from numba import __version__, cfunc
 
 from flexmb.jit.folder import cache_directory, warn_once
+from flexmb.jit.progress import announced
 
 OLDEST, NEWEST = (0, 60), (0, 68)  # numba versions that the hooks were tried with: tests/flexmb/jit/test_hooks.py
 
@@ -29,6 +30,17 @@ SEMANTICS: dict[str, Any] = {"fastmath": {"contract"}, "error_model": "numpy", "
 
 def _compiled_anew(compiled: Any, function: FunctionType) -> None:
     """Without a cache: nothing is kept."""
+    compiled.compile = _announcing(compiled.compile, function)
+
+
+def _announcing(compile: Callable[[Any], Any], function: FunctionType) -> Callable[[Any], Any]:
+    """What compiles the versions of a kernel that is not kept, with a line about it where it takes long."""
+
+    def compile_anew(signature: Any) -> Any:
+        with announced(function, None):
+            return compile(signature)
+
+    return compile_anew
 
 
 def _through_cfunc(kernel: Any, signature: Any) -> int:
@@ -46,6 +58,7 @@ class Hooks:
     """How helpers and kernels are compiled: as here, by what numba documents, or by its internals."""
 
     parts: dict[str, Any] = field(default_factory=dict)  # options of njit for a helper
+    kernels: dict[str, Any] = field(default_factory=dict)  # of a kernel
     keep: Callable[[Any, FunctionType], None] = _compiled_anew  # (dispatcher, its function)
     address: Callable[[Any, Any], int] = _through_cfunc  # of (dispatcher, signature), once it is compiled for it
 
@@ -57,18 +70,23 @@ def _by_internals() -> Hooks:
     from numba.core.types.function_type import CompileResultWAP
 
     from flexmb.jit.cache import KernelCache
-    from flexmb.jit.parts import PartCompiler
+    from flexmb.jit.parts import KernelCompiler, PartCompiler
 
     def keep(compiled: Any, function: FunctionType) -> None:
         directory = cache_directory()
-        if directory is not None:
-            compiled._cache = KernelCache(function, directory)
+        if directory is None:
+            _compiled_anew(compiled, function)
+        else:
+            compiled._cache = cache = KernelCache(function, directory)
+            compiled.compile = cache.filling(compiled)
 
     def address(kernel: Any, signature: Any) -> int:
         return int(CompileResultWAP(kernel.overloads[signature.args]).__wrapper_address__())
 
-    parts = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True, "pipeline_class": PartCompiler}
-    return Hooks(parts, keep, address)
+    parts = {
+        "no_cpython_wrapper": True, "no_cfunc_wrapper": True, "forceinline": True, "pipeline_class": PartCompiler
+    }  # fmt: skip
+    return Hooks(parts, {"pipeline_class": KernelCompiler}, keep, address)
 
 
 def _version() -> tuple[int, int]:

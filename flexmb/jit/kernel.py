@@ -15,6 +15,7 @@ from numba.extending import overload
 
 from flexmb.jit.bundle import BundleType
 from flexmb.jit.hooks import HOOKS, SEMANTICS
+from flexmb.jit.lanes import LANE
 
 if config.DISABLE_JIT:
     raise ImportError(
@@ -22,19 +23,19 @@ if config.DISABLE_JIT:
         "py_func, or see flexmb.jit.counting, which interprets kernels"
     )
 
-_AS_PART: dict[str, Any] = SEMANTICS | HOOKS.parts
+AS_PART: dict[str, Any] = SEMANTICS | HOOKS.parts
 
 
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile `function` as an entry point, cached on disk."""
-    compiled = njit(**SEMANTICS)(function)
+    compiled = njit(**SEMANTICS, **HOOKS.kernels)(function)
     HOOKS.keep(compiled, function)
     return compiled
 
 
 def helper(function: Callable[..., Any]) -> Any:
     """Compile `function` into the kernels that call it."""
-    return njit(**_AS_PART)(function)
+    return njit(**AS_PART)(function)
 
 
 def written_out(function: Callable[..., Any]) -> Any:
@@ -43,7 +44,7 @@ def written_out(function: Callable[..., Any]) -> Any:
     For the short ones around a call by address, which no optimiser sees through: arrays that are handed on once more on
     their way there are counted again. It takes longer to compile.
     """
-    return njit(inline="always", **_AS_PART)(function)
+    return njit(inline="always", **AS_PART)(function)
 
 
 def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any]) -> Callable[..., Any]:
@@ -56,7 +57,7 @@ def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any
     def choose(bundle: Any, *args: Any) -> Any:
         return (of_kind if isinstance(bundle, kind) else others)(bundle, *args)
 
-    @overload(choose, jit_options=_AS_PART)
+    @overload(choose, jit_options=AS_PART)
     def _typed(bundle, *args):
         is_of_kind = isinstance(bundle, BundleType) and issubclass(bundle.of, kind)
         choice = of_kind if is_of_kind else others
@@ -69,18 +70,24 @@ def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any
     return choose
 
 
-def by_number(real: Callable[..., Any], tangent: Callable[..., Any]) -> Callable[..., Any]:
-    """One function for two kinds of numbers: `tangent` where an argument is complex, `real` where none is.
+def by_number(
+    real: Callable[..., Any], tangent: Callable[..., Any], lanes: Callable[..., Any] | None = None
+) -> Callable[..., Any]:
+    """One function for three kinds of numbers: `tangent` where an argument is complex, `lanes` (by default the same as
+    `real`) where one is a `flexmb.jit.lanes.LaneType`, `real` where all are floats.
 
     Decided by type, while the caller is compiled, like `by_bundle`.
     """
+    of_lanes = real if lanes is None else lanes
 
     def choose(*args: Any) -> Any:
         return (tangent if any(isinstance(x, complex) for x in args) else real)(*args)
 
-    @overload(choose, jit_options=_AS_PART)
+    @overload(choose, jit_options=AS_PART)
     def _typed(*args):
-        choice = tangent if any(isinstance(kind, types.Complex) for kind in args) else real
+        choice = of_lanes if LANE in args else real
+        if any(isinstance(kind, types.Complex) for kind in args):
+            choice = tangent
 
         def call(*args):
             return choice(*args)

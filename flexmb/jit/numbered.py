@@ -3,31 +3,53 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import cache
 from inspect import signature
 from typing import Any
 
-from flexmb.jit.kernel import helper
+from numba.extending import overload
+
+from flexmb.jit.features import has, numbers_of
+from flexmb.jit.kernel import AS_PART
 
 
-def numbered(name: str, functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """A helper that hands its arguments to the one of `functions`, all of one signature, that has the number in front.
+def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
+    """A helper `name(bundle, number, ...)` that hands `...` to the one of `functions`, all of one signature, of this number.
 
-    What is none of their numbers is the first, number 0. The helper is written as one would by hand,
+    Only those whose number n is a feature of the bundle, "<feature> n", are compiled. The helper is written as one
+    would by hand,
 
-        def name(number, q, i):
+        def name(bundle, number, q, i):
             if number == 1:
                 return function_1(q, i)
             ...
-            return function_0(q, i)
+            return function_4(q, i)
 
-    since a closure around the rest of the chain would take arrays as `*arguments`, which are counted again at every
-    link: evaluations of short chains then take an eighth longer.
+    so that one that is alone costs nothing.
     """
-    arguments = ", ".join(signature(functions[0]).parameters)
-    lines = [f"def {name}(number, {arguments}):"]
-    lines += [f"    if number == {n}:\n        return function_{n}({arguments})" for n in range(1, len(functions))]
-    lines += [f"    return function_0({arguments})"]
-    space: dict[str, Any] = {f"function_{n}": function for n, function in enumerate(functions)}
-    space["__name__"] = __name__  # numba looks a cached function's module up
-    exec(compile("\n".join(lines), f"<{name} by number>", "exec"), space)
-    return helper(space[name])
+
+    functions = tuple(functions)
+
+    def choose(bundle: Any, number: int, *arguments: Any) -> Any:
+        if not has(bundle, f"{feature} {number}"):
+            raise ValueError(f"{name}: the bundle has no {feature} {number}")
+        return functions[number](*arguments)
+
+    @cache
+    def written(present: tuple[int, ...]) -> Callable[..., Any]:
+        arguments = ", ".join(signature(functions[0]).parameters)
+        lines = [f"def {name}(bundle, number, {arguments}):"]
+        lines += [f"    if number == {n}:\n        return function_{n}({arguments})" for n in present[:-1]]
+        lines += [f"    return function_{present[-1]}({arguments})"]
+        space: dict[str, Any] = {f"function_{n}": functions[n] for n in present}
+        space["__name__"] = __name__  # numba looks a cached function's module up
+        exec(compile("\n".join(lines), f"<{name} by number>", "exec"), space)
+        call: Callable[..., Any] = space[name]
+        call.__qualname__ = f"{name}.{'_'.join(map(str, present))}"  # part of its symbol
+        return call
+
+    @overload(choose, jit_options=AS_PART, strict=False)  # the written one names the arguments
+    def _typed(bundle, number, *arguments):
+        return written(numbers_of(bundle.features, feature, len(functions)))
+
+    return choose

@@ -14,6 +14,9 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
 from numba.core.typed_passes import NativeLowering
+from numba.core.untyped_passes import RewriteSemanticConstants
+
+from flexmb.jit.features import KnownFeatures
 
 
 class _NoMachineCode:
@@ -46,11 +49,22 @@ class _PartLowering(NativeLowering):
         return bool(super().run_pass(state))
 
 
-class PartCompiler(Compiler):
-    """The default compiler up to the lowering, which leaves a part."""
+class KernelCompiler(Compiler):
+    """The default compiler, which knows the features of bundles before it infers types."""
 
     def define_pipelines(self) -> list[Any]:
-        """The default passes, with the last but one exchanged."""
+        """The default passes and one more."""
+        [manager] = super().define_pipelines()
+        manager.add_pass_after(KnownFeatures, RewriteSemanticConstants)
+        manager.finalize()
+        return [manager]
+
+
+class PartCompiler(KernelCompiler):
+    """The same up to the lowering, which leaves a part."""
+
+    def define_pipelines(self) -> list[Any]:
+        """The passes of a kernel, with the last but one exchanged."""
         [manager] = super().define_pipelines()
         manager.passes = [
             (_PartLowering, text) if which is NativeLowering else (which, text) for which, text in manager.passes

@@ -11,12 +11,13 @@ from functools import cache
 from typing import Any
 
 from numba import types
+from numba.experimental import function_type  # noqa: F401  (how numba sees the type of a `Pointer`)
 from numba.types import WrapperAddressProtocol
 
 from flexmb.jit.bundle import AnyBundle, BundleType
 from flexmb.jit.hooks import HOOKS
 
-REAL, VECTOR, MATRIX = types.float64, types.float64[::1], types.float64[:, ::1]
+REAL, VECTOR, MATRIX, INDEX = types.float64, types.float64[::1], types.float64[:, ::1], types.int64[::1]
 STATUS, NOTHING = types.int64, types.none
 
 

@@ -9,25 +9,26 @@ from flexmb.jit.kernel import helper
 from flexmb.jit.numbered import numbered
 from flexmb.levels import full, linear, rigid, ruthless, stiffened
 from flexmb.levels.level import FidelityLevel
+from flexmb.tables.features import LEVEL
 
 LEVELS: tuple[FidelityLevel, ...] = tuple(module.LEVEL for module in (rigid, ruthless, linear, full, stiffened))
 BY_NAME = {level.name: level for level in LEVELS}
 
-_inertia_and_bias = numbered("inertia_and_bias", [level.inertia_and_bias for level in LEVELS])
-_without_masses = numbered("without_masses", [level.without_masses for level in LEVELS])
+_inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])
+_without_masses = numbered("without_masses", LEVEL, [level.without_masses for level in LEVELS])
 _AT_REST = np.array([level.at_rest for level in LEVELS])
 
 
 @helper
 def body_inertia(c, w, k):
     """M_m and b_m of body k at its level."""
-    _inertia_and_bias(c.body[k].level, c, w, k)
+    _inertia_and_bias(c, c.body[k].level, c, w, k)
 
 
 @helper
 def inertia_without_masses(c, w, k):
     """The same as far as constant modal masses M_ff, eliminated from tables made before the run, ask for it."""
-    _without_masses(c.body[k].level, c, w, k)
+    _without_masses(c, c.body[k].level, c, w, k)
 
 
 @helper

@@ -1,6 +1,7 @@
 """The range of deflections in which a modal field means anything."""
 
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import every, kept
 from flexmb.levels.body import is_at_rest
 
 RANGE = 10.0  # beyond so many body sizes a motion has diverged, and no modal field describes it
@@ -10,7 +11,8 @@ RANGE = 10.0  # beyond so many body sizes a motion has diverged, and no modal fi
 def is_out_of_range(c, w, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
 
-    eta as the level sees it: a ruthless body never leaves its range.
+    eta as the level sees it: a ruthless body never leaves its range. Of lanes: all of them; what goes on of single ones
+    is NaN.
     """
     if c.body[k].modes == 0 or is_at_rest(c.body[k].level):
         return False
@@ -19,10 +21,11 @@ def is_out_of_range(c, w, k):
     diagonal = 0.0
     for n in range(c.body[k].modes):
         diagonal += w.mode[k, n].eta * c.pair[k, n, n].mff * w.mode[k, n].eta
-    if c.body[k].modes * diagonal.real <= limit:  # Cauchy and Schwarz: the sum below is no larger
+    if every(c.body[k].modes * diagonal.real <= limit):  # Cauchy and Schwarz: the sum below is no larger
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
             squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    return squares.real > limit
+    w.mode[k, 0].eta = kept(squares.real <= limit, w.mode[k, 0].eta)
+    return every(squares.real > limit)

@@ -4,11 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
-from flexmb.system.labels import state_names
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -36,7 +34,7 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     state = equations.on_functions(state)
     at, mass, n = equations.variations(state), equations.mass(state), len(free)
     names, units = displacement_names(equations)
-    speeds = [state_names(system)[1][j] for j in free]
+    speeds = [system.state_names[1][j] for j in free]
     driven = _driven(equations)
     B = np.zeros((2 * n, len(driven)))
     B[n:] = np.linalg.solve(mass, np.eye(n)[:, driven])
@@ -56,17 +54,16 @@ def displacement_names(equations: Equations) -> tuple[list[str], list[str]]:
     """Names and units of xi: those of the coordinates, "<hinge>.rotation.x" and "<hinge>.position.x" of quaternions."""
     system = equations.system
     named = [("", "")] * system.nu
-    coordinates = state_names(system)[0]
+    coordinates = system.state_names[0]
     for j, speed in enumerate(equations.constants.speed):
         if speed["coordinate"] >= 0:
             named[j] = coordinates[speed["coordinate"]]
     for name, body in zip(system.body_names, equations.constants.body, strict=True):
         modes = slice(int(body["etad_index"]), int(body["etad_index"] + body["modes"]))
         named[modes] = coordinates[int(body["eta_index"]) : int(body["eta_index"] + body["modes"])]
-        start = quaternion_offset.py_func(int(body["hinge_kind"]))
-        if start >= 0:
+        if body["quaternion"] >= 0:
             hinge = next(hinge.name for hinge in system.scene.hinges if hinge.child == name)
-            labels = _ROTATION if start == 0 else _ROTATION + _POSITION
+            labels = _ROTATION if body["quaternion"] == body["q_index"] else _ROTATION + _POSITION
             j = int(body["u_index"])
             named[j : j + len(labels)] = [(f"{hinge}.{label}", unit) for label, unit in labels]
     chosen = [named[j] for j in equations.free]

@@ -18,7 +18,6 @@ import numpy as np
 
 from flexmb.entry import articulated
 from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
-from flexmb.hinges.catalogue import quaternion_offset
 from flexmb.scene.functions import Constant, Function, Ramp
 from flexmb.scene.schema import Scene
 from flexmb.system.closed import ClosedSystem
@@ -138,12 +137,11 @@ class Equations:
         """(nu,nu) of xi' = du + transport xi: carried axes turn with their own angular velocity."""
         out = np.zeros((len(u), len(u)))
         for body in self.constants.body:
-            start = quaternion_offset.py_func(int(body["hinge_kind"]))
-            if start >= 0:
+            if body["quaternion"] >= 0:
                 j = int(body["u_index"])
                 turning = slice(j, j + 3)
                 out[turning, turning] = -_cross(u[turning])
-                if start > 0:
+                if body["quaternion"] > body["q_index"]:
                     moving = slice(j + 3, j + 6)
                     out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
         return out

@@ -14,7 +14,6 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.linalg import qr
 
 from flexmb.modal.flexible_model import FlexibleModel, SecondOrder, join_second
 from flexmb.typing import Real
@@ -63,6 +62,8 @@ def with_equivalent_masses(model: FlexibleModel) -> FlexibleModel:
 
 def _basis(fields: Real) -> Real:
     """Orthonormal columns that span those of `fields` (points, n), each scaled to unit length first."""
+    from scipy.linalg import qr  # slow to import, and only level stiffened needs it
+
     size = np.linalg.norm(fields, axis=0)
     Q, R, _ = qr(fields[:, size > 0.0] / size[size > 0.0], mode="economic", pivoting=True)
     return np.asarray(Q[:, np.abs(np.diag(R)) > NEGLIGIBLE])

@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 from msgspec.structs import replace
-from scipy.spatial.transform import Rotation
 
 from flexmb.modal.beam import BeamElements, beam_elements
 from flexmb.modal.element_points import Points, axis_points, join, massy_lump, on_axis, section_points, turning_lump
@@ -18,6 +17,7 @@ from flexmb.modal.reduce import beam_modes, damping_matrix
 from flexmb.modal.second_order import beam_second_order
 from flexmb.modal.stations import Lump, Stations, inertia_stations, lumps
 from flexmb.scene.bodies import IDENTITY, BeamBody, ModalBody, Quaternion
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.typing import Real
 
 
@@ -93,7 +93,7 @@ def _nodes(body: BeamBody, elements: BeamElements, columns: Real) -> dict[str, F
         if not 0.0 <= x <= body.length_m:
             raise ValueError(f"beam '{body.name}': node '{name}' at x = {x:g} m is not on [0, {body.length_m:g}] m")
         moved = elements.motion(np.array([x]), columns)[0]
-        turn = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+        turn = rotation_matrix(quaternion)
         second = _second_order(body, elements, columns, np.array([x]), np.zeros((1, 3)))
         of_node = None if second is None else second.map(lambda G: G[0])
         nodes[name] = FlexibleNode(np.array([x, 0.0, 0.0]), turn, moved[:3], moved[3:], of_node)

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import msgspec
 import numpy as np
-from scipy.spatial.transform import Rotation
 
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode, undeforming_node
 from flexmb.modal.raw_second_order import node_second_order, second_order
 from flexmb.scene.bodies import ModalBody, Vector
 from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.typing import Real
 
 
@@ -57,7 +57,7 @@ def _nodes(body: ModalBody, modes: int) -> dict[str, FlexibleNode]:
             )
         nodes[node.name] = FlexibleNode(
             np.array(node.position_m, dtype=float),
-            Rotation.from_quat(node.quaternion, scalar_first=True).as_matrix(),
+            rotation_matrix(node.quaternion),
             _columns(node.translation_modes),
             _columns(node.rotation_modes),
             node_second_order(node) if body.level == "stiffened" else None,

@@ -6,10 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, cholesky, eigh
-from scipy.sparse.csgraph import connected_components
 
 from flexmb.modal.beam import BeamElements
+from flexmb.modal.eigenproblem import eigenpairs, forward, solve_definite
 from flexmb.scene.bodies import Modes
 from flexmb.typing import Real
 
@@ -91,7 +90,7 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     names = list(elements.fields)
     blocks = [elements.coordinates(name) for name in names]
     coupled = np.array([[_coupled(M[a, b], M[a, a], M[b, b]) for b in blocks] for a in blocks])
-    _, label = connected_components(coupled, directed=False)
+    label = _groups(coupled)
     free = np.ones(elements.size, dtype=bool)
     if clamped:
         free[elements.clamped_coordinates()] = False
@@ -109,6 +108,14 @@ def _parts(elements: BeamElements, K: Real, M: Real, clamped: bool) -> list[_Cou
     return parts
 
 
+def _groups(coupled: NDArray[np.bool_]) -> list[int]:
+    """For each family the first one that it is coupled with, directly or by way of others."""
+    label = list(range(len(coupled)))
+    for a, b in np.argwhere(coupled):
+        label = [min(label[a], label[b]) if its in (label[a], label[b]) else its for its in label]
+    return label
+
+
 def _coupled(M_ab: Real, M_aa: Real, M_bb: Real) -> bool:
     """Whether two blocks of the mass matrix are coupled by more than the round-off of a lump's position."""
     return bool(np.abs(M_ab).max() > _ROUND_OFF * np.sqrt(np.abs(M_aa).max() * np.abs(M_bb).max()))
@@ -119,7 +126,7 @@ def _part(index: NDArray[np.intp], K: Real, M: Real, rigid: Real) -> _Coupled:
     if rigid.shape[1] == 0:
         return _Coupled(index, rigid, K, M, M)
     MR = M @ rigid
-    R = np.linalg.solve(cholesky(rigid.T @ MR, lower=True), rigid.T).T
+    R = forward(np.linalg.cholesky(rigid.T @ MR), rigid.T).T
     deflation = M @ R @ R.T @ M
     return _Coupled(index, R, K + np.trace(K) / np.trace(deflation) * deflation, M, M - deflation)
 
@@ -130,8 +137,9 @@ def _eigenmodes(part: _Coupled, count: int) -> list[tuple[float, Real]]:
     wanted = min(count, size)
     if wanted == 0:
         return []
-    compliance, columns = eigh(part.M_elastic, part.A, subset_by_index=[size - wanted, size - 1])
-    return _mass_normalised(compliance[::-1], columns[:, ::-1], part.M)
+    compliance, columns = eigenpairs(part.M_elastic, part.A)
+    highest = slice(None, size - wanted - 1 if wanted < size else None, -1)
+    return _mass_normalised(compliance[highest], columns[:, highest], part.M)
 
 
 def _with_attachment(
@@ -144,13 +152,13 @@ def _with_attachment(
     tip = np.array([elements.mesh.nodes[-1]])
     load = elements.motion(tip, np.eye(elements.size))[0][:, part.index].T
     load = load[:, np.any(load, axis=0)]
-    static = cho_solve(cho_factor(part.A), load)
+    static = solve_definite(part.A, load)
     # The remainder of the static deflections is orthogonal to the eigenmodes, so only the remainder needs reducing.
     known = np.column_stack([part.rigid, *(column for _, column in eigenmodes)])
     for _ in range(2):  # twice is enough (Parlett): the second pass removes the round-off of the first
         static = static - known @ (known.T @ part.M @ static)
     static = static / np.sqrt(np.einsum("im,ij,jm->m", static, part.A, static))
-    compliance, mix = eigh(static.T @ part.M_elastic @ static, static.T @ part.A @ static)
+    compliance, mix = eigenpairs(static.T @ part.M_elastic @ static, static.T @ part.A @ static)
     return eigenmodes + _mass_normalised(compliance[::-1], static @ mix[:, ::-1], part.M)
 
 

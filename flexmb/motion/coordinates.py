@@ -5,15 +5,50 @@ Both algorithms, Jain's recursion and Frisch's matrices, start here.
 """
 
 from flexmb.hinges import catalogue
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.lanes import some
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.scalar import sqrt
+from flexmb.tables.features import (
+    BALL_SPRINGS,
+    DAMPERS,
+    FUNCTIONS,
+    MODES,
+    MOTORS,
+    PRESCRIBED,
+    QUATERNIONS,
+    SPRINGS,
+    WHEELS,
+)
 from flexmb.tables.functions import evaluate
 
 
 @helper
 def load_state(t, y, c, w):
     """Take q and u from y = [q, u, ...], functions of time at t: prescribed coordinates exact, quaternions unit."""
+    nq = w.q.shape[0]
+    for i in range(nq):
+        w.q[i] = y[i]
+    for j in range(w.u.shape[0]):
+        w.u[j] = y[nq + j]
+    if has(c, FUNCTIONS):
+        evaluate_functions(t, c, w)
+    if has(c, PRESCRIBED):
+        for j in range(w.u.shape[0]):
+            f = c.speed[j].prescribed
+            if f >= 0:
+                w.q[c.speed[j].coordinate] = w.function[f, 0]
+                w.u[j] = w.function[f, 1]
+    if has(c, QUATERNIONS):
+        for i in range(nq):
+            w.raw[i] = y[i]
+        normalise_quaternions(w.q, c)
+
+
+@helper
+def evaluate_functions(t, c, w):
+    """Values, rates and accelerations of all functions of time into w.function."""
     for f in range(c.function.shape[0]):
         value, rate, acceleration = evaluate(
             c.function[f].kind, c.function[f].data, c.function[f].start, c.function[f].stop, c.table, t
@@ -21,26 +56,14 @@ def load_state(t, y, c, w):
         w.function[f, 0] = value
         w.function[f, 1] = rate
         w.function[f, 2] = acceleration
-    nq = w.q.shape[0]
-    for i in range(nq):
-        w.raw[i] = y[i]
-        w.q[i] = y[i]
-    for j in range(w.u.shape[0]):
-        w.u[j] = y[nq + j]
-        f = c.speed[j].prescribed
-        if f >= 0:
-            w.q[c.speed[j].coordinate] = w.function[f, 0]
-            w.u[j] = w.function[f, 1]
-    normalise_quaternions(w.q, c)
 
 
 @helper
 def normalise_quaternions(q, c):
     """Scale every hinge quaternion in q to unit length."""
     for k in range(c.body.shape[0]):
-        start = catalogue.quaternion_offset(c.body[k].hinge_kind)
-        if start >= 0:
-            i = c.body[k].q_index + start
+        i = c.body[k].quaternion
+        if i >= 0:
             s = 1.0 / sqrt(q[i] * q[i] + q[i + 1] * q[i + 1] + q[i + 2] * q[i + 2] + q[i + 3] * q[i + 3])
             for n in range(4):
                 q[i + n] *= s
@@ -49,7 +72,15 @@ def normalise_quaternions(q, c):
 @kernel
 def project(t, y, c):
     """Put y back on the configuration manifold: unit quaternions, prescribed coordinates and speeds exact."""
-    normalise_quaternions(y, c)
+    if has(c, QUATERNIONS):
+        normalise_quaternions(y, c)
+    if has(c, PRESCRIBED):
+        _prescribe(t, y, c)
+
+
+@helper
+def _prescribe(t, y, c):
+    """Prescribed coordinates and speeds at the values of their functions."""
     nu = c.speed.shape[0]
     nq = y.shape[0] - nu - 1
     for j in range(nu):
@@ -67,12 +98,14 @@ def configuration_rate(c, w):
     """qdot(q, u) into w.rate; quaternions are taken raw, so that their norm is an invariant of the flow."""
     for k in range(c.body.shape[0]):
         catalogue.rate(
-            c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, w.rate
+            c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, w.rate
         )
-        for n in range(c.body[k].modes):
-            w.rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
-    for i in range(c.wheel.shape[0]):
-        w.rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
+        if has(c, MODES):
+            for n in range(c.body[k].modes):
+                w.rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
+    if has(c, WHEELS):
+        for i in range(c.wheel.shape[0]):
+            w.rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
 
 
 @helper
@@ -91,16 +124,27 @@ def store_slope(c, w, power, dy):
 def hinge_forces(c, w):
     """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
     for j in range(w.u.shape[0]):
-        force = -c.speed[j].damping * w.u[j]
-        i = c.speed[j].coordinate
-        if i >= 0:
-            force -= c.speed[j].stiffness * (w.q[i] - c.speed[j].rest)
-        f = c.speed[j].motor
-        if f >= 0:
-            force += w.function[f, 0]
+        force = 0.0
+        if has(c, DAMPERS):
+            force -= c.speed[j].damping * w.u[j]
+        if has(c, SPRINGS):
+            i = c.speed[j].coordinate
+            if i >= 0:
+                force -= c.speed[j].stiffness * (w.q[i] - c.speed[j].rest)
+        if has(c, MOTORS):
+            f = c.speed[j].motor
+            if f >= 0:
+                force += w.function[f, 0]
         w.speed[j].applied = force
+    if has(c, BALL_SPRINGS):
+        _ball_springs(c, w)
+
+
+@helper
+def _ball_springs(c, w):
+    """Take the torques of isotropic springs of spherical hinges off w.speed.applied."""
     for k in range(c.body.shape[0]):
-        if c.body[k].ball_spring != 0.0:
+        if some(c.body[k].ball_spring != 0.0):
             i = c.body[k].q_index
             theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
             for n in range(3):
@@ -113,10 +157,13 @@ def speed_power(c, w):
     total = 0.0
     for j in range(w.u.shape[0]):
         rate = w.u[j]
-        total -= c.speed[j].damping * rate * rate
-        f = c.speed[j].motor
-        if f >= 0:
-            total += w.function[f, 0] * rate
-        if c.speed[j].prescribed >= 0:
-            total += w.speed[j].drive * rate
+        if has(c, DAMPERS):
+            total -= c.speed[j].damping * rate * rate
+        if has(c, MOTORS):
+            f = c.speed[j].motor
+            if f >= 0:
+                total += w.function[f, 0] * rate
+        if has(c, PRESCRIBED):
+            if c.speed[j].prescribed >= 0:
+                total += w.speed[j].drive * rate
     return total

@@ -1,7 +1,9 @@
 """Coordinates moved by finite increments of the speeds' motion, q o exp(increment): for methods on Lie groups."""
 
 from flexmb.hinges import catalogue
+from flexmb.jit.features import has
 from flexmb.jit.kernel import kernel
+from flexmb.tables.features import QUATERNIONS
 
 
 @kernel
@@ -13,11 +15,11 @@ def move(y, increment, result, c):
     """
     for k in range(c.body.shape[0]):
         i, j = c.body[k].q_index, c.body[k].u_index
-        if catalogue.quaternion_offset(c.body[k].hinge_kind) < 0:  # asking its kind would take an eighth of a step
+        if not has(c, QUATERNIONS) or c.body[k].quaternion < 0:
             for n in range(c.body[k].nv):
                 result[i + n] = y[i + n] + increment[j + n]
         else:
-            catalogue.retract(c.body[k].hinge_kind, y, i, increment, j, result)
+            catalogue.retract(c, c.body[k].hinge_kind, y, i, increment, j, result)
         for n in range(c.body[k].modes):
             i, j = c.body[k].eta_index + n, c.body[k].etad_index + n
             result[i] = y[i] + increment[j]

@@ -32,7 +32,7 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
     """
     if threading.current_thread() is not threading.main_thread():
         return run(*arguments), False
-    done, found = threading.Event(), list[Any]()
+    done, found = _thread.allocate_lock(), list[Any]()  # a lock alone: an Event costs as much as a short run
 
     def work() -> None:
         try:
@@ -40,19 +40,23 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
         except BaseException as problem:
             found.append((None, problem))
         finally:
-            done.set()
+            done.release()
 
+    def wait() -> None:
+        while not found:
+            done.acquire(timeout=PATIENCE)
+
+    done.acquire()
     _thread.start_new_thread(work, ())
     interrupted = False
     try:
-        while not done.wait(PATIENCE):
-            pass
+        wait()
     except KeyboardInterrupt:
         stop[0], interrupted = 1, True
-        done.wait()
+        wait()
     except BaseException:  # of a handler of another signal, an alarm for example
         stop[0] = 1
-        done.wait()
+        wait()
         raise
     result, problem = found[0]
     if problem is not None:

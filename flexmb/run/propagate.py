@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Iterator
+from contextlib import contextmanager
 from time import perf_counter
 from typing import Any, NamedTuple
 
@@ -10,12 +11,15 @@ import numpy as np
 
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
-from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
+from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
-from flexmb.run.switching import switch_times
-from flexmb.system.algorithm import Route
+from flexmb.run.observing import batch
+from flexmb.run.switching import timing_of
+from flexmb.system import algorithms
+from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
@@ -43,20 +47,24 @@ def recursion(constants: Constants, workspace: Any) -> Problem:
 class Integration:
     """An integrator with a problem and a workspace of its own, ready to be called."""
 
-    def __init__(self, route: Route, settings: Settings, exact: Constants, nq: int, nu: int) -> None:
-        """exact: the constants with every body eliminated explicitly, for Jacobians."""
+    def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
-        self._integrator, self._accuracy = settings.integrator, settings.accuracy(nq, nu)
+        self._integrator = integrator
         motion = route.rhs, route.project, constants, self._workspace
-        if self._integrator.linearises:
-            moving = tangent.tangent_workspace(exact, nq, nu)
+        if integrator.linearises:
+            exact = system.constants  # with every body eliminated explicitly, for Jacobians
+            moving = tangent.tangent_workspace(exact, system.nq, system.nu)
             self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
         else:
             self._problem = problem(*motion)
+        batched = algorithm.observing is not None and not system.scene.closures
+        self.batch = batch(system, algorithm.observing, constants, self._workspace) if batched else None
+        """Observes many samples at once."""
+        self.is_compiled = False
 
-    def __call__(self, y: Real, clock: Clock, out: Real, counts: Index) -> tuple[int, float]:
+    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`."""
-        return self._integrator.run(self._problem, y, clock, self._accuracy, out, counts)
+        return self._integrator.run(self._problem, y, clock, accuracy, out, counts)
 
     @property
     def fault(self) -> int:
@@ -64,23 +72,39 @@ class Integration:
         return int(self._workspace.fault[0])
 
 
-def integrate(system: System, route: Route, times: Real, settings: Settings) -> Raw:
-    """Run once over no time at all, which compiles the kernels, and then over the whole time."""
-    initial = system.initial_state
-    ends = np.array([*switch_times(system.scene, times[-1]), times[-1]])
+@contextmanager
+def integration(
+    system: System, algorithm: Algorithm, stabilise: float, integrator: Integrator
+) -> Iterator[Integration]:
+    """One that nobody else uses meanwhile; kept for the next run, but of closed chains, which remember their branch.
 
-    def run(times: Real, ends: Real, call: Callable[..., tuple[Any, bool]]) -> Raw:
-        y, out = np.concatenate([initial.q, initial.u, [0.0]]), np.empty((len(times), system.nq + system.nu + 1))
-        counts = np.zeros(COUNTS, np.int64)
-        begun = perf_counter()
-        solve = Integration(route, settings, system.constants, system.nq, system.nu)
-        start = perf_counter()
-        (status, t), interrupted = call(solve, (y, Clock(times, ends), out, counts), counts[STOP : STOP + 1])
-        end = perf_counter()
-        return Raw(
-            out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), end - begun, end - start,
-            interrupted,
-        )  # fmt: skip
+    ValueError and others for what does not go together: see `System.route`.
+    """
+    route = system.route(algorithm, stabilise)
+    spare: list[Integration] = system.kept.setdefault((Integration, algorithm, integrator.name), [])
+    try:
+        found = spare.pop()
+    except IndexError:
+        found = Integration(system, algorithms.chosen(algorithm), route, integrator)
+    yield found
+    if not system.scene.closures:
+        spare.append(found)
 
-    compiled = run(times[:1], ends[:0], lambda solve, arguments, _: (solve(*arguments), False))
-    return run(times, ends, interruptible)._replace(compile_s=compiled.compile_s)
+
+def integrate(system: System, solve: Integration, times: Real, settings: Settings) -> Raw:
+    """Run over the whole time, and the first time before that over no time at all, which compiles the integrator."""
+    initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
+    ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
+    start = perf_counter()
+    if not solve.is_compiled:
+        nothing = np.empty((1, len(initial.y))), np.zeros(COUNTS, np.int64)
+        solve(initial.y.copy(), Clock(times[:1], ends[:0]), accuracy, *nothing)
+        solve.is_compiled = True
+    out, counts = np.empty((len(times), len(initial.y))), np.zeros(COUNTS, np.int64)
+    begun = perf_counter()
+    given = initial.y, Clock(times, ends), accuracy, out, counts
+    (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
+    end = perf_counter()
+    return Raw(
+        out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), begun - start, end - begun, interrupted
+    )

@@ -12,7 +12,7 @@ from flexmb.typing import Real
 
 OUTPUT_BYTES = 2**32
 """Memory that the outputs of one run may take."""
-_NUMBER_BYTES, _OBJECT_BYTES, _SAMPLE_BYTES = 16, 200, 2000  # evaluated, then gathered; of Python, measured
+_NUMBER_BYTES, _SAMPLE_BYTES = 16, 200  # evaluated in rows, then gathered by name; times and what numpy needs
 _TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
 
 
@@ -46,5 +46,5 @@ def sample_bytes(system: System) -> int:
     """Memory that one output time of a run takes, at most."""
     scene = system.scene
     places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
-    numbers = system.nq + 2 * system.nu + 24 * len(scene.markers) + 6 * places + 11
-    return _NUMBER_BYTES * numbers + _OBJECT_BYTES * (4 * len(scene.markers) + places) + _SAMPLE_BYTES
+    numbers = system.nq + 3 * system.nu + 24 * len(scene.markers) + 6 * places + 11
+    return _NUMBER_BYTES * numbers + _SAMPLE_BYTES

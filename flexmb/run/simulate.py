@@ -15,16 +15,16 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIO
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
-from flexmb.run.propagate import Raw, integrate
+from flexmb.run.observing import Batch, observe
+from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
+from flexmb.run.switching import refuse_end
 from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.check import check_run, check_scene
+from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
-from flexmb.system.labels import state_names
-from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, NotFiniteError, PrecisionWarning
@@ -82,7 +82,7 @@ def simulate(
     _refuse_unknown(settings)
     t_end = _end(t_end)
     if isinstance(scene, System):
-        check_run(scene.scene, t_end)
+        refuse_end(scene, t_end)
     else:
         check_scene(scene, t_end)
     chosen = Settings(method, **settings).checked(t_end)
@@ -92,13 +92,14 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         _refuse_without_jacobian(system, algorithm, method)
-    route, start = system.route(algorithm, stabilise), system.precision(system.initial_state)
-    if start.status != Status.OK:
-        nothing = np.empty((0, system.nq + system.nu + 1))
-        raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
-        return _observed(system, times, raw, algorithm)
-    raw = integrate(system, route, times, chosen)
-    trajectory = _observed(system, times, raw, algorithm)
+    with integration(system, algorithm, stabilise, chosen.integrator) as solve:
+        start = system.start_precision
+        if start.status != Status.OK:
+            nothing = np.empty((0, system.nq + system.nu + 1))
+            raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
+            return _observed(system, times, raw, algorithm, solve.batch)
+        raw = integrate(system, solve, times, chosen)
+        trajectory = _observed(system, times, raw, algorithm, solve.batch)
     if start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
@@ -134,38 +135,29 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm) -> Trajectory:
+def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Batch | None) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
     start = perf_counter()
-    status, stopped_at, seen = raw.status, raw.t, list[Evaluation]()
-    message = _message(system, raw)
-    for t, y in zip(times, raw.states, strict=False):
-        try:
-            seen.append(system.evaluate(t, y[: system.nq], y[system.nq : -1], algorithm))
-        except NotFiniteError as error:  # squares overflow earlier than the state itself
-            if status is Status.OK:
-                status, stopped_at, message = Status.NONFINITE, float(t), f"stopped at t = {t:g} s: {error}"
-            break
-        except DynamicsError as error:  # fixed steps may have jumped over the place where the dynamics ends
-            status, stopped_at, message = Status.NOT_POSITIVE_DEFINITE, float(t), f"stopped at t = {t:g} s: {error}"
-            break
-        except KeyboardInterrupt:
-            status, stopped_at = Status.INTERRUPTED, float(t)
-            message = f"stopped at t = {t:g} s, while outputs were evaluated: {status.advice}"
-            break
-    states = raw.states[: len(seen)]
-    q_names, u_names = state_names(system)
+    rows, trouble = observe(system, algorithm, times, raw.states, batch)
+    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
+    if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
+        status, stopped_at = _why(trouble), float(times[len(rows)])
+        message = f"stopped at t = {stopped_at:g} s" + (
+            f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
+        )
+    states = raw.states[: len(rows)]
+    q_names, u_names = system.state_names
     return Trajectory(
         scene=system.scene.name,
         status=status,
         message=message,
         stopped_at=stopped_at,
-        t=times[: len(seen)],
+        t=times[: len(rows)],
         q=states[:, : system.nq],
         u=states[:, system.nq : -1],
         q_names=q_names,
         u_names=u_names,
-        **gathered(seen, [marker.name for marker in system.scene.markers]),
+        **gathered(system._observation, rows),
         work=states[:, -1],
         statistics=Statistics(
             evaluations=raw.counts[EVALUATIONS],
@@ -178,6 +170,14 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm) -> Tr
             output_s=perf_counter() - start,
         ),
     )
+
+
+def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
+    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
+    the place where the dynamics ends."""
+    if isinstance(trouble, KeyboardInterrupt):
+        return Status.INTERRUPTED
+    return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
 def _message(system: System, raw: Raw) -> str:

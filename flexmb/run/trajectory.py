@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from flexmb.system.observables import ENERGIES, Evaluation, MarkerMotion
+from flexmb.scene.quaternions import quaternion_of
+from flexmb.system.observables import ENERGIES, Observation
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -142,26 +142,31 @@ class Trajectory:
         return write_plots(self, Path(folder))
 
 
-def gathered(seen: Sequence[Evaluation], markers: Iterable[str]) -> dict[str, Any]:
-    """Fields of a `Trajectory` that are what was observed at each of its times."""
-    first = seen[0] if seen else None
-    found: dict[str, Any] = {
-        "markers": {name: _marker_path([each.markers[name] for each in seen]) for name in markers},
-        "energy": {kind: np.array([each.energy[kind] for each in seen]) for kind in ENERGIES},
-        "momentum": np.array([each.momentum for each in seen]).reshape(-1, 6),
+def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
+    """Fields of a `Trajectory` that are what was observed, in rows (T,width)."""
+    names, found = observation.names, observation.columns_of(rows)
+    return {
+        "markers": {name: _marker_path(found["markers"][:, i]) for i, name in enumerate(names.markers)},
+        "loads": _by_name(names.hinges, found["loads"]) | _by_name(names.closures, found["closures"]),
+        "wheel_loads": _by_name(names.wheels, found["wheel_loads"]),
+        "drives": {name: found["drives"][:, places] for name, places in names.driven.items()},
+        "energy": _by_name(ENERGIES, found["energy"]),
+        "momentum": found["momentum"].copy(),
     }
-    for key in ("loads", "wheel_loads", "drives"):
-        names = getattr(first, key) if first else ()
-        found[key] = {name: np.array([getattr(each, key)[name] for each in seen]) for name in names}
-    return found
 
 
-def _marker_path(motions: Sequence[MarkerMotion]) -> MarkerPath:
+def _by_name(names: Sequence[str], values: Real) -> dict[str, Real]:
+    """Of (T,n) or (T,n,k)."""
+    return {name: values[:, i].copy() for i, name in enumerate(names)}
+
+
+def _marker_path(rows: Real) -> MarkerPath:
+    """Of rows (T,24) as `Outputs` has them."""
     return MarkerPath(
-        position=np.array([m.position for m in motions]).reshape(-1, 3),
-        quaternion=_continuous_quaternions(np.array([m.rotation for m in motions]).reshape(-1, 3, 3)),
-        velocity=np.array([m.velocity for m in motions]).reshape(-1, 6),
-        acceleration=np.array([m.acceleration for m in motions]).reshape(-1, 6),
+        position=rows[:, :3].copy(),
+        quaternion=_continuous_quaternions(rows[:, 3:12].reshape(-1, 3, 3)),
+        velocity=rows[:, 12:18].copy(),
+        acceleration=rows[:, 18:24].copy(),
     )
 
 
@@ -169,7 +174,7 @@ def _continuous_quaternions(rotations: Real) -> Real:
     """Scalar-first quaternions of (T,3,3) rotations, each with the sign that is closer to the one before."""
     if not len(rotations):
         return np.empty((0, 4))
-    quaternions = Rotation.from_matrix(rotations).as_quat(canonical=True, scalar_first=True)
+    quaternions = quaternion_of(rotations)
     turns = np.sum(quaternions[1:] * quaternions[:-1], axis=1) < 0.0
     return quaternions * np.cumprod(np.r_[1.0, np.where(turns, -1.0, 1.0)])[:, None]
 

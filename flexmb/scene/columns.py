@@ -1,4 +1,4 @@
-"""Many structs at once: those of one kind together, the values of a key as an array, their quaternions as matrices.
+"""Many structs at once: those of one kind together, the values of a key as an array.
 
 What looks at a scene of 10^5 bodies has no time to look at one value after another.
 """
@@ -88,14 +88,3 @@ def _holds(node: inspect.Type, wanted: Callable[[inspect.Type], bool]) -> bool:
         case inspect.VarTupleType(item_type=each):
             return _holds(each, wanted)
     return wanted(node)
-
-
-def rotation_matrices(quaternions: Real) -> Real:
-    """(n,3,3) of scalar-first quaternions (n,4), which are scaled to unit length."""
-    w, x, y, z = (quaternions / np.linalg.norm(quaternions, axis=1)[:, None]).T
-    rows = [
-        1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y),
-        2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x),
-        2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y),
-    ]  # fmt: skip
-    return np.stack(rows, axis=-1).reshape(-1, 3, 3)

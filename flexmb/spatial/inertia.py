@@ -9,6 +9,8 @@ from flexmb.spatial.vector import (
     add9,
     mat3,
     rotate_mat,
+    rotate_plane,
+    rotate_rows,
     rotate_sym,
     store3,
     store9,
@@ -17,6 +19,7 @@ from flexmb.spatial.vector import (
     sym_times,
     times,
     times_t,
+    transpose,
 )
 
 
@@ -79,6 +82,18 @@ def rigid_inertia(m, s, j):
 def rotate_inertia(r, p):
     """Components in axes A from components in axes B with r = R_AB."""
     return rotate_sym(r, p[0]), rotate_mat(r, p[1]), rotate_sym(r, p[2])
+
+
+@helper
+def rotate_without(r, p, row):
+    """The same of an inertia whose row and column 2 (rotation about z) or 5 (displacement along z) vanish.
+
+    They are not read.
+    """
+    a, b, c = p
+    if row == 2:
+        return rotate_plane(r, a), rotate_rows(r, b), rotate_sym(r, c)
+    return rotate_sym(r, a), transpose(rotate_rows(r, transpose(b))), rotate_plane(r, c)
 
 
 @helper

@@ -1,23 +1,34 @@
 """Rotations: quaternions, rotation vectors, their rates. R_AB maps components in B to components in A."""
 
-from flexmb.jit.kernel import helper
-from flexmb.spatial.scalar import atan2, cos, sin, sqrt
+from flexmb.jit.kernel import by_number, helper
+from flexmb.jit.lanes import every, select
+from flexmb.spatial.scalar import atan2, sincos, sqrt
 from flexmb.spatial.vector import add, cross, dot, scale
+
+_SMALL = 0.25  # square of the angle below which series are taken
 
 
 @helper
 def rotation_z(angle):
     """Rotation by `angle` about z."""
-    c = cos(angle)
-    s = sin(angle)
+    s, c = sincos(angle)
     return c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0
+
+
+@helper
+def turned_about_z(m, c, s):
+    """M R_z, by cosine and sine of the angle."""
+    return (
+        c * m[0] + s * m[1], c * m[1] - s * m[0], m[2],
+        c * m[3] + s * m[4], c * m[4] - s * m[3], m[5],
+        c * m[6] + s * m[7], c * m[7] - s * m[6], m[8],
+    )  # fmt: skip
 
 
 @helper
 def rotation_axis(axis, angle):
     """Rotation by `angle` about coordinate axis 0, 1 or 2."""
-    c = cos(angle)
-    s = sin(angle)
+    s, c = sincos(angle)
     if axis == 0:
         return 1.0, 0.0, 0.0, 0.0, c, -s, 0.0, s, c
     if axis == 1:
@@ -57,47 +68,77 @@ def quaternion_rate(w, x, y, z, omega):
 def rotation_vector(w, x, y, z):
     """Rotation vector of a unit quaternion, angle in [0, pi]."""
     s2 = x * x + y * y + z * z
-    sign = 1.0 if w.real >= 0.0 else -1.0
-    if s2.real < 1e-16:
-        # 2 atan(s)/s -> 2 (1 - s^2/3): the correction is below round-off here, and s has no derivative at 0
+    sign = select(w.real >= 0.0, 1.0, -1.0)
+    small = s2.real < 1e-16
+    # 2 atan(s)/s -> 2 (1 - s^2/3): the correction is below round-off here, and s has no derivative at 0
+    if every(small):
         return scale(2.0 * sign, (x, y, z))
     s = sqrt(s2)
-    return scale(2.0 * sign * atan2(s, sign * w) / s, (x, y, z))
+    return scale(select(small, 2.0 * sign, 2.0 * sign * atan2(s, sign * w) / s), (x, y, z))
 
 
 @helper
-def exponential_coefficients(t2):
-    """a1 = sin t/t, a2 = (1 - cos t)/t^2, a3 = (t - sin t)/t^3, and b2 = a2'/t, b3 = a3'/t, from t^2.
+def _series(t2):
+    """`exponential_coefficients` by series: the closed forms cancel at small angles.
 
-    Below t = 0.5 by series (the closed forms cancel there; the first term left out is below 1e-14 of the value
-    for b2, b3 and below 1e-17 for the others), above it in closed form.
+    The first term left out is below 1e-14 of the value for b2, b3 and below 1e-17 for the others.
     """
-    if t2.real < 0.25:
-        a1 = 1.0
-        a2 = 1.0
-        a3 = 1.0
-        for k in range(8, 0, -1):  # Horner: sum over k of m! (-t2)^k / (2k + m)!, m = 1, 2, 3
-            n = 2.0 * k
-            a1 = 1.0 - t2 / (n * (n + 1.0)) * a1
-            a2 = 1.0 - t2 / ((n + 1.0) * (n + 2.0)) * a2
-            a3 = 1.0 - t2 / ((n + 2.0) * (n + 3.0)) * a3
-        a2 *= 0.5
-        a3 /= 6.0
-        b2 = -1.0 / 12.0 + t2 * (
-            1.0 / 180.0 - t2 * (1.0 / 6720.0 - t2 * (1.0 / 453600.0 - t2 * (1.0 / 47900160.0 - t2 / 7264857600.0)))
-        )
-        b3 = -1.0 / 60.0 + t2 * (
-            1.0 / 1260.0
-            - t2 * (1.0 / 60480.0 - t2 * (1.0 / 4989600.0 - t2 * (1.0 / 622702080.0 - t2 / 108972864000.0)))
-        )
-        return a1, a2, a3, b2, b3
+    a1 = 1.0
+    a2 = 1.0
+    a3 = 1.0
+    for k in range(8, 0, -1):  # Horner: sum over k of m! (-t2)^k / (2k + m)!, m = 1, 2, 3
+        n = 2.0 * k
+        a1 = 1.0 - t2 / (n * (n + 1.0)) * a1
+        a2 = 1.0 - t2 / ((n + 1.0) * (n + 2.0)) * a2
+        a3 = 1.0 - t2 / ((n + 2.0) * (n + 3.0)) * a3
+    a2 *= 0.5
+    a3 /= 6.0
+    b2 = -1.0 / 12.0 + t2 * (
+        1.0 / 180.0 - t2 * (1.0 / 6720.0 - t2 * (1.0 / 453600.0 - t2 * (1.0 / 47900160.0 - t2 / 7264857600.0)))
+    )
+    b3 = -1.0 / 60.0 + t2 * (
+        1.0 / 1260.0 - t2 * (1.0 / 60480.0 - t2 * (1.0 / 4989600.0 - t2 * (1.0 / 622702080.0 - t2 / 108972864000.0)))
+    )
+    return a1, a2, a3, b2, b3
+
+
+@helper
+def _closed(t2):
+    """`exponential_coefficients` in closed form."""
     t = sqrt(t2)
-    s = sin(t)
-    c = cos(t)
+    s, c = sincos(t)
     a1 = s / t
     a2 = (1.0 - c) / t2
     a3 = (t - s) / (t2 * t)
     return a1, a2, a3, (s / t - 2.0 * a2) / t2, ((1.0 - c) / t2 - 3.0 * a3) / t2
+
+
+@helper
+def _one_form(t2):
+    if t2.real < _SMALL:
+        return _series(t2)
+    return _closed(t2)
+
+
+@helper
+def _both_forms(t2):
+    """Of lanes, each with the form that its angle asks for."""
+    small = t2 < _SMALL
+    near = _series(t2)
+    if every(small):
+        return near
+    far = _closed(t2)
+    return (
+        select(small, near[0], far[0]),
+        select(small, near[1], far[1]),
+        select(small, near[2], far[2]),
+        select(small, near[3], far[3]),
+        select(small, near[4], far[4]),
+    )
+
+
+# a1 = sin t/t, a2 = (1 - cos t)/t^2, a3 = (t - sin t)/t^3, and b2 = a2'/t, b3 = a3'/t, from t^2
+exponential_coefficients = by_number(_one_form, _one_form, _both_forms)
 
 
 @helper

@@ -174,6 +174,40 @@ def rotate_mat(r, m):
 
 
 @helper
+def rotate_plane(r, s):
+    """R S R' for a symmetric 6-tuple S whose row and column z vanish, and are not read."""
+    xx, yy, xy = s[0], s[1], s[3]
+    ax, ay = r[0] * xx + r[1] * xy, r[0] * xy + r[1] * yy
+    bx, by = r[3] * xx + r[4] * xy, r[3] * xy + r[4] * yy
+    cx, cy = r[6] * xx + r[7] * xy, r[6] * xy + r[7] * yy
+    return (
+        ax * r[0] + ay * r[1],
+        bx * r[3] + by * r[4],
+        cx * r[6] + cy * r[7],
+        ax * r[3] + ay * r[4],
+        ax * r[6] + ay * r[7],
+        bx * r[6] + by * r[7],
+    )
+
+
+@helper
+def rotate_rows(r, m):
+    """R M R' for a matrix M whose row z vanishes, and is not read."""
+    x, y = times(r, (m[0], m[1], m[2])), times(r, (m[3], m[4], m[5]))
+    return (
+        r[0] * x[0] + r[1] * y[0],
+        r[0] * x[1] + r[1] * y[1],
+        r[0] * x[2] + r[1] * y[2],
+        r[3] * x[0] + r[4] * y[0],
+        r[3] * x[1] + r[4] * y[1],
+        r[3] * x[2] + r[4] * y[2],
+        r[6] * x[0] + r[7] * y[0],
+        r[6] * x[1] + r[7] * y[1],
+        r[6] * x[2] + r[7] * y[2],
+    )
+
+
+@helper
 def store3(a, i, v):
     a[i] = v[0]
     a[i + 1] = v[1]

@@ -12,7 +12,6 @@ from flexmb.typing import Real
 
 if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
-    from flexmb.entry.observation import Outputs
 
 Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_printed"]
 """Names of the algorithms, for type checkers: a test holds them to the list."""
@@ -30,20 +29,26 @@ class Route(NamedTuple):
 class DynamicsAlgorithm:
     """A way from a state to its accelerations, and what it can do besides.
 
-    All functions take y = [q, u, work] and raise DynamicsError where there are no accelerations.
+    `observe` takes y = [q, u, work] and raises DynamicsError where there are no accelerations.
     """
 
     name: Algorithm
     summary: str
     """What it is, in one line."""
-    accelerations: Callable[[Mechanics, float, Real], Real]
-    """udot (nu,) of a tree."""
-    observe: Callable[[Mechanics, float, Real, Outputs], None]
-    """Fills everything observable of a tree."""
-    kernel: Callable[[Mechanics], tuple[Any, tuple[Any, ...]]]
-    """The kernel of the accelerations, and fresh tables that it takes after t and y."""
+    kernel: Callable[[], Any]
+    """Gives the kernel of a tree's accelerations: of t, y and tables, the second of which is a workspace. It leaves
+    udot in w.speed.acceleration and returns a status code."""
+    own: Callable[[Mechanics], tuple[Any, ...]]
+    """These tables with the system's workspace."""
+    fresh: Callable[[Mechanics], tuple[Any, ...]]
+    """The same with a workspace of their own."""
+    observe: Callable[[Mechanics, float, Real], None]
+    """Fills everything observable of a tree, the system's `Outputs`."""
     route: Callable[[Mechanics], Route] | None = None
     """For runs of trees; None where it is for single states."""
+    observing: Any = None
+    """The kernel that observes a tree, of t, y, tables as `route` makes them, and `Outputs`; it returns a status code.
+    None where Python stands between several."""
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
     """For closed chains; None where it knows trees only."""
     jacobian: bool = False

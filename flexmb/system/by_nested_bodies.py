@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-from flexmb.entry.observation import Outputs
-from flexmb.frisch import evaluation
 from flexmb.frisch.errata import AS_PRINTED, CORRECTED
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -14,34 +12,35 @@ from flexmb.typing import Real
 
 
 def _declared(name: Algorithm, summary: str, **more: Any) -> DynamicsAlgorithm:
-    def accelerations(system: Mechanics, t: float, y: Real) -> Real:
-        nested = system.nested(name)
-        status, rates = nested.accelerations(t, y)
-        system._check(status, nested.fault)
-        system._trust(t, y, nested)
-        return rates
+    def kernel() -> Any:
+        from flexmb.frisch import evaluation  # who uses the recursion waits for none of it
 
-    def observe(system: Mechanics, t: float, y: Real, out: Outputs) -> None:
+        return evaluation.accelerations
+
+    def own(system: Mechanics) -> tuple[Any, Any]:
         nested = system.nested(name)
+        return nested.constants, nested.own_workspace
+
+    def fresh(system: Mechanics) -> tuple[Any, Any]:
+        nested = system.nested(name)
+        return nested.constants, nested.workspace()
+
+    def observe(system: Mechanics, t: float, y: Real) -> None:
+        nested, out = system.nested(name), system._out
         status, motion = nested.motion(t, y)
         system._check(status, nested.fault)
         system._trust(t, y, nested)
         out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.loads
-        system._observe_motion(t, y, out)
+        system._observe_motion(t, y)
         out.wheel_loads[:, :3] = motion.wheel_torques
 
-    def tables(system: Mechanics) -> tuple[Any, Any]:
-        nested = system.nested(name)
-        return nested.constants, nested.workspace()
-
     def route(system: Mechanics) -> Route:
-        system.nested(name)  # refused here, not in the run
-        return Route(lambda: tables(system), evaluation.rhs, coordinates.project)
+        from flexmb.frisch import evaluation
 
-    return DynamicsAlgorithm(
-        name, summary, accelerations, observe,
-        kernel=lambda system: (evaluation.accelerations, tables(system)), route=route, **more,
-    )  # fmt: skip
+        system.nested(name)  # refused here, not in the run
+        return Route(lambda: fresh(system), evaluation.rhs, coordinates.project)
+
+    return DynamicsAlgorithm(name, summary, kernel, own, fresh, observe, route=route, **more)
 
 
 FRISCH = _declared("frisch", "the nested-body equations of 1975, corrected", errata=CORRECTED)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from flexmb.entry import articulated
-from flexmb.entry.observation import Outputs, observe
+from flexmb.entry.observation import observe
 from flexmb.motion import coordinates
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
@@ -16,25 +16,20 @@ if TYPE_CHECKING:
     from flexmb.closure.closures import ClosedMotion, Closures
 
 
-def _accelerations(system: Mechanics, t: float, y: Real) -> Real:
-    c, w = system.recursion_constants, system._recursion_w
-    status = articulated.accelerations(t, y, c, w)
-    if status != OK:
-        system._check(status, int(w.fault[0]))
-    system._trust(t, y, w)
-    return w.speed["acceleration"].copy()
+def _own(system: Mechanics) -> tuple[Any, Any]:
+    return system.recursion_constants, system._recursion_w
 
 
-def _observe(system: Mechanics, t: float, y: Real, out: Outputs) -> None:
-    c, w = system.recursion_constants, system._recursion_w
-    status = observe(t, y, c, w, out)
-    if status != OK:
-        system._check(status, int(w.fault[0]))
-    system._trust(t, y, w)
-
-
-def _tables(system: Mechanics) -> tuple[Any, Any]:
+def _fresh(system: Mechanics) -> tuple[Any, Any]:
     return system.recursion_constants, system.recursion_workspace()
+
+
+def _observe(system: Mechanics, t: float, y: Real) -> None:
+    w = system._recursion_w
+    status = system._observe_recursion(t, y)
+    if status != OK:
+        system._check(status, int(w.fault[0]))
+    system._trust(t, y, w)
 
 
 def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
@@ -44,10 +39,12 @@ def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
 ALGORITHM = DynamicsAlgorithm(
     "articulated",
     "the O(N) recursion",
-    _accelerations,
+    lambda: articulated.accelerations,
+    _own,
+    _fresh,
     _observe,
-    kernel=lambda system: (articulated.accelerations, _tables(system)),
-    route=lambda system: Route(lambda: _tables(system), articulated.rhs, coordinates.project),
+    route=lambda system: Route(lambda: _fresh(system), articulated.rhs, coordinates.project),
+    observing=observe,
     closed_motion=_closed_motion,
     jacobian=True,
 )

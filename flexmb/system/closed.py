@@ -16,6 +16,7 @@ from flexmb.closure.tables import Closed
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.evaluator import Evaluator
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -31,9 +32,7 @@ class ClosedSystem(System):
         super().__init__(scene)
         own = closure_constants(scene, self.constants, self._closure_ports)
         slowest = slowest_mode(self._links)
-        self.closures = Closures(
-            scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check
-        )
+        self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
         self._start: State | None = None
 
     @property
@@ -57,6 +56,12 @@ class ClosedSystem(System):
         t, y = self.layout.entering(state)
         return finite_result(self._motion(t, y, algorithm).accelerations, t)
 
+    def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
+        """Evaluators are of trees."""
+        raise NotImplementedError(
+            f'scene "{self.scene.name}" has closures, and an evaluator is for trees: use accelerations(state)'
+        )
+
     def _motion(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
         found = self._on_chains(algorithm)(self.closures, t, y)
         self._trust(t, y, self.closures)
@@ -73,12 +78,21 @@ class ClosedSystem(System):
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""
-        motion, out = self._motion(t, y, algorithm), self._observation.out
-        out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
-        self._observe_motion(t, y, out)
+        closures = self._observe(t, y, algorithm)
         found = self._observation.evaluation(t)
-        closures = zip(self.scene.closures, finite_result(motion.closures, t), strict=True)
-        return replace(found, loads=found.loads | {closure.name: load for closure, load in closures})
+        loads = zip(self._observation.names.closures, finite_result(closures, t), strict=True)
+        return replace(found, loads=found.loads | dict(loads))
+
+    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+        """As of a tree, with the loads of closures."""
+        self._observation.fill(row, t, self._observe(t, y, algorithm))
+
+    def _observe(self, t: float, y: Real, algorithm: Algorithm) -> Real:
+        """Fills the outputs; loads (C,6) of closures."""
+        motion, out = self._motion(t, y, algorithm), self._out
+        out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
+        self._observe_motion(t, y)
+        return motion.closures
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
-from flexmb.system.tree_system import System
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
 
 Names = tuple[tuple[str, str], ...]
 
 
-def state_names(system: System) -> tuple[Names, Names]:
+def names_of_states(system: System) -> tuple[Names, Names]:
     """((name, unit) of every entry of q, the same of u)."""
     scene = system.scene
     q, u = [("", "")] * system.nq, [("", "")] * system.nu

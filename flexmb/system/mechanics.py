@@ -4,17 +4,18 @@ from __future__ import annotations
 
 import warnings
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
-from flexmb.entry.observation import Outputs, observe_motion
-from flexmb.frisch.nested_system import NestedSystem
+from flexmb.entry.observation import Outputs, observe, observe_motion
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
+from flexmb.jit.direct import Direct, direct
+from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants, Workspace
@@ -22,6 +23,10 @@ from flexmb.tables.state import DynamicsError, Layout, PrecisionWarning, State, 
 from flexmb.tables.status import OK, Status
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem
+    from flexmb.system.evaluator import Evaluator
 
 FEW_DIGITS = 4.0  # below it `PrecisionWarning` says so
 
@@ -77,10 +82,10 @@ class Mechanics:
     nu: int
     _w: Workspace
     _recursion_w: Workspace
+    _out: Outputs
 
     def __init__(self) -> None:
         self._matrices: Matrices | None = None
-        self._held: tuple[Constants, Workspace] | None = None
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -89,6 +94,14 @@ class Mechanics:
 
     def nested(self, algorithm: Any = "frisch") -> NestedSystem:
         """Frisch's equations of this scene."""
+        raise NotImplementedError
+
+    def evaluator(self, algorithm: Any = "articulated") -> Evaluator:
+        """Of an algorithm, with a workspace of its own."""
+        raise NotImplementedError
+
+    def _evaluator(self, algorithm: Any) -> Evaluator:
+        """Of an algorithm that there is, with this system's workspace."""
         raise NotImplementedError
 
     def workspace(self) -> Workspace:
@@ -107,7 +120,7 @@ class Mechanics:
         """M (nu,nu), by composite bodies."""
         t, y = self.layout.entering(state)
         M = np.empty((self.nu, self.nu))
-        composite.mass_matrix(t, y, self.constants, self._w, self._places(), M)
+        self._fill_mass_matrix(t, y, M)
         return finite_result(M, t)
 
     def factorise(self, state: State) -> MassMatrixFactors:
@@ -165,10 +178,8 @@ class Mechanics:
         t, y = self.layout.entering(state)
         used = np.where(self._is_modal, 0.0, arguments.vector("accelerations", accelerations, self.nu))
         rates = self.layout.rates("accelerations", used)
-        if self._held is None:
-            self._held = held_hinges(self.constants, self.workspace())
-        held, w = self._held
-        self._check(consistent_accelerations(t, y, rates, self.constants, held, w), int(w.fault[0]))
+        *_, held, w = self._held.held
+        self._check(self._held(t, y, rates), int(w.fault[0]))
         self._trust(t, y, w, held)
         rates = w.speed["acceleration"].copy()
         return ConsistentMotion(rates, self.inverse_dynamics(state, rates))
@@ -176,7 +187,7 @@ class Mechanics:
     def applied(self, state: State) -> Real:
         """Hinge springs, dampers and motors (nu,): the tau that M udot + c of the free motion equals."""
         t, y = self.layout.entering(state)
-        self._check(articulated.accelerations(t, y, self.constants, self._w))
+        self._check(self._accelerate(t, y))
         return finite_result(self._w.speed["applied"].copy(), t)
 
     def fault_name(self, status: int, fault: int) -> str:
@@ -186,17 +197,50 @@ class Mechanics:
     def _inverse(self, t: float, y: Real, rates: Real) -> tuple[Real, Real]:
         """tau (nu,), and the loads (N,6) that the hinges then transmit, World axes."""
         tau, loads = np.zeros(self.nu), np.zeros((len(self.constants.body), 6))
-        articulated.inverse_dynamics(t, y, rates, self.constants, self._w, tau, loads)
+        self._invert(t, y, rates, tau, loads)
         return tau, loads
 
-    def _observe_motion(self, t: float, y: Real, out: Outputs) -> None:
-        """Markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
-        observe_motion(t, y, self.constants, self._w, out)
-
-    def _observe_forced(self, t: float, y: Real, out: Outputs) -> None:
-        """The same, and the loads of hinges by inverse dynamics."""
+    def _observe_rates(self, t: float, y: Real, algorithm: str) -> None:
+        """Everything observable with the accelerations of an algorithm, and the loads of hinges by inverse dynamics."""
+        rates, out = self._evaluator(algorithm)(t, y[: self.nq], y[self.nq : -1]), self._out
+        out.rates[:], out.drives[:] = rates, self._w.speed["drive"]
         out.loads[:] = self._inverse(t, y, out.rates)[1]
-        self._observe_motion(t, y, out)
+        self._observe_motion(t, y)
+
+    # Kernels with the tables that they are called with, found when first asked for: that compiles them
+
+    @cached_property
+    def _observe_recursion(self) -> Direct:
+        """(t, y): everything observable by the recursion; a status code."""
+        return direct(observe, STATUS, REAL, VECTOR, self.recursion_constants, self._recursion_w, self._out)
+
+    @cached_property
+    def _observe_motion(self) -> Direct:
+        """(t, y): markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
+        return direct(observe_motion, NOTHING, REAL, VECTOR, self.constants, self._w, self._out)
+
+    @cached_property
+    def _accelerate(self) -> Direct:
+        """(t, y): the recursion with every body eliminated explicitly; a status code."""
+        return direct(articulated.accelerations, STATUS, REAL, VECTOR, self.constants, self._w)
+
+    @cached_property
+    def _invert(self) -> Direct:
+        """(t, y, rates, tau, loads)."""
+        return direct(
+            articulated.inverse_dynamics, NOTHING, REAL, VECTOR, VECTOR, self.constants, self._w, VECTOR, MATRIX
+        )
+
+    @cached_property
+    def _fill_mass_matrix(self) -> Direct:
+        """(t, y, M)."""
+        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, self.constants, self._w, self._places(), MATRIX)
+
+    @cached_property
+    def _held(self) -> Direct:
+        """(t, y, rates): accelerations with every hinge and wheel held at `rates`; a status code."""
+        tables = held_hinges(self.constants, self.workspace())
+        return direct(consistent_accelerations, STATUS, REAL, VECTOR, VECTOR, self.constants, *tables)
 
     def _places(self) -> Matrices:
         """Made when first asked for: they are as large as the mass matrix."""
@@ -249,7 +293,9 @@ class Mechanics:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""
         if status != OK:
             place = self.fault_name(status, int(self._w.fault[0]) if fault is None else fault)
-            raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error = DynamicsError(Status(status).advice.format(body=f'"{place}"'))
+            error.status = Status(status)
+            raise error
 
 
 def _owner(c: Constants, speed: int) -> int:

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial.transform import Rotation
 
-from flexmb.entry.observation import outputs, parts, places, shapes
+from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
+from flexmb.scene.quaternions import quaternion_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
 
@@ -27,7 +27,7 @@ class MarkerMotion:
     @property
     def quaternion(self) -> Real:
         """Scalar first, unit."""
-        return Rotation.from_matrix(self.rotation).as_quat(scalar_first=True, canonical=True)
+        return quaternion_of(self.rotation)
 
 
 @dataclass(frozen=True)
@@ -50,11 +50,12 @@ class Evaluation:
 
 @dataclass(frozen=True)
 class Names:
-    """Of what is observed: (body, port) of markers; hinges and wheels in order; places in u of what is driven."""
+    """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven."""
 
     markers: dict[str, tuple[int, int]]
     hinges: Sequence[str]
     wheels: Sequence[str]
+    closures: Sequence[str]
     driven: dict[str, Index]
 
 
@@ -64,12 +65,35 @@ class Observation:
     def __init__(self, names: Names, speeds: int) -> None:
         of = shapes(speeds, len(names.markers), len(names.hinges), len(names.wheels))
         at = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
-        self._names, self._places = names, places(of)
-        self.out = outputs(of, at[:, 0].copy(), at[:, 1].copy())
+        self.names, self._shapes, self._at = names, of, (at[:, 0].copy(), at[:, 1].copy())
+        self._places = places(of)
+        self.columns = places(of | {"drives": (speeds,), "closures": (len(names.closures), 6)})
+        """Where each part of a row lies: what `out.every` has, then drives and the loads of closures."""
+        self.width = max(place.stop for place, _ in self.columns.values())
+        """Of a row."""
+        self.out = self.outputs()
+
+    def outputs(self) -> Outputs:
+        """Fresh arrays of the same kind."""
+        return outputs(self._shapes, *self._at)
+
+    def fill(self, row: Real, t: float, closures: Real) -> None:
+        """Copy what was filled last, and the loads (C,6) of closures, into a row (width,).
+
+        DynamicsError where a number is not finite.
+        """
+        every = len(self.out.every)
+        row[:every] = finite_result(self.out.every, t)
+        row[every : every + len(self.out.drives)] = self.out.drives
+        row[every + len(self.out.drives) :] = finite_result(closures, t).ravel()
+
+    def columns_of(self, rows: Real) -> dict[str, Real]:
+        """Parts of rows (T,width) by the names in `columns`, (T, ...) each, which are views."""
+        return {name: rows[:, place].reshape(len(rows), *shape) for name, (place, shape) in self.columns.items()}
 
     def evaluation(self, t: float) -> Evaluation:
         """A copy of what was filled last; DynamicsError where a number is not finite."""
-        names, found = self._names, parts(finite_result(self.out.every, t).copy(), self._places)
+        names, found = self.names, parts(finite_result(self.out.every, t).copy(), self._places)
         return Evaluation(
             accelerations=found["rates"],
             markers={

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,18 +21,26 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.frisch.nested_system import NestedSystem, Partitions
+from flexmb.entry.observation import free_loads
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
-from flexmb.jain.operators import Operators, SpatialOperators
+from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
-from flexmb.system import algorithms
+from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
-from flexmb.system.mechanics import Mechanics
+from flexmb.system.evaluator import Evaluator
+from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem, Partitions
+    from flexmb.jain.operators import Operators, SpatialOperators
+    from flexmb.system.batch import Batch, BatchAccelerations
+
+_NO_CLOSURES = np.zeros((0, 6))
 
 
 class System(Mechanics):
@@ -51,10 +60,20 @@ class System(Mechanics):
         self.recursion_constants = with_elimination(self.constants, elimination)
         self._recursion_w = self.recursion_workspace()
         hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
-        self._observation = Observation(Names(markers, hinges, wheels, self._driven([*hinges, *wheels])), self.nu)
+        closures, driven = [closure.name for closure in scene.closures], self._driven([*hinges, *wheels])
+        self._observation = Observation(Names(markers, hinges, wheels, closures, driven), self.nu)
+        self._out = self._observation.out
         self.rhs, self.project = articulated.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
+        self._evaluators: dict[str, Evaluator] = {}
+        self.kept: dict[Any, Any] = {}
+        """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what holds addresses: a copy finds its own."""
+        kept = {name: value for name, value in self.__dict__.items() if not isinstance(value, Direct)}
+        return kept | {"_evaluators": {}, "kept": {}}
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -113,6 +132,8 @@ class System(Mechanics):
 
         ValueError where the print does not apply: a body whose modes are not clamped at its hinge point.
         """
+        from flexmb.frisch.nested_system import NestedSystem  # who uses the recursion waits for none of it
+
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
             self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
@@ -126,6 +147,8 @@ class System(Mechanics):
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
         t, _ = self.layout.entering(state)
+        from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
+
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
         found = self._operators.at(t, state.q, state.u)
@@ -142,11 +165,52 @@ class System(Mechanics):
         Frisch's equations are of first order in the deformation: they take bodies of level `full` as `linear`.
         Raises DynamicsError where an inertia is not positive definite, or numbers are so large that they overflow.
         """
-        t, y = self.layout.entering(state)
-        return finite_result(self._accelerations(t, y, algorithm), t)
+        if type(state) is not State or state.layout is not self.layout:
+            self.layout.owning(state)
+        evaluator = self._evaluators.get(algorithm) or self._evaluator(algorithm)
+        return evaluator(state.t, state.q, state.u).copy()
 
-    def _accelerations(self, t: float, y: Real, algorithm: Algorithm) -> Real:
-        return algorithms.chosen(algorithm).accelerations(self, t, y)
+    def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
+        """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.
+
+            udot, status = system.accelerations_batch(q, u)     q (n,nq), u (n,nu), t (s) one or (n,)
+
+        A state that has no accelerations fails no other one: its row is NaN. Raises ValueError or TypeError for arrays
+        that do not fit.
+        """
+        return self._batch.accelerations(q, u, t, threads=threads)
+
+    @cached_property
+    def _batch(self) -> Batch:
+        """Copies of this system."""
+        from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+
+        return Batch([self])
+
+    def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
+        """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
+
+        A call costs half a microsecond besides the kernel. One evaluator per thread; compiled here, not at its first
+        call. NotImplementedError for closed chains.
+        """
+        chosen = algorithms.chosen(algorithm)
+        return Evaluator(self, chosen, chosen.fresh(self))
+
+    def _evaluator(self, algorithm: Any) -> Evaluator:
+        chosen = algorithms.chosen(algorithm)
+        if chosen.name not in self._evaluators:
+            self._evaluators[chosen.name] = Evaluator(self, chosen, chosen.own(self))
+        return self._evaluators[chosen.name]
+
+    @cached_property
+    def start_precision(self) -> Precision:
+        """`precision` of the initial state, found once."""
+        return self.precision(self.initial_state)
+
+    @cached_property
+    def state_names(self) -> tuple[labels.Names, labels.Names]:
+        """((name, unit) of every entry of q, the same of u)."""
+        return labels.names_of_states(self)
 
     def route(self, algorithm: Algorithm = "articulated", stabilise: float = 0.0) -> Route:
         """The algorithm as runs see it; `stabilise` is for closed chains.
@@ -166,9 +230,16 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            return self._evaluate(t, y, "articulated").loads
+            return self._by_hinge(finite_result(self._free_loads(t, y), t))
         rates = self.layout.rates("accelerations", accelerations)
         return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+
+    def _free_loads(self, t: float, y: Real) -> Real:
+        """(N,6) of the free motion, World axes."""
+        loads, w = np.zeros((len(self._links), 6)), self._recursion_w
+        self._check(free_loads(t, y, self.recursion_constants, w, loads), int(w.fault[0]))
+        self._trust(t, y, w)
+        return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:
         return {link.hinge.name: loads[k] for k, link in enumerate(self._links)}
@@ -193,8 +264,16 @@ class System(Mechanics):
         return self._evaluate(*self.layout.packed(t, q, u), algorithm)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        algorithms.chosen(algorithm).observe(self, t, y, self._observation.out)
+        algorithms.chosen(algorithm).observe(self, t, y)
         return self._observation.evaluation(t)
+
+    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
+        """Everything observable at y = [q, u, work], which is not checked, into a row as `Observation.columns` has it.
+
+        Raises DynamicsError as `evaluate` does.
+        """
+        algorithms.chosen(algorithm).observe(self, t, y)
+        self._observation.fill(row, t, _NO_CLOSURES)
 
     def _wheel_names(self) -> Iterator[str]:
         yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))

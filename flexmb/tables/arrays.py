@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jit.bundle import bundle
+from flexmb.tables import features
 from flexmb.typing import Index, Real, Record
 
 EXPLICIT, WOODBURY, CONDENSED = range(3)
@@ -35,6 +36,7 @@ BODY = _record(
     ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
+    ("quaternion", _I),  # where the quaternion of its hinge begins in q, -1 where there is none
     ("u_index", _I),  # first hinge speed in u
     ("nv", _I),  # number of hinge speeds
     ("modes", _I),  # number of modes
@@ -151,6 +153,10 @@ class Constants:
     function: Record  # (F,) FUNCTION
     table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
 
+    def features(self) -> frozenset[str]:
+        """What kernels for these constants contain."""
+        return features.features(self)
+
 
 # Every reduced body has nodes i = 0..C-1 where outboard bodies are hinged; vectors of all of them are stacked (6C).
 REDUCED_NODE = _record(
@@ -177,8 +183,6 @@ class ReducedConstants(Constants):
 BODY_STATE = _record(
     ("rotation", _F, (9,)),  # R_parent_body
     ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
-    ("hinge_map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
-    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
     ("velocity", _F, (6,)),  # of the body frame, body axes
     ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
     ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
@@ -189,13 +193,20 @@ BODY_STATE = _record(
     ("force", _F, (6,)),  # rigid part of the bias force
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
-    # by free speed; of a hinge with a single axis as flexmb.jain.hinge_solve has it
-    ("hinge_gain", _F, (6, 6)),  # L^-1 (P_R H)'
-    ("hinge_factor", _F, (6, 6)),  # Cholesky factor L of D_R
-    ("hinge_residual", _F, (6,)),  # L^-1 epsilon_R
-    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
+    # of a hinge with a single axis, as flexmb.jain.hinge_solve has it
+    ("gain", _F, (6,)),  # G
+    ("inertia_along", _F),  # D_R
+    ("rate_at_rest", _F),  # D_R^-1 epsilon_R
     ("free_count", _I),
     ("load", _F, (6,)),  # load across the hinge on the body about O, body axes
+)
+HINGE_STATE = _record(  # by free speed
+    ("map", _F, (6, 6)),  # H in outboard axes; columns 0..nv-1
+    ("motion", _F, (6, 6)),  # H in body axes, where O deforms relative to the body
+    ("gain", _F, (6, 6)),  # L^-1 (P_R H)'
+    ("factor", _F, (6, 6)),  # Cholesky factor L of D_R
+    ("residual", _F, (6,)),  # L^-1 epsilon_R
+    ("free_speed", _I, (6,)),  # the hinge's speeds that are free
 )
 MODE_STATE = _record(  # mode n of a body
     ("eta", _F),  # as the level sees it: 0 for ruthless
@@ -228,6 +239,7 @@ class Workspace:
     rate: Real  # (nq,) qdot
     ground: Real  # (3,) acceleration of the ground, World axes: -gravity
     body: Record  # (N,) BODY_STATE
+    hinge: Record  # (N,) HINGE_STATE; not touched where every hinge has a single axis
     mode: Record  # (N,m) MODE_STATE
     pff: Real  # (N,m,m) modal block of the articulated inertia, then its Cholesky factor
     port: Record  # (P,) PORT_STATE

@@ -7,7 +7,8 @@ from math import pi
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import by_number, helper
+from flexmb.jit.lanes import every, select, some
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.spatial.scalar import cos, sin
 from flexmb.tables.arrays import FUNCTION
@@ -51,9 +52,10 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
 @helper
 def _smooth_step(a, b, begin, duration, t):
     x = (t - begin) / duration
-    if x.real <= 0.0:
+    before, after = x.real <= 0.0, x.real >= 1.0
+    if every(before):
         return a, 0.0, 0.0
-    if x.real >= 1.0:
+    if every(after):
         return b, 0.0, 0.0
     x2 = x * x
     x3 = x2 * x
@@ -61,32 +63,78 @@ def _smooth_step(a, b, begin, duration, t):
     rate = x3 * (140.0 + x * (-420.0 + x * (420.0 - 140.0 * x)))
     acceleration = x2 * (420.0 + x * (-1680.0 + x * (2100.0 - 840.0 * x)))
     d = b - a
-    return a + d * value, d * rate / duration, d * acceleration / (duration * duration)
+    resting = before | after
+    return (
+        select(before, a, select(after, b, a + d * value)),
+        select(resting, 0.0, d * rate / duration),
+        select(resting, 0.0, d * acceleration / (duration * duration)),
+    )
 
 
 @helper
 def _spin_up(rate, duration, t):
-    if t.real >= duration:
+    after = t.real >= duration
+    if every(after):
         return rate * (t - 0.5 * duration), rate, 0.0
     k = 2.0 * pi / duration
     c = cos(k * t)
     value = rate / duration * (0.5 * t * t + (c - 1.0) / (k * k))
-    return value, rate / duration * (t - sin(k * t) / k), rate / duration * (1.0 - c)
+    return (
+        select(after, rate * (t - 0.5 * duration), value),
+        select(after, rate, rate / duration * (t - sin(k * t) / k)),
+        select(after, 0.0, rate / duration * (1.0 - c)),
+    )
+
+
+@helper
+def _piece_at(t, table, first, last):
+    """Left end and coefficients of the piece of a spline that time t is in."""
+    row = first
+    while row + 1 < last and t.real >= table[row + 1, 0]:
+        row += 1
+    return _piece(table, row)
+
+
+@helper
+def _pieces_at(t, table, first, last):
+    """The same of lanes, each of which may be in another piece."""
+    found = _piece(table, first)
+    for row in range(first + 1, last):
+        reached, now = t >= table[row, 0], _piece(table, row)
+        if not some(reached):
+            break
+        found = (
+            select(reached, now[0], found[0]),
+            select(reached, now[1], found[1]),
+            select(reached, now[2], found[2]),
+            select(reached, now[3], found[3]),
+            select(reached, now[4], found[4]),
+            select(reached, now[5], found[5]),
+            select(reached, now[6], found[6]),
+        )
+    return found
+
+
+@helper
+def _piece(table, row):
+    x = table[row]
+    return x[0], x[1], x[2], x[3], x[4], x[5], x[6]
+
+
+piece_at = by_number(_piece_at, _piece_at, _pieces_at)
 
 
 @helper
 def _spline(table, first, last, t):
-    row = first
-    while row + 1 < last and t.real >= table[row + 1, 0]:
-        row += 1
-    x = t - table[row, 0]
+    piece = piece_at(t, table, first, last)
+    x = t - piece[0]
     value = 0.0
     rate = 0.0
     half = 0.0
     for n in range(1, 7):  # Horner for the polynomial, its derivative and half its second derivative
         half = half * x + rate
         rate = rate * x + value
-        value = value * x + table[row, n]
+        value = value * x + piece[n]
     return value, rate, 2.0 * half
 
 
@@ -104,9 +152,7 @@ def evaluate(kind, data, first, last, table, t):
     if kind == _SPIN_UP:
         return _spin_up(data[0], data[1], t)
     if kind == _PULSE:
-        if data[1] <= t.real < data[2]:
-            return data[0], 0.0, 0.0
-        return 0.0, 0.0, 0.0
+        return select((data[1] <= t.real) & (t.real < data[2]), data[0], 0.0), 0.0, 0.0
     if kind == _TABLE:
         return _spline(table, first, last, t)
     return data[0], 0.0, 0.0

@@ -2,20 +2,27 @@
 
 import math
 
-from flexmb.jit.kernel import kernel
+from flexmb.jit.kernel import helper, kernel
 
 SOUND, NOT_FINITE, NO_ORIENTATION = range(3)
 SHORTEST, LONGEST = 1e-200, 1e200  # squares of lengths that a quaternion may have: it is scaled to unit length
 
 
-@kernel
-def unsound(values, quaternions):
+@helper
+def soundness(values, quaternions):
     """SOUND, or why numbers (n,) cannot be used; `quaternions` (k,): where each starts among them."""
-    for value in values:
-        if not math.isfinite(value):
+    for i in range(values.shape[0]):
+        if not math.isfinite(values[i]):
             return NOT_FINITE
-    for i in quaternions:
+    for k in range(quaternions.shape[0]):
+        i = quaternions[k]
         norm2 = values[i] ** 2 + values[i + 1] ** 2 + values[i + 2] ** 2 + values[i + 3] ** 2
         if not SHORTEST < norm2 < LONGEST:
             return NO_ORIENTATION
     return SOUND
+
+
+@kernel
+def unsound(values, quaternions):
+    """The same for callers in Python."""
+    return soundness(values, quaternions)

@@ -13,17 +13,22 @@ import numpy as np
 
 from flexmb.tables import arguments
 from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
+from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
 _NONE: Index = np.zeros(0, np.int64)
 
 
 class DynamicsError(ArithmeticError):
-    """The accelerations do not exist at this state; the message names the body and the remedy."""
+    """The accelerations do not exist at this state; the message names the body and the remedy, `status` the kind."""
+
+    status = Status.NOT_POSITIVE_DEFINITE
 
 
 class NotFiniteError(DynamicsError):
     """A state is finite, but its accelerations or other results overflow."""
+
+    status = Status.NONFINITE
 
 
 class PrecisionWarning(UserWarning):
@@ -87,11 +92,15 @@ class Layout:
 
         Asked by every public call: what fits costs one comparison and one small kernel.
         """
-        if type(state) is not State or state.layout is not self:
-            self._own(state)
+        self.owning(state)
         if unsound(state.y, self.quaternions):
             self._examine(state.y)
         return state.t, state.y
+
+    def owning(self, state: State) -> None:
+        """ValueError or TypeError unless a state belongs here; its numbers are not looked at."""
+        if type(state) is not State or state.layout is not self:
+            self._own(state)
 
     def packed(self, t: Any, q: Any, u: Any) -> tuple[float, Real]:
         """Time and y = [q, u, 0] of arrays, a copy; ValueError or TypeError where they do not fit."""

@@ -19,6 +19,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "rate": np.zeros(nq),
         "ground": -c.gravity,
         "body": np.zeros(n, a.BODY_STATE),
+        "hinge": np.zeros(n, a.HINGE_STATE),
         "mode": np.zeros((n, m), a.MODE_STATE),
         "pff": np.zeros((n, m, m)),
         "port": np.zeros(len(c.port), a.PORT_STATE),

@@ -1,9 +1,12 @@
-"""Interleaved timing: rivals take turns, so that a busy machine slows both; time that others had does not count."""
+"""Interleaved timing: rivals take turns, so that a busy machine slows both; time that others had does not count.
+
+Processor time of the process, not of the thread: `simulate` runs compiled code in a thread of its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from time import thread_time
+from time import process_time
 from typing import Literal
 
 import numpy as np
@@ -21,20 +24,25 @@ Ends = Literal["clamped-free", "free-free"]
 
 def interleaved(*rivals: Callable[[], object]) -> list[float]:
     """Seconds per call of each rival: 20th percentile of ROUNDS samples, each of at least SAMPLE_S, taken in turns."""
+    return np.percentile(turns(*rivals), 20, axis=0).tolist()
+
+
+def turns(*rivals: Callable[[], object], rounds: int = ROUNDS) -> np.ndarray:
+    """(rounds, rivals) seconds per call, a row for each round; a sample takes at least SAMPLE_S."""
     repeats = []
     for rival in rivals:
         rival()
-        start = thread_time()
+        start = process_time()
         rival()
-        repeats.append(max(1, int(SAMPLE_S / max(thread_time() - start, 1e-7))))
-    samples = np.empty((ROUNDS, len(rivals)))
+        repeats.append(max(1, int(SAMPLE_S / max(process_time() - start, 1e-7))))
+    samples = np.empty((rounds, len(rivals)))
     for row in samples:
         for i, (rival, repeat) in enumerate(zip(rivals, repeats, strict=True)):
-            start = thread_time()
+            start = process_time()
             for _ in range(repeat):
                 rival()
-            row[i] = (thread_time() - start) / repeat
-    return np.percentile(samples, 20, axis=0).tolist()
+            row[i] = (process_time() - start) / repeat
+    return samples
 
 
 def record(benchmark, native: float, **rivals: float) -> None:

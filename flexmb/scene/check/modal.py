@@ -6,7 +6,6 @@ from collections.abc import Generator, Iterator
 from math import pi, sqrt
 
 import numpy as np
-from scipy.linalg import eigh
 
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody
 from flexmb.scene.check import inertia
@@ -206,6 +205,8 @@ def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
 def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Defect]:
     """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
     stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
+    from scipy.linalg import eigh  # SciPy is slow to import, and few scenes have raw modes
+
     lowest = float(eigh(stiffness, M, eigvals_only=True, subset_by_index=[0, 0])[0])
     size = float(np.max(np.linalg.norm(arrays.position, axis=1)))
     if lowest <= 0.0 or size == 0.0:

@@ -11,12 +11,11 @@ from collections.abc import Iterable, Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
-from flexmb.scene.columns import column, rotation_matrices
+from flexmb.scene.columns import column
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -33,6 +32,7 @@ from flexmb.scene.hinges import (
 )
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
+from flexmb.scene.quaternions import about, rotation_matrix
 from flexmb.scene.schema import PointMass, Scene, Wheel
 from flexmb.scene.tree import GROUND, Coordinate, NodeFrame, coordinates, ordered, rest_frames
 from flexmb.typing import Real
@@ -110,7 +110,7 @@ class _Nodes:
 
         Not on SID bodies, whose nodes are in their files.
         """
-        R = rotation_matrices(column(hinges, f"{side}_quaternion", 4))
+        R = rotation_matrix(column(hinges, f"{side}_quaternion", 4))
         p = column(hinges, f"{side}_position_m", 3)
         for i, hinge in enumerate(hinges):
             name, node = getattr(hinge, side), getattr(hinge, f"{side}_node")
@@ -122,7 +122,7 @@ class _Nodes:
 
 def _beside(node: NodeFrame, R: Real, p: Real) -> tuple[Real, Real]:
     """What is at R, p from a node, seen from its body."""
-    turn = rotation_matrices(np.array([node.quaternion]))[0]
+    turn = rotation_matrix(node.quaternion)
     return turn @ R, node.position + turn @ p
 
 
@@ -271,8 +271,8 @@ def _directions_of(hinge: Hinge) -> Real:
             columns = {"rotation": (*hinge.axis, 0.0, 0.0, 0.0), "translation": (0.0, 0.0, 0.0, *hinge.axis)}
             directions = [columns[name] for name, _ in coordinates(hinge)]
         case Planar():
-            back = Rotation.from_euler("z", -_start(hinge.rotation))
-            directions = [(0.0, 0.0, 0.0, *back.apply(axis)) for axis in np.eye(3)[:2]] + [angular[2]]
+            back = about("z", -_start(hinge.rotation))
+            directions = [(0.0, 0.0, 0.0, *axis) for axis in back.T[:2]] + [angular[2]]
         case Universal():
             directions = _carried("xy", hinge)
         case Gimbal():
@@ -292,10 +292,10 @@ def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Real]:
     angles = [_start(coordinate) for _, coordinate in coordinates(hinge)]
     directions = []
     for k, letter in enumerate(sequence):
-        after = Rotation.identity()
+        after = np.eye(3)
         for axis, angle in zip(sequence[k + 1 :], angles[k + 1 :], strict=True):
-            after = after * Rotation.from_euler(axis, angle)
-        directions.append(np.concatenate([after.inv().apply(np.eye(3)["xyz".index(letter)]), np.zeros(3)]))
+            after = after @ about(axis, angle)
+        directions.append(np.concatenate([after["xyz".index(letter)], np.zeros(3)]))
     return directions
 
 

@@ -1,4 +1,4 @@
-"""A hinge with a single axis takes a path of its own: to the same numbers, and one file knows of it."""
+"""A hinge with a single axis takes a path of its own: to the same numbers, and two files know of it."""
 
 from __future__ import annotations
 
@@ -34,13 +34,13 @@ def without_axes(c: Constants) -> Constants:
 
 
 def test_the_axis_is_the_one_motion_of_the_hinge(found):
-    """Column 0 of H has a one in the row `axis`, and nothing else."""
-    c, w = found.system.constants, found.system.workspace()
+    """Column 0 of H, as the hinge's own file has it, has a one in the row `axis`, and nothing else."""
+    c, w = without_axes(found.system.constants), found.system.workspace()
     assert articulated.accelerations(0.0, start(found), c, w) == OK
-    for body, state in zip(c.body, w.body, strict=True):
+    for body, state in zip(found.system.constants.body, w.hinge, strict=True):
         assert (body["axis"] >= 0) == (body["nv"] == 1)
         if body["nv"] == 1:
-            assert np.flatnonzero(state["hinge_map"][:, 0]).tolist() == [body["axis"]]
+            assert np.flatnonzero(state["map"][:, 0]).tolist() == [body["axis"]]
 
 
 def test_small_matrices_give_the_same_accelerations(found):
@@ -58,12 +58,12 @@ def test_small_matrices_give_the_same_solutions(found):
         assert np.max(np.abs(one - several)) <= gamma(found.system.nu) * np.linalg.cond(found.M) * np.max(np.abs(one))
 
 
-def test_one_file_knows_of_it():
+def test_two_files_know_of_it():
     """Elsewhere neither its mark nor the axis: the recursion asks a hinge for what it does."""
     named = re.compile(r"\b(SINGLE|ANGULAR_Z|LINEAR_Z|REVOLUTE|PRISMATIC)\b|free_count == -1\b|body\[k\]\.axis\b")
     assert named.search("if w.body[k].free_count == SINGLE:")
     rooms = [path for room in ("jain", "closure", "entry") for path in (ROOT / "flexmb" / room).glob("*.py")]
-    assert [path.name for path in rooms if named.search(path.read_text(encoding="utf-8"))] == ["hinge_solve.py"]
+    assert [path.name for path in rooms if named.search(path.read_text(encoding="utf-8"))] == ["axis.py", "hinge_solve.py"]
 
 
 def start(found: RandomState) -> Real:

@@ -13,6 +13,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+import flexmb.run.observing as observing
+import flexmb.run.propagate as propagation
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.run.interruption import interruptible
 from flexmb.run.warm_up import pendulum
@@ -50,9 +52,7 @@ except KeyboardInterrupt as stopped:
     run = stopped.trajectory
     print(time.process_time() - pressed, run.status.name, run.stopped_at, len(run.t), run.t[-1], stopped)
 """
-METHODS = {
-    name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()
-}
+METHODS = {name: {"step": 1e-6} if each.fixed else {"rtol": 1e-12, "atol": 1e-14} for name, each in INTEGRATORS.items()}
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -80,24 +80,49 @@ def test_the_command_line_writes_what_was_reached_and_says_130(tmp_path):
     assert (tmp_path / "trajectory.csv").read_text().count("\n") >= 2
 
 
-def test_outputs_that_are_evaluated_are_kept_too(monkeypatch):
+@pytest.mark.parametrize("algorithm", ["articulated", "composite"])
+def test_outputs_that_are_evaluated_are_kept_too(algorithm, monkeypatch):
+    """By the compiled loop, which Python calls again and again, and by single states."""
     system, seen = fm.compile(pendulum()), 0
-    whole = type(system).evaluate
+    whole = type(system)._observe_row
 
-    def evaluate(self, *given):
+    def observe_row(self, *given):
         nonlocal seen
         seen += 1
         if seen == 4:
             raise KeyboardInterrupt
         return whole(self, *given)
 
-    monkeypatch.setattr(type(system), "evaluate", evaluate)
+    def nothing_at_once(times, states, rows):
+        return 0
+
+    monkeypatch.setattr(type(system), "_observe_row", observe_row)
+    monkeypatch.setattr(propagation, "batch", lambda *given: nothing_at_once)
     with pytest.raises(fm.Interrupted) as stopped:
-        fm.simulate(system, 1.0, samples=11)
+        fm.simulate(system, 1.0, samples=11, algorithm=algorithm)
     run = stopped.value.trajectory
     assert run.status is Status.INTERRUPTED
-    assert len(run.t) == len(run.q) == 3
+    assert len(run.t) == len(run.q) == len(run.momentum) == 3
     assert "outputs were evaluated" in str(stopped.value)
+
+
+def test_the_keyboard_is_looked_at_between_the_samples_of_a_large_scene(monkeypatch):
+    """Compiled code takes many samples at once where they are cheap, few where each takes long."""
+    asked, clock = [], iter(range(10**6))
+    monkeypatch.setattr(observing, "perf_counter", lambda: next(clock))  # a second passes at every look
+
+    def batch(times, states, rows):
+        asked.append(len(times))
+        return len(times)
+
+    system = fm.compile(pendulum())
+    states = np.zeros((50, 3))
+    assert observing.observe(system, "articulated", np.arange(50.0), states, batch).trouble is None
+    assert asked == [1] * 50
+    monkeypatch.setattr(observing, "perf_counter", lambda: 0.0)
+    asked.clear()
+    observing.observe(system, "articulated", np.arange(50.0), states, batch)
+    assert asked == [1, 2, 4, 8, 16, 19]
 
 
 @pytest.fixture

@@ -285,6 +285,11 @@ def calls() -> dict[str, Call]:
             u=vectors,
             **ALGORITHM,
         )
+        arguments = {"t": 0.5, "q": state.q.copy(), "u": state.u.copy()}
+        evaluator = _copying(tree.evaluator(algorithm))
+        add(f"System.evaluator, {algorithm}", evaluator, arguments, t=numbers, q=quaternion_first, u=vectors)
+    add("System.evaluator", lambda algorithm: tree.evaluator(algorithm).accelerations, {"algorithm": "articulated"},
+        **ALGORITHM)  # fmt: skip
     of_rates = {"state": state, "accelerations": rates}
     for name, kind in {
         "inverse_dynamics": vectors, "modal_residual": vectors, "consistent_inverse_dynamics": but_modal,
@@ -477,6 +482,11 @@ def calls() -> dict[str, Call]:
     return found
 
 
+def _copying(evaluator: Callable[..., np.ndarray]) -> Callable[..., np.ndarray]:
+    """Of a function that writes one array: its results are compared."""
+    return lambda t, q, u: evaluator(t, q, u).copy()
+
+
 def seen(run: fm.Trajectory) -> tuple[Any, ...]:
     """Of a run that finished."""
     if not run.finished:
@@ -542,6 +552,7 @@ EXEMPT = {
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise", "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",
     "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state",
+    "ClosedSystem.evaluator",  # always refused
     "ClosedSystem.workspace", "ClosedSystem.recursion_workspace", "ClosedSystem.composite_workspace",
     "load_scene", "save_scene", "SceneBuilder",  # files and data, checked where they are compiled
     "Advice", "Campbell", "Evaluation", "LinearModel", "SteadySpin", "System", "Trajectory", "Status",  # results

@@ -40,8 +40,9 @@ def test_every_algorithm_does_what_it_declares(name, tree, closed):
     assert tree.evaluate(0.0, state.q, state.u, name).loads["pivot"] == pytest.approx(
         tree.hinge_loads(state)["pivot"], rel=1e-12, abs=1e-12
     )
-    kernel, tables = ALGORITHMS[name].kernel(tree)
-    assert kernel(0.0, state.y, *tables) == 0
+    for tables in (ALGORITHMS[name].own(tree), ALGORITHMS[name].fresh(tree)):
+        assert ALGORITHMS[name].kernel()(0.0, state.y, *tables) == 0
+        assert tables[1].speed["acceleration"] == pytest.approx(tree.accelerations(state), rel=1e-12)
     if name in RUNNING:
         assert len(tree.route(name)) == 3
     else:

@@ -1,0 +1,84 @@
+"""The classical Runge-Kutta method for eight runs at once: `flexmb.integrate.rk4` in lanes, all at the same time."""
+
+from __future__ import annotations
+
+from flexmb.integrate.control import ACCEPTED, SAMPLES, permitted, stretch
+from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite, set_all, store_lane
+from flexmb.jit.kernel import helper, kernel, written_out
+from flexmb.jit.lanes import LANES
+from flexmb.tables.status import NONFINITE, OK
+
+
+@helper
+def _advance(s, slope, h):
+    """s.trial = y + h slope."""
+    for i in range(s.y.shape[0]):
+        s.trial[i] = s.y[i] + h * slope[i]
+
+
+@written_out
+def _step(problem, s, entries, t, last, h, counts):
+    """s.trial = y(t + h) from s.y; no stage is later than `last`. Returns a status code."""
+    set_all(entries.time, t)
+    lane_copy(s.y, s.trial)
+    status = lane_derivative(problem, 0, counts)
+    set_all(entries.time, t + 0.5 * h)
+    for stage in range(1, 3):
+        if status == OK:
+            _advance(s, s.k[stage - 1], 0.5 * h)
+            status = lane_derivative(problem, stage, counts)
+    set_all(entries.time, min(t + h, last))
+    if status == OK:
+        _advance(s, s.k[2], h)
+        status = lane_derivative(problem, 3, counts)
+    for i in range(s.y.shape[0]):
+        s.trial[i] = s.y[i] + h / 6.0 * (s.k[0, i] + 2.0 * (s.k[1, i] + s.k[2, i]) + s.k[3, i])
+    return status
+
+
+@helper
+def _store(entries, sample, out, counts):
+    """out[lane, sample] = the state of each lane."""
+    for lane in range(LANES):
+        store_lane(entries.y, lane, out[lane, sample])
+        counts[lane, SAMPLES] = sample + 1
+
+
+@kernel
+def rk4_lanes(problem, s, entries, clock, accuracy, out, counts):
+    """Integrate from the states s.y (n,LANES) as `rk4` does each of them; returns (status code, time of its end).
+
+    out (LANES,T,n): states at every time of the clock. counts (LANES,COUNTS). The status is OK unless all lanes have
+    failed: those that failed alone are not finite at the end.
+    """
+    times, segment_ends = clock
+    t = times[0]
+    set_all(entries.time, t)
+    lane_copy(s.y, s.trial)
+    problem.project(problem.stages, problem.constants)
+    lane_copy(s.trial, s.y)
+    _store(entries, 0, out, counts)
+    segment = 0
+    for sample in range(1, times.shape[0]):
+        while t < times[sample]:
+            start = t
+            end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
+            for j in range(steps):
+                status = permitted(accuracy.max_steps, counts[0])
+                if status == OK:
+                    status = _step(problem, s, entries, t, last, h, counts)
+                if status != OK:
+                    return status, t
+                mark_finite(s.trial, s.chosen)
+                if not any_chosen(entries):
+                    return NONFINITE, t
+                t = end if j == steps - 1 else start + (j + 1) * h
+                set_all(entries.time, t)
+                problem.project(problem.stages, problem.constants)
+                lane_copy(s.trial, s.y)
+                for lane in range(LANES):
+                    counts[lane, ACCEPTED] += 1
+            if t == segment_ends[segment]:
+                segment += 1
+        _store(entries, sample, out, counts)
+    return OK, t

@@ -1,0 +1,77 @@
+"""Hinges with a single axis along z, without the zeros and ones of their rotation and their map H.
+
+Most hinges are of this kind. What `flexmb.hinges` says of a revolute and a prismatic hinge is written out here, so that
+no product with a zero is left: the compiler must not leave one out, for 0 times infinity is not 0. How such a hinge is
+eliminated is in `flexmb.jain.hinge_solve`.
+"""
+
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper
+from flexmb.spatial.rotation import turned_about_z
+from flexmb.spatial.scalar import cos, sin
+from flexmb.spatial.vector import axpy
+from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS
+from flexmb.tables.features import AXIS
+
+TURNING, SLIDING, OTHERS = (f"{AXIS} {row}" for row in (ANGULAR_Z, LINEAR_Z, NO_AXIS))  # features of a scene
+
+
+@helper
+def has_axis(c, k):
+    """Whether hinge k has a single axis; known beforehand in scenes where all have one, or none has."""
+    if not has(c, OTHERS):
+        return True
+    if not has(c, TURNING) and not has(c, SLIDING):
+        return False
+    return c.body[k].axis >= 0
+
+
+@helper
+def turns(c, k):
+    """Whether the single axis of hinge k is one of rotation."""
+    if not has(c, SLIDING):
+        return True
+    return c.body[k].axis == ANGULAR_Z
+
+
+@helper
+def pose(c, w, k, R, arm):
+    """R_parent_O and the arm to O, in parent axes, from those of O+."""
+    q = w.q[c.body[k].q_index]
+    if turns(c, k):
+        return turned_about_z(R, cos(q), sin(q)), arm
+    return R, axpy(q, (R[2], R[5], R[8]), arm)
+
+
+@helper
+def cross_hinge(c, w, k, V, A):
+    """Velocity and bias of O from those of the same point of the parent, in outboard axes: H u and the Coriolis term."""
+    u = w.u[c.body[k].u_index]
+    (x, y, z), v = V
+    alpha, a = A
+    if turns(c, k):
+        return ((x, y, z + u), v), ((alpha[0] + u * y, alpha[1] - u * x, alpha[2]), a)
+    return ((x, y, z), (v[0], v[1], v[2] + u)), (alpha, (a[0] + 2.0 * u * y, a[1] - 2.0 * u * x, a[2]))
+
+
+@helper
+def column(c, k):
+    """The motion of O that a unit of the hinge's speed is, in outboard axes."""
+    if turns(c, k):
+        return (0.0, 0.0, 1.0), (0.0, 0.0, 0.0)
+    return (0.0, 0.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@helper
+def along(c, k, F):
+    """H F."""
+    return F[0][2] if turns(c, k) else F[1][2]
+
+
+@helper
+def move_along(c, k, A, rate):
+    """A + H' rate."""
+    alpha, a = A
+    if turns(c, k):
+        return (alpha[0], alpha[1], alpha[2] + rate), a
+    return alpha, (a[0], a[1], a[2] + rate)

@@ -1,0 +1,163 @@
+"""Kernels called by address, from Python and from kernels: what numba asks of a bundle at every call is asked once.
+
+A dispatcher finds out the type of every argument at each call: of a bundle in half a microsecond. Here the addresses of
+a kernel and of its bundles go, as whole numbers, to an entry that is compiled once for all kernels whose arguments are
+arranged alike, and the entry calls through the address. In kernels `status_at` and `nothing_at` do that, and
+`at_address` makes the bundle of an address.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from typing import Any
+
+from llvmlite import ir
+from numba import types
+from numba.core import cgutils
+from numba.extending import lower_builtin, type_callable
+from numba.np.arrayobj import populate_array
+
+from flexmb.jit.kernel import kernel
+from flexmb.jit.pointer import NOTHING, STATUS, pointer
+from flexmb.jit.tables import TableType
+
+ADDRESS = types.int64
+
+
+class Direct(partial):
+    """A kernel as a function of what it takes besides bundles, which it holds. Threads share it as they share these."""
+
+    held: tuple[Any, ...]
+
+    def __reduce__(self) -> Any:
+        """Neither pickled nor copied: addresses are of one process, and of these bundles."""
+        raise TypeError("a call by address cannot be copied: make another one for the bundles of the copy")
+
+
+def bound(entry: Any, where: tuple[int, ...], *held: Any) -> Direct:
+    """An entry whose first arguments are addresses, with what they are the addresses of."""
+    function = Direct(entry, *where)
+    function.held = held
+    return function
+
+
+def direct(compiled: Any, returned: Any, *arguments: Any) -> Direct:
+    """A kernel for these arguments, each a bundle or one of the types of `pointer.py`: called with those of a type.
+
+    Compiles it, or finds it compiled; raises TypeError where it returns something else than `returned`. A call with an
+    argument of another type raises TypeError; lengths of arrays are for the caller to check.
+    """
+    is_given = tuple(isinstance(argument, types.Type) for argument in arguments)
+    given = [argument for argument in arguments if isinstance(argument, types.Type)]
+    entry = settled(_entry(returned, is_given), *[ADDRESS] * (1 + is_given.count(False)), *given)
+    return bound(entry, addresses(compiled, returned, *arguments), *arguments)
+
+
+def addresses(compiled: Any, returned: Any, *arguments: Any) -> tuple[int, ...]:
+    """Of a kernel, compiled for these arguments, and of the bundles among them, which the caller holds."""
+    bundles = [argument for argument in arguments if not isinstance(argument, types.Type)]
+    function = pointer(compiled, returned, *arguments).__wrapper_address__()
+    return function, *(bundle._address for bundle in bundles)
+
+
+def settled(compiled: Any, *kinds: Any) -> Any:
+    """A kernel that is compiled for these types, and refuses others by a TypeError instead of being compiled anew."""
+    if kinds not in compiled.overloads:
+        compiled.disable_compile(False)
+        compiled.compile(kinds)
+        compiled.disable_compile()
+    return compiled
+
+
+@cache
+def _entry(returned: Any, is_given: tuple[bool, ...]) -> Any:
+    """A kernel of addresses, then of what is given, that puts them in order.
+
+    For a kernel of two numbers and, between them, a bundle it is written as one would by hand,
+
+        def status_of_aba(function, b1, a0, a2):
+            return status_at(function, (a0, b1, a2))
+    """
+    names = [f"{'a' if given else 'b'}{i}" for i, given in enumerate(is_given)]
+    ordered = sorted(names, key=lambda name: name[0] == "a")
+    by = "nothing" if returned == NOTHING else "status"
+    name = f"{by}_of_{''.join(each[0] for each in names)}"
+    text = f"def {name}(function, {', '.join(ordered)}):\n    return {by}_at(function, ({', '.join(names)},))"
+    space: dict[str, Any] = {"status_at": status_at, "nothing_at": nothing_at, "__name__": __name__}
+    exec(compile(text, f"<{name}>", "exec"), space)
+    return kernel(space[name])
+
+
+def at_address(example: Any) -> Callable[[Any], Any]:
+    """For kernels: a function from an address to the bundle there, which is of the type of `example`."""
+    kind = example._numba_type_
+
+    def at(address: Any, kind: Any = kind) -> Any:  # the type is named for the key of the kernels that it is part of
+        return address
+
+    type_callable(at)(lambda context: lambda address: kind)
+    lower_builtin(at, types.Integer)(_pointed)
+    return at
+
+
+def _pointed(context, builder, sig, args):
+    return builder.inttoptr(args[0], context.get_value_type(sig.return_type))
+
+
+def status_at(function: Any, arguments: Any) -> Any:
+    """The status code of the kernel at an address; whole numbers among the arguments are addresses of bundles.
+
+    Tables are handed over as arrays.
+    """
+    return function(*arguments)
+
+
+def nothing_at(function: Any, arguments: Any) -> Any:
+    """The same of a kernel that returns nothing."""
+    function(*arguments)
+
+
+@type_callable(status_at)
+def _type_of_status(context):
+    return lambda function, arguments: STATUS
+
+
+@type_callable(nothing_at)
+def _type_of_nothing(context):
+    return lambda function, arguments: NOTHING
+
+
+@lower_builtin(status_at, types.Integer, types.BaseTuple)
+@lower_builtin(nothing_at, types.Integer, types.BaseTuple)
+def _call(context, builder, sig, args):
+    given = zip(sig.args[1], cgutils.unpack_tuple(builder, args[1]), strict=True)
+    values = [_handed_over(context, builder, kind, value) for kind, value in given]
+    kind = ir.FunctionType(context.get_value_type(sig.return_type), [value.type for value in values])
+    return builder.call(builder.inttoptr(args[0], kind.as_pointer()), values)
+
+
+def _handed_over(context, builder, kind, value):
+    """An argument as a kernel that was compiled by itself takes it."""
+    if isinstance(kind, types.Integer):
+        return builder.inttoptr(value, context.get_value_type(types.voidptr))
+    return _array(context, builder, kind, value) if isinstance(kind, TableType) else value
+
+
+def _array(context, builder, kind, value):
+    """A table of numbers as an array of numba, which owns nothing."""
+    array = context.make_array(types.Array(kind.dtype, kind.ndim, "C"))(context, builder)
+    shape = cgutils.unpack_tuple(builder, builder.extract_value(value, 1))
+    size = context.get_constant(types.intp, kind.dtype.bitwidth // 8)
+    strides = [size]
+    for extent in shape[:0:-1]:
+        strides.insert(0, builder.mul(strides[0], extent))
+    populate_array(
+        array,
+        data=builder.bitcast(builder.extract_value(value, 0), array.data.type),
+        shape=cgutils.pack_array(builder, shape),
+        strides=cgutils.pack_array(builder, strides),
+        itemsize=size,
+        meminfo=None,
+    )
+    return array._getvalue()

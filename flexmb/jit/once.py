@@ -1,0 +1,38 @@
+"""A kernel that is not on disk yet is compiled by one process, while the others that want it wait for its file.
+
+Compiling takes seconds to minutes of a processor, and the workers of a session start at once with the same scenes. Who
+compiles holds a lock on a file beside the kernel's. The operating system frees it when its holder ends, however it
+ends; nobody waits longer than `PATIENCE`; and where there are no locks (a file system without them, a folder that
+nobody may write to) everybody compiles for himself, as without this file. Kernels are written whole or not at all, so
+that a lock saves work and nothing else depends on it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+PATIENCE = 600.0  # s; the longest kernel takes a tenth of it on an idle processor
+
+
+@contextmanager
+def compiled_once(file: Path, patience: float = PATIENCE) -> Iterator[None]:
+    """Hold the lock of a kernel's file; if another process wrote the file meanwhile, it is there for the body."""
+    from filelock import FileLock, Timeout  # only who compiles needs it
+
+    lock = FileLock(file.with_name(f"{file.name}.lock"))
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        lock.acquire(timeout=patience)
+    except (OSError, NotImplementedError, Timeout):
+        yield
+        return
+    try:
+        yield
+    finally:
+        with suppress(OSError):
+            if file.is_file():  # nobody asks for its lock any more
+                Path(lock.lock_file).unlink()
+        with suppress(OSError):
+            lock.release()

@@ -1,0 +1,42 @@
+"""A line for who waits: what is being compiled, when it takes longer than two seconds, and that it is once.
+
+It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless the program has set up its logging:
+`logging.getLogger("flexmb.jit").setLevel(logging.ERROR)` silences it.
+"""
+
+from __future__ import annotations
+
+import logging
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from types import FunctionType
+
+AFTER = 2.0  # s
+_LOGGER = logging.getLogger("flexmb.jit")
+_at_it = threading.local()
+
+
+@contextmanager
+def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
+    """Say after a while that a kernel is being compiled; of kernels within kernels the outermost says so."""
+    if getattr(_at_it, "outermost", None) is not None:
+        yield
+        return
+    _at_it.outermost = function
+    timer = threading.Timer(AFTER, _LOGGER.warning, (_sentence(function, folder),))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()
+        _at_it.outermost = None
+
+
+def _sentence(function: FunctionType, folder: Path | None) -> str:
+    purpose = (function.__doc__ or "").strip().partition("\n")[0]
+    name = f"{function.__module__}.{function.__qualname__}"
+    how_often = f"once: it is kept in {folder}" if folder else "in every process: no folder is writable to keep it"
+    return f"flexmb is compiling {name} ({purpose or 'a kernel'}) for scenes of this kind, {how_often}"

@@ -1,0 +1,51 @@
+"""The result of many runs: states at the output times, and how each run ended."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexmb.system.batch import Batch
+from flexmb.tables.status import OK, Status
+from flexmb.typing import Index, Real
+
+
+@dataclass(frozen=True)
+class BatchTrajectory:
+    """n runs at T output times t (s).
+
+    q (n,T,nq), u (n,T,nu) and work (n,T) J, as in `flexmb.Trajectory`, NaN where a run did not come; `status` (n,) of
+    `flexmb.Status`, `stopped_at` (n,) s the time of the last good state; evaluations, accepted_steps, rejected_steps
+    (n,). `batch.system(copy)` evaluates what else is observable at a state.
+    """
+
+    batch: Batch
+    t: Real
+    q: Real
+    u: Real
+    work: Real
+    status: Index
+    fault: Index
+    stopped_at: Real
+    evaluations: Index
+    accepted_steps: Index
+    rejected_steps: Index
+
+    @property
+    def finished(self) -> bool:
+        """Whether all runs reached the end."""
+        return not len(self.failed)
+
+    @property
+    def failed(self) -> Index:
+        """Numbers of the copies that did not."""
+        return np.flatnonzero(self.status != OK)
+
+    def message(self, copy: int) -> str:
+        """How a run ended, in words."""
+        status, t = Status(int(self.status[copy])), self.stopped_at[copy]
+        if status is Status.OK:
+            return f"finished at t = {t:g} s"
+        place = self.batch.system(copy).fault_name(status, int(self.fault[copy]))
+        return f"stopped at t = {t:g} s: " + status.advice.format(body=f'"{place}"')

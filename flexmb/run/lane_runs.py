@@ -1,0 +1,141 @@
+"""Runs of a batch: in lanes where the method and the scenes allow, copy by copy where they do not, in threads."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.entry import articulated, lanes
+from flexmb.integrate.control import COUNTS
+from flexmb.integrate.dop853_lanes import LaneControl, dop853_lanes, lane_control
+from flexmb.integrate.lane_problem import LaneEntries, first_derivative, lane_entries, lane_problem, lane_stages
+from flexmb.integrate.problem import Clock
+from flexmb.integrate.rk4_lanes import rk4_lanes
+from flexmb.integrate.settings import Settings
+from flexmb.jit.lanes import LANES
+from flexmb.motion import coordinates
+from flexmb.run.propagate import Integration
+from flexmb.run.switching import switch_times
+from flexmb.system.algorithm import Route
+from flexmb.system.batch import Batch, in_threads
+from flexmb.system.tree_system import System
+from flexmb.tables.lane_tables import LaneWorkspace
+from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NOT_POSITIVE_DEFINITE, OK
+from flexmb.typing import Index, Real
+
+_IN_LANES = ("rk4", "dop853")
+_DECIDED = (OK, MAX_STEPS, INTERRUPTED)  # how lanes end as well as they would alone
+_NOT_YET = -1
+
+
+class Runs(NamedTuple):
+    """What the runs of N copies write: n of a batch, and more of the last one until blocks of LANES are full."""
+
+    y: Real  # (N,nq+nu+1) initial states
+    out: Real  # (N,T,nq+nu+1)
+    counts: Index  # (N,COUNTS)
+    status: Index  # (N,)
+    fault: Index  # (N,)
+    stopped_at: Real  # (N,)
+
+
+def runs(q: Real, u: Real, samples: int) -> Runs:
+    """Room for the runs of copies with these initial states (n,nq), (n,nu)."""
+    n = len(q) + -len(q) % LANES
+    y = np.concatenate([q, u, np.zeros((len(q), 1))], axis=1)
+    y = np.concatenate([y, np.repeat(y[-1:], n - len(q), axis=0)])
+    zeros = np.zeros(n, np.int64)
+    return Runs(
+        y, np.full((n, samples, y.shape[1]), np.nan), np.zeros((n, COUNTS), np.int64), zeros + _NOT_YET, zeros.copy(),
+        np.zeros(n),
+    )  # fmt: skip
+
+
+class BatchRun:
+    """A method applied to the copies of a batch."""
+
+    def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
+        self._batch, self._times, self._settings, self._found = batch, times, settings, found
+        self._ends = [np.array([*switch_times(s.scene, times[-1]), times[-1]]) for s in batch.systems]
+
+    def __call__(self, n: int, threads: int) -> None:
+        """Run the first n copies."""
+        blocks = list(range(0, n, LANES)) if self._batch.in_lanes and self._settings.method in _IN_LANES else []
+        in_threads(self._in_lanes, blocks, threads)
+        left = [copy for copy in range(n) if self._found.status[copy] == _NOT_YET]
+        in_threads(self._alone, left, threads if self._batch.in_lanes else 1)
+
+    def _copies_ends(self, copies: Sequence[int]) -> list[Real]:
+        """Ends of the segments of each copy."""
+        last = len(self._ends) - 1
+        return [self._ends[min(copy, last)] for copy in copies]
+
+    def _in_lanes(self, firsts: Iterable[int]) -> None:
+        n = self._found.y.shape[1]
+        s = lane_stages(n, self._settings.method)
+        with self._batch.workspace() as w:
+            for first in firsts:
+                self._block(first, s, lane_entries(s), w)
+
+    def _block(self, first: int, s: Any, entries: LaneEntries, w: LaneWorkspace) -> None:
+        """Run LANES copies; those whose end the lanes do not decide are left for later."""
+        c = self._batch.constants(first // LANES)
+        place = slice(first, first + LANES)
+        found = Runs(*(part[place] for part in self._found))
+        ends = self._copies_ends(range(first, first + LANES))
+        s.y[...] = found.y.T
+        lanes.begin(c, w)
+        problem = lane_problem(lanes.rhs, lanes.project, s, c, w)
+        if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
+            self._examine(first, found.status)
+        accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
+        if self._settings.method == "dop853":
+            most = max(map(len, ends))
+            padded = np.array([[*each, *[each[-1]] * (most - len(each))] for each in ends])
+            lengths = np.array(list(map(len, ends)))
+            control: LaneControl = lane_control(lengths)
+            clock = Clock(self._times, padded)
+            dop853_lanes(problem, s, entries, control, clock, accuracy, found.out, found.counts)
+            status, stopped_at = control.status, control.t
+        else:
+            if any(len(each) != len(ends[0]) or np.any(each != ends[0]) for each in ends):
+                return
+            end, t = rk4_lanes(problem, s, entries, Clock(self._times, ends[0]), accuracy, found.out, found.counts)
+            status = np.where(np.isfinite(s.y).all(axis=0), end, _NOT_YET)
+            stopped_at = np.full(LANES, t)
+        for lane in np.flatnonzero((found.status == _NOT_YET) & np.isin(status, _DECIDED)):
+            found.status[lane], found.stopped_at[lane] = status[lane], stopped_at[lane]
+
+    def _examine(self, first: int, status: Index) -> None:
+        """Copies whose inertias are not positive definite at the start, or are so beyond rounding, do not run."""
+        for lane in range(LANES):
+            copy = min(first + lane, len(self._batch.systems) - 1)
+            system = self._batch.systems[copy]
+            y = self._found.y[first + lane]
+            if np.isfinite(y).all():
+                precision = system.precision(system.state(y[: system.nq], y[system.nq : -1]))
+                if precision.status != OK:
+                    status[lane], self._found.fault[first + lane] = NOT_POSITIVE_DEFINITE, precision.fault
+
+    def _alone(self, copies: Iterable[int]) -> None:
+        solvers: dict[System, Integration] = {}
+        for copy in copies:
+            system, found = self._batch.system(copy), self._found
+            if system not in solvers:
+                solvers.clear()
+                solvers[system] = Integration(
+                    self._route(system), self._settings, system.constants, system.nq, system.nu
+                )
+            solve = solvers[system]
+            [ends] = self._copies_ends([copy])
+            found.counts[copy], found.out[copy] = 0, np.nan
+            status, t = solve(found.y[copy].copy(), Clock(self._times, ends), found.out[copy], found.counts[copy])
+            found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
+
+    def _route(self, system: System) -> Route:
+        """With the modes of every body eliminated explicitly, as in lanes."""
+        if not self._batch.in_lanes:
+            return system.route()
+        return Route(lambda: (system.constants, system.workspace()), articulated.rhs, coordinates.project)

@@ -1,0 +1,59 @@
+"""What is observed at the samples of a run, as rows of numbers; in compiled code where that is possible."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from time import perf_counter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.entry.sampling import observe_samples
+from flexmb.jit.direct import ADDRESS, addresses, bound, settled
+from flexmb.jit.pointer import INDEX, MATRIX, REAL, STATUS, VECTOR
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.tree_system import System
+from flexmb.tables.state import DynamicsError
+from flexmb.typing import Real
+
+PATIENCE = 0.05  # s that compiled code may take before Python looks at the keyboard
+
+Batch = Callable[[Real, Real, Real], int]
+
+
+class Rows(NamedTuple):
+    """Observed at the first samples, (T,m) as `Observation.columns` has them, and what ended it, if anything did."""
+
+    rows: Real
+    trouble: DynamicsError | KeyboardInterrupt | None
+
+
+def batch(system: System, kernel: Any, constants: Any, workspace: Any) -> Batch:
+    """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns how many, up to the first that
+    is for Python to look into. It has outputs of its own."""
+    out = system._observation.outputs()
+    entry = settled(observe_samples, *[ADDRESS] * 4, INDEX, VECTOR, MATRIX, MATRIX)
+    behind = addresses(kernel, STATUS, REAL, VECTOR, constants, workspace, out)
+    call = bound(entry, behind, constants, workspace, out)
+    return lambda times, states, rows: call(workspace.doubt, times, states, rows)
+
+
+def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Batch | None) -> Rows:
+    """Rows at all states (T,n) that are reached at these times, or up to where it fails or Ctrl-C is pressed.
+
+    `sampled` does many at once; what it leaves is evaluated as a single state is, with its errors and warnings.
+    """
+    rows, done, many = np.zeros((len(states), system._observation.width)), 0, 1
+    try:
+        while done < len(states):
+            if sampled is not None:
+                start, some = perf_counter(), slice(done, min(done + many, len(states)))
+                done += sampled(times[some], states[some], rows[some])
+                many = 2 * many if perf_counter() - start < PATIENCE / 2.0 else max(1, many // 2)
+                if done == some.stop:
+                    continue
+            system._observe_row(float(times[done]), states[done], algorithm, rows[done])
+            done += 1
+    except (DynamicsError, KeyboardInterrupt) as trouble:
+        return Rows(rows[:done], trouble)
+    return Rows(rows, None)

@@ -1,0 +1,106 @@
+"""The entry point that runs many copies of a scene: other initial states, other masses, lengths, stiffnesses."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Unpack
+
+import numpy as np
+
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, REJECTED, SAMPLES, STOP
+from flexmb.integrate.integrator import Method
+from flexmb.integrate.settings import Settings
+from flexmb.jit.lanes import LANES
+from flexmb.run.batch_trajectory import BatchTrajectory
+from flexmb.run.interruption import interruptible
+from flexmb.run.lane_runs import BatchRun, Runs, runs
+from flexmb.run.samples import OUTPUT_BYTES, sample_times
+from flexmb.run.simulate import RunSettings
+from flexmb.scene.check import check_run
+from flexmb.scene.schema import Scene
+from flexmb.system.batch import Batch, compile_batch, number_of_threads
+from flexmb.system.tree_system import System
+from flexmb.tables import arguments
+from flexmb.typing import Real
+
+
+def simulate_batch(
+    copies: Batch | System | Sequence[Scene],
+    t_end: float,
+    method: Method = "dop853",
+    *,
+    q: Any = None,
+    u: Any = None,
+    samples: int | Sequence[float] | Real = 201,
+    threads: int | None = None,
+    **settings: Unpack[RunSettings],
+) -> BatchTrajectory:
+    """Simulate many copies of a scene from t = 0 to `t_end` (s): each as `simulate` would, many times faster.
+
+    copies: scenes of one structure, each with numbers of its own, or the `Batch` that `compile_batch` makes of them; or
+    one compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds
+    of all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
+    eight copies at once in the lanes of the processor, each with steps of its own; the other methods, and scenes with
+    closures, run one copy after the other. All modes are eliminated explicitly. threads: how many, by default one for
+    each processor.
+
+    A run that fails fails no other one and raises nothing: `status` and `message` of the result say why it stopped.
+    Raises SceneError, ValueError or TypeError as `simulate` does, ValueError where states do not fit the copies, and
+    KeyboardInterrupt for Ctrl-C.
+    """
+    batch = copies if isinstance(copies, Batch) else _batch(copies)
+    t_end = arguments.number("t_end", t_end)
+    chosen = Settings(method, **settings).checked(t_end)
+    for system in batch.systems:
+        check_run(system.scene, t_end)
+    times = sample_times(samples, t_end)
+    if (q is None or u is None) and batch.shares_constants and (q is not None or u is not None):
+        start = batch.initial_states()
+        given = len(q if q is not None else u)
+        q = np.repeat(start[0], given, axis=0) if q is None else q
+        u = np.repeat(start[1], given, axis=0) if u is None else u
+    own = batch.initial_states() if q is None or u is None else (q, u)
+    rows = batch.states(own[0] if q is None else q, own[1] if u is None else u)
+    _refuse_too_many(len(rows[0]), len(times), batch)
+    found = runs(*rows, len(times))
+    if len(rows[0]):
+        number = number_of_threads(threads, len(found.y) // LANES)
+        stop = found.counts.T[STOP : STOP + 1]  # of all runs at once
+        _, interrupted = interruptible(
+            BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop
+        )
+        if interrupted:
+            raise KeyboardInterrupt
+    return _gathered(batch, times, found, len(rows[0]))
+
+
+def _batch(copies: System | Sequence[Scene]) -> Batch:
+    return copies._batch if isinstance(copies, System) else compile_batch(copies)
+
+
+def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:
+    size = 8 * n * samples * (batch.nq + batch.nu + 1)
+    if size > OUTPUT_BYTES:
+        raise ValueError(
+            f"{n} copies at {samples} output times take {size / 2**30:.1f} GiB, and {OUTPUT_BYTES / 2**30:g} are "
+            "allowed: ask for fewer samples, or run the copies in parts"
+        )
+
+
+def _gathered(batch: Batch, times: Real, found: Runs, n: int) -> BatchTrajectory:
+    """The runs of n copies; what was not reached is NaN."""
+    states, counts = found.out[:n], found.counts[:n]
+    states[np.arange(len(times)) >= counts[:, SAMPLES, None]] = np.nan
+    return BatchTrajectory(
+        batch=batch,
+        t=times,
+        q=states[:, :, : batch.nq],
+        u=states[:, :, batch.nq : -1],
+        work=states[:, :, -1],
+        status=found.status[:n],
+        fault=found.fault[:n],
+        stopped_at=found.stopped_at[:n],
+        evaluations=counts[:, EVALUATIONS],
+        accepted_steps=counts[:, ACCEPTED],
+        rejected_steps=counts[:, REJECTED],
+    )

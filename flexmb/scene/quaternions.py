@@ -1,0 +1,57 @@
+"""Rotations of a scene's frames, in numpy alone: importing SciPy's takes longer than a scene's first evaluation.
+
+Quaternions are scalar first; R_AB maps components in B to components in A.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flexmb.typing import Real
+
+
+def rotation_matrix(quaternion: ArrayLike) -> Real:
+    """R (...,3,3) of quaternions (...,4), which are scaled to unit length; ValueError where one is zero."""
+    given = np.asarray(quaternion, dtype=float)
+    size = np.linalg.norm(given, axis=-1, keepdims=True)
+    if np.any(size == 0.0):
+        raise ValueError("a quaternion of length zero is no rotation")
+    w, x, y, z = np.moveaxis(given / size, -1, 0)
+    rows = (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def quaternion_of(R: Real) -> Real:
+    """Unit quaternions (...,4) of rotation matrices (...,3,3); of both signs the one whose first nonzero is positive.
+
+    Each is found from its largest component, so that no digits are lost near half a turn: Markley, J. Guidance 31
+    (2008) 440.
+    """
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    i, j, k = np.array([(0, 1, 2), (1, 2, 0), (2, 0, 1)]).T
+    candidates = np.empty((*np.shape(R)[:-2], 4, 4))  # row r is 4 q_r times the quaternion
+    candidates[..., 0, 0] = 1.0 + trace
+    candidates[..., 0, 1:] = candidates[..., 1:, 0] = R[..., k, j] - R[..., j, k]
+    candidates[..., 1:, 1:] = R + np.swapaxes(R, -1, -2)
+    candidates[..., 1 + i, 1 + i] = 1.0 - trace[..., None] + 2.0 * R[..., i, i]
+    largest = np.argmax(np.diagonal(candidates, axis1=-2, axis2=-1), axis=-1)
+    found = np.take_along_axis(candidates, largest[..., None, None], axis=-2)[..., 0, :]
+    found /= np.linalg.norm(found, axis=-1, keepdims=True)
+    first = np.take_along_axis(found, np.argmax(found != 0.0, axis=-1)[..., None], axis=-1)
+    return np.where(first < 0.0, -found, found)
+
+
+def about(axis: str, angle: float) -> Real:
+    """R (3,3) of a turn by `angle` (rad) about "x", "y" or "z"."""
+    i = "xyz".index(axis)
+    j, k = (i + 1) % 3, (i + 2) % 3
+    R = np.eye(3)
+    R[j, j] = R[k, k] = np.cos(angle)
+    R[k, j] = np.sin(angle)
+    R[j, k] = -R[k, j]
+    return R

@@ -1,0 +1,210 @@
+"""Many copies of one system: accelerations of many states at once, in lanes and threads.
+
+    batch = compile_batch(scenes)            each copy with masses, lengths, stiffnesses ... of its own
+    found = batch.accelerations(q, u)        (n,nq), (n,nu) -> (n,nu)
+
+Copies of one system, which differ in their states only, are asked by `System.accelerations_batch`. A copy that fails
+fails no other one: what the lanes cannot decide is asked of its own system, alone.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from flexmb.entry.lanes import Copies, Entries, accelerations
+from flexmb.jit.lanes import LANES
+from flexmb.scene.check import check_scene
+from flexmb.scene.schema import Scene
+from flexmb.tables import arguments
+from flexmb.tables.arrays import Constants
+from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
+from flexmb.tables.state import DynamicsError
+from flexmb.tables.status import NONFINITE, OK
+from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+
+_WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
+
+
+class BatchAccelerations(NamedTuple):
+    """accelerations (n,nu), NaN where a copy has none; status (n,) says why not, numbers of `flexmb.Status`."""
+
+    accelerations: Real
+    status: Index
+
+    @property
+    def failed(self) -> Index:
+        """Numbers of the copies that have no accelerations."""
+        return np.flatnonzero(self.status != OK)
+
+
+class Batch:
+    """Copies that share their structure: hinges, levels, modes, where loads act; their numbers may differ.
+
+    `systems`: one for each copy, or a single one for any number of copies.
+    """
+
+    def __init__(self, systems: Sequence[System]) -> None:
+        self.systems = tuple(systems)
+        self.shares_constants = len(self.systems) == 1
+        first = self.systems[0]
+        self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
+        self.in_lanes = not first.scene.closures
+        self._constants: list[Constants] = [first.constants]
+        self._spare: list[LaneWorkspace] = []
+        if self.in_lanes and not self.shares_constants:
+            self._constants = [
+                lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
+            ]
+
+    def system(self, copy: int) -> System:
+        """That of a copy."""
+        return self.systems[0 if self.shares_constants else copy]
+
+    def constants(self, block: int) -> Constants:
+        """Of the copies LANES * block and on."""
+        return self._constants[0 if self.shares_constants else block]
+
+    @contextmanager
+    def workspace(self) -> Iterator[LaneWorkspace]:
+        """For LANES copies, nobody else's meanwhile; it takes longer to make one than to evaluate a thousand copies."""
+        try:
+            w = self._spare.pop()
+        except IndexError:
+            w = lane_workspace(self.systems[0].workspace(), self.nq, self.nu)
+        yield w
+        self._spare.append(w)
+
+    def states(self, q: Any, u: Any) -> tuple[Real, Real]:
+        """Coordinates (n,nq) and speeds (n,nu) of all copies, C-contiguous; ValueError where they do not fit."""
+        rows = [arguments.array(name, x) for name, x in (("q", q), ("u", u))]
+        for name, x, size in zip("qu", rows, (self.nq, self.nu), strict=True):
+            if x.ndim != 2 or x.shape[1] != size:
+                raise ValueError(f"{name} has shape {x.shape}: give a row of {size} numbers for each copy")
+        if len(rows[0]) != len(rows[1]):
+            raise ValueError(f"there are {len(rows[0])} rows of q, but {len(rows[1])} of u")
+        if not self.shares_constants and len(rows[0]) != len(self.systems):
+            raise ValueError(f"the batch has {len(self.systems)} copies, but q has {len(rows[0])} rows")
+        return np.ascontiguousarray(rows[0]), np.ascontiguousarray(rows[1])
+
+    def initial_states(self) -> tuple[Real, Real]:
+        """(n,nq) and (n,nu) of the scenes at t = 0."""
+        found = [system.initial_state for system in self.systems]
+        return np.array([state.q for state in found]), np.array([state.u for state in found])
+
+    def accelerations(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
+        """udot (n,nu) of all copies at coordinates q (n,nq), speeds u (n,nu) and times t (s), one or (n,).
+
+        In lanes of eight copies each, whose modes are all eliminated explicitly, and in threads: by default as many as
+        there are processors, if there is enough to do. A copy that has no accelerations, or whose state is not finite,
+        gets NaN and a status; it raises nothing. Scenes with closures are evaluated one by one.
+        """
+        q, u = self.states(q, u)
+        n = len(q)
+        times = np.broadcast_to(arguments.array("t", t), (n,)).copy()
+        copies = Copies(q, u, times, np.empty((n, self.nu)), np.full(n, NONFINITE))
+        if self.in_lanes:
+            self._in_lanes(copies, number_of_threads(threads, n // _WORTH_A_THREAD))
+        for copy in np.flatnonzero(copies.status != OK):
+            self._alone(copies, int(copy))
+        return BatchAccelerations(copies.accelerations, copies.status)
+
+    def _in_lanes(self, copies: Copies, threads: int) -> None:
+        n = len(copies.q)
+
+        def work(ranges: Iterable[tuple[int, int]]) -> None:
+            with self.workspace() as w:
+                entries = Entries(w.time, w.state, w.slope)
+                for start, stop in ranges:
+                    accelerations(start, stop, copies, entries, self.constants(start // LANES), w)
+
+        step = n if self.shares_constants else LANES
+        if self.shares_constants and threads > 1:
+            step = LANES * -(-n // (threads * LANES))
+        ranges = [(start, min(start + step, n)) for start in range(0, n, max(step, 1))]
+        in_threads(work, ranges, threads)
+
+    def _alone(self, copies: Copies, copy: int) -> None:
+        """What the system itself says of a copy that the lanes did not decide."""
+        system, found = self.system(copy), copies.accelerations[copy]
+        try:
+            alone = system.accelerations(system.state(copies.q[copy], copies.u[copy], copies.t[copy]))
+        except DynamicsError as error:
+            copies.status[copy], found[:] = error.status, np.nan
+            return
+        except ValueError:  # not finite, or no orientation
+            copies.status[copy], found[:] = NONFINITE, np.nan
+            return
+        copies.status[copy] = OK
+        if not np.isfinite(found).all() or not self.in_lanes:
+            found[:] = alone
+
+
+def compile_batch(scenes: Sequence[Scene]) -> Batch:
+    """Check scenes of one structure and turn them into a batch, one copy for each.
+
+    They may differ in all numbers: masses, inertias, lengths, axes, stiffnesses, dampings, loads, functions, initial
+    states. Raises SceneError for a scene that is wrong, ValueError where there is none, or where one has another
+    structure than the first: another hinge, level, mode or load, or another name.
+    """
+    from flexmb.system.compile import assembled
+
+    if not scenes:
+        raise ValueError("a batch needs at least one scene")
+    for scene in scenes:
+        check_scene(scene)
+    systems = [assembled(scene, "explicit") for scene in scenes]
+    for i, system in enumerate(systems):
+        _refuse_other_structure(i, system, systems[0])
+    return Batch(systems)
+
+
+def _refuse_other_structure(i: int, system: System, first: System) -> None:
+    if system.layout != first.layout:
+        strange = {*system.layout.q.items()} ^ {*first.layout.q.items()}
+        raise ValueError(
+            f"scene {i} has another structure than scene 0: the coordinates of {sorted({name for name, _ in strange})}"
+        )
+    if system.scene.closures or first.scene.closures:
+        if system.scene.closures and first.scene.closures:
+            return
+        raise ValueError(f"scene {i} has another structure than scene 0: only one of them has closures")
+    difference = structural_difference(first.constants, system.constants)
+    if difference is not None:
+        raise ValueError(f"scene {i} has another structure than scene 0: they differ in {difference}")
+
+
+def blocks_of(copies: Sequence[Any]) -> list[list[Any]]:
+    """LANES copies each; the last block is filled up with the last copy."""
+    padded = [*copies, *[copies[-1]] * (-len(copies) % LANES)]
+    return [padded[start : start + LANES] for start in range(0, len(padded), LANES)]
+
+
+def number_of_threads(asked: int | None, most: int) -> int:
+    """As many as asked for; by default one for each processor, but not more than `most`."""
+    if asked is None:
+        return max(1, min(most, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1))
+    threads = arguments.whole("threads", asked)
+    if threads < 1:
+        raise ValueError(f"threads is {threads}: at least one has to do the work")
+    return threads
+
+
+def in_threads(work: Callable[[Iterable[Any]], None], parts: Sequence[Any], threads: int) -> None:
+    """Call work(some of the parts) in each thread: each takes the next one when it is ready."""
+    threads = min(threads, len(parts))
+    if threads <= 1:
+        work(parts)
+        return
+    waiting = iter(parts)  # one iterator for all: taking the next one of a list is atomic
+    with ThreadPoolExecutor(threads) as pool:
+        for done in [pool.submit(work, waiting) for _ in range(threads)]:
+            done.result()

@@ -1,0 +1,59 @@
+"""python -m tests.benchmarks: measure every row of what must hold and print the table. 1 where a row is not met.
+
+With --write the measurements are kept, and docs/performance.md and its pictures are made of all that is kept.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from tests.benchmarks.must_hold.catalogue import all_rows
+from tests.benchmarks.must_hold.kept import Kept, read, write
+from tests.benchmarks.must_hold.measure import measured_row
+from tests.benchmarks.must_hold.page import PAGE, figures, goal, page, verdict
+from tests.benchmarks.must_hold.scaling import PICTURES, draw, measured_curves
+
+
+def main(
+    words: Annotated[
+        list[str] | None, typer.Option("--only", "-k", help="Rows and pictures with this in their names (repeat it).")
+    ] = None,
+    keep: Annotated[
+        bool, typer.Option("--write", help="Keep the measurements; write the page and its pictures.")
+    ] = False,
+    from_kept: Annotated[bool, typer.Option("--from-kept", help="Measure nothing: show what is kept.")] = False,
+    scaling: Annotated[bool, typer.Option("--scaling", help="Measure the curves of the pictures as well.")] = False,
+) -> None:
+    """Measure the rows of what must hold, each against its rival in turns."""
+    console, results = Console(), read()
+    chosen = {name: row for name, row in all_rows().items() if not words or any(word in name for word in words)}
+    found: dict[str, Kept] = {name: kept for name, kept in results.rows.items() if name in chosen}
+    if not from_kept:
+        for name, row in chosen.items():
+            found[name] = measured_row(row)
+            console.print(f"{name}: {verdict(row, found[name])}, {', '.join(figures(row, found[name]))}", style="dim")
+    table = Table("row", "over, or of", "measured", "goal", "spread", "", "behind it")
+    for name, row in chosen.items():
+        value, spread, detail = figures(row, found.get(name))
+        table.add_row(name, row.what, value, goal(row), spread, verdict(row, found.get(name)), detail)
+    console.print(table)
+    if keep:
+        results.rows |= found
+        results.rows = {name: kept for name, kept in results.rows.items() if name in all_rows()}
+        if scaling:
+            for name, picture in PICTURES.items():
+                if not words or any(word in name for word in words):
+                    results.scaling[name] = measured_curves(picture)
+        write(results)
+        draw(results)
+        PAGE.write_text(page(results), encoding="utf-8")
+    met = all(verdict(row, found.get(name)) == "met" for name, row in chosen.items())
+    raise typer.Exit(0 if chosen and met else 1)
+
+
+if __name__ == "__main__":
+    typer.run(main)

@@ -1,0 +1,19 @@
+"""All rows of the table of what must hold, in the order of the page."""
+
+from __future__ import annotations
+
+from functools import cache
+
+from tests.benchmarks.must_hold import charts, evaluation, floating_frames, growth, modes, runs, start
+from tests.benchmarks.must_hold.row import Row
+
+SOURCES = (evaluation, runs, modes, floating_frames, growth, charts, start)
+
+
+@cache
+def all_rows() -> dict[str, Row]:
+    """By name."""
+    rows = [row for source in SOURCES for row in source.rows()]
+    found = {row.name: row for row in rows}
+    assert len(found) == len(rows), "two rows of one name"
+    return found

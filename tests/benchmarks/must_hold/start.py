@@ -1,0 +1,85 @@
+"""How long a newcomer waits: the README's example and the canonical cases, in processes of their own.
+
+The example is judged by its processor time, which is what it takes on the wall where nobody else is at work; the
+canonical cases, whose work is spread over processes, by the wall.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from functools import partial
+from pathlib import Path
+from statistics import median
+from time import perf_counter
+from typing import NamedTuple
+
+from tests.benchmarks.must_hold.row import Measured, Row
+from tests.repo.project import ROOT
+
+GROUP = "Start"
+COLD_ROUNDS, WARM_ROUNDS = 2, 5
+
+
+class Spent(NamedTuple):
+    """Seconds of a process and its children: user and system time, and on the wall."""
+
+    processor: float
+    wall: float
+
+
+def rows() -> list[Row]:
+    """Cold: nothing compiled yet. Warm: every kernel on disk."""
+    return [
+        Row("readme_cold", GROUP, "README's first example, cold", 15.0, partial(_readme, True), "at most", "s"),
+        Row("readme_warm", GROUP, "README's first example, warm", 1.2, partial(_readme, False), "at most", "s"),
+        Row("canonical_cold", GROUP, "crosscheck run canonical, cold", 300.0, _canonical, "at most", "s"),
+    ]
+
+
+def _readme(cold: bool) -> Measured:
+    """As a process of its own, imports included."""
+    example = re.findall(r"```python\n(.*?)```", (ROOT / "README.md").read_text(encoding="utf-8"), flags=re.DOTALL)[0]
+    command = [sys.executable, "-c", example]
+    with tempfile.TemporaryDirectory() as folder:
+        if not cold:
+            run(command, Path(folder))
+        rounds = COLD_ROUNDS if cold else WARM_ROUNDS
+        spent = [run(command, Path(folder) / f"{k}" if cold else Path(folder)) for k in range(rounds)]
+    seconds = [each.processor for each in spent]
+    wall = f"processor time; {median(each.wall for each in spent):.3g} s on the wall"
+    return Measured(median(seconds), min(seconds), max(seconds), wall)
+
+
+def _canonical() -> Measured:
+    """With a worker for each processor, as the command does by itself."""
+    with tempfile.TemporaryDirectory() as folder:
+        spent = run(crosscheck(Path(folder) / "out"), Path(folder) / "kernels")
+    detail = f"on the wall; {spent.processor:.3g} s of {os.cpu_count()} processors"
+    return Measured(spent.wall, spent.wall, spent.wall, detail)
+
+
+def crosscheck(out: Path, *options: str) -> Sequence[str]:
+    """The command that runs the canonical cases."""
+    main = "from crosscheck.cli import main; main()"
+    return [sys.executable, "-c", main, "run", "canonical", "--out", str(out), *options]
+
+
+def run(command: Sequence[str], kernels: Path | None = None) -> Spent:
+    """A process in the root of the repository, with its own folder of kernels, unless it is to use that of the user.
+
+    Raises CalledProcessError where it fails; what it printed is part of it.
+    """
+    from resource import RUSAGE_CHILDREN, getrusage  # Unix only, as most peers are
+
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    if kernels is not None:
+        environment["NUMBA_CACHE_DIR"] = str(kernels)
+    before, start = getrusage(RUSAGE_CHILDREN), perf_counter()
+    subprocess.run(command, cwd=ROOT, env=environment, check=True, capture_output=True, text=True)
+    wall, after = perf_counter() - start, getrusage(RUSAGE_CHILDREN)
+    return Spent(after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, wall)

@@ -1,0 +1,90 @@
+"""A line for who waits for the compiler, and none for who does not."""
+
+import logging
+import os
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+from flexmb.jit import progress
+from flexmb.jit.progress import announced
+
+ROOT = Path(__file__).parents[3]
+PROGRAM = """
+import logging, sys, time
+from pathlib import Path
+from flexmb.jit import cache, hooks, progress
+from flexmb.jit.kernel import kernel
+
+hooks.cache_directory = lambda: Path(sys.argv[1])
+progress.AFTER = float(sys.argv[2])
+if "silent" in sys.argv:
+    logging.getLogger("flexmb.jit").setLevel(logging.ERROR)
+
+@kernel
+def inner(x):
+    return 2.0 * x
+
+@kernel
+def slow(x):
+    "Twice a number.\\n\\nAnd more."
+    return inner(x)
+
+plain = slow._compiler.compile
+
+def slowly(*arguments):
+    time.sleep(1.0)
+    return plain(*arguments)
+
+slow._compiler.compile = slowly
+assert slow(1.5) == 3.0
+"""
+
+
+def lines(folder: Path, after: float, *options: str) -> list[str]:
+    """On stderr, of a process of its own."""
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    command = [sys.executable, "-c", PROGRAM, str(folder), str(after), *options]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True)
+    assert (done.returncode, done.stdout) == (0, ""), done.stderr
+    return done.stderr.splitlines()
+
+
+def test_a_slow_kernel_is_announced_once(tmp_path):
+    """What, for what, and that it is once; also of a kernel that contains another."""
+    [line] = lines(tmp_path, 0.1)
+    assert line == (
+        f"flexmb is compiling __main__.slow (Twice a number.) for scenes of this kind, once: it is kept in {tmp_path}"
+    )
+    assert lines(tmp_path, 0.1) == []  # it is found
+
+
+def test_a_fast_one_is_not(tmp_path):
+    assert lines(tmp_path, 100.0) == []
+
+
+def test_the_logger_silences_it(tmp_path):
+    assert lines(tmp_path, 0.1, "silent") == []
+
+
+def test_where_nothing_is_kept_the_line_says_so(monkeypatch, caplog):
+    monkeypatch.setattr(progress, "AFTER", 0.01)
+    with caplog.at_level(logging.WARNING, "flexmb.jit"), announced(lines, None):
+        time.sleep(0.3)
+    [record] = caplog.records
+    assert "in every process: no folder is writable" in record.getMessage()
+
+
+def test_an_error_ends_the_watch(monkeypatch, caplog):
+    monkeypatch.setattr(progress, "AFTER", 0.2)
+    with caplog.at_level(logging.WARNING, "flexmb.jit"):
+        try:
+            with announced(lines, None):
+                raise ValueError
+        except ValueError:
+            time.sleep(0.4)
+        assert caplog.records == []
+        with announced(lines, None):
+            time.sleep(0.4)
+    assert len(caplog.records) == 1

@@ -1,0 +1,149 @@
+"""What runs of one system keep for the next one: it makes them cheap, and changes nothing."""
+
+import threading
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+import flexmb.run.propagate as propagation
+import flexmb.run.switching as switching
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.run.observing import observe
+from flexmb.run.propagate import integration
+from flexmb.run.warm_up import looped, pendulum
+from flexmb.tables.status import Status
+from tests.trees import random_scene
+
+RUN = {"t_end": 0.02, "samples": 7, "rtol": 1e-6}
+
+
+def numbers(run: fm.Trajectory) -> list[np.ndarray]:
+    """Everything but seconds."""
+    markers = [each for path in run.markers.values() for each in vars(path).values()]
+    loads = [*run.loads.values(), *run.wheel_loads.values(), *run.drives.values()]
+    return [run.t, run.q, run.u, run.work, run.momentum, *run.energy.values(), *markers, *loads]
+
+
+def equal(one: fm.Trajectory, other: fm.Trajectory) -> bool:
+    pairs = zip(numbers(one), numbers(other), strict=True)
+    return one.message == other.message and all(np.array_equal(a, b) for a, b in pairs)
+
+
+@pytest.fixture(scope="module")
+def system() -> fm.System:
+    return fm.compile(random_scene(3))
+
+
+def kept(system: fm.System) -> int:
+    return sum(len(value) for key, value in system.kept.items() if isinstance(value, list))
+
+
+@pytest.mark.parametrize("algorithm", ["articulated", "composite", "frisch"])
+def test_a_later_run_is_the_first_one_again(algorithm):
+    fresh, used = fm.compile(random_scene(3)), fm.compile(random_scene(3))
+    first = fm.simulate(fresh, **RUN, algorithm=algorithm)
+    assert first.finished
+    for t_end in (0.05, 0.02):
+        fm.simulate(used, t_end, "rk4", step=1e-3, algorithm=algorithm)
+    fm.simulate(used, 0.05, samples=3, rtol=1e-3, max_steps=2, algorithm=algorithm)  # stops in the middle
+    assert equal(fm.simulate(used, **RUN, algorithm=algorithm), first)
+    assert equal(fm.simulate(used, **RUN, algorithm=algorithm), first)
+    assert kept(used) == 2  # one of each method
+
+
+@pytest.mark.parametrize("method", [name for name, each in INTEGRATORS.items() if each.linearises])
+def test_a_later_run_with_jacobians_is_the_first_one_again(method):
+    options = {"step": 5e-3} if INTEGRATORS[method].fixed else {}
+    system = fm.compile(pendulum())
+    runs = [fm.simulate(system, 0.02, method, samples=3, **options) for _ in range(3)]
+    assert equal(runs[0], runs[1]) and equal(runs[0], runs[2])
+
+
+def test_a_closed_chain_starts_anew():
+    """It remembers the branch it moves on."""
+    system = fm.compile(looped())
+    assert equal(fm.simulate(system, **RUN), fm.simulate(system, **RUN))
+    assert kept(system) == 0
+
+
+def test_what_fails_in_python_is_not_kept(system):
+    solver, count = INTEGRATORS["dop853"], kept(system)
+    with pytest.raises(ZeroDivisionError), integration(system, "articulated", 0.0, solver):
+        raise ZeroDivisionError
+    assert kept(system) <= count
+
+
+def test_runs_in_threads_do_not_share_workspaces(system):
+    """Two at once have an integration each; both are kept."""
+    alone = [fm.simulate(system, 0.02, samples=40, rtol=rtol) for rtol in (1e-6, 1e-9)]
+    found: list[list[fm.Trajectory]] = [[], []]
+
+    def work(i: int) -> None:
+        for _ in range(10):
+            found[i].append(fm.simulate(system, 0.02, samples=40, rtol=(1e-6, 1e-9)[i]))
+
+    threads = [threading.Thread(target=work, args=(i,)) for i in range(2)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    for expected, runs in zip(alone, found, strict=True):
+        assert len(runs) == 10 and all(equal(expected, run) for run in runs)
+    solver = INTEGRATORS["dop853"]
+    with integration(system, "articulated", 0.0, solver) as one, integration(system, "articulated", 0.0, solver) as two:
+        assert one is not two and not np.shares_memory(one._workspace.body, two._workspace.body)
+
+
+def test_a_scene_is_walked_once(monkeypatch):
+    """And cannot change afterwards."""
+    scene = pendulum()
+    system, walks = fm.compile(scene), []
+    whole = switching.timing
+    monkeypatch.setattr(switching, "timing", lambda scene: walks.append(scene) or whole(scene))
+    for _ in range(3):
+        fm.simulate(system, 1e-3, samples=2)
+    assert walks == [scene]
+    with pytest.raises(AttributeError):
+        scene.bodies = ()
+    with pytest.raises(AttributeError):
+        scene.hinges[0].coordinate.angle_rad = 1.0
+
+
+def test_kernels_are_compiled_in_the_first_run_only(monkeypatch):
+    system = fm.compile(pendulum())
+    first, second = (fm.simulate(system, 1e-3, samples=2).statistics for _ in range(2))
+    assert first.compile_s > second.compile_s
+    monkeypatch.setattr(propagation, "Integration", None)  # none is made
+    assert fm.simulate(system, 1e-3, samples=2).finished
+
+
+@pytest.mark.parametrize("sound", [0, 3])
+def test_single_states_take_over_where_the_compiled_loop_ends(system, sound):
+    """A loop that gives up at the first sample, or after some, changes nothing; a wrong row of it is seen."""
+    run = fm.simulate(system, **RUN)
+    states = np.hstack([run.q, run.u, run.work[:, None]])
+    with integration(system, "articulated", 0.0, INTEGRATORS["dop853"]) as solve:
+        whole = observe(system, "articulated", run.t, states, solve.batch)
+
+        def gives_up(times, states, rows):
+            count = min(len(times), 1) if times[0] < run.t[sound] else 0
+            return solve.batch(times[:count], states[:count], rows[:count])
+
+        assert np.array_equal(observe(system, "articulated", run.t, states, gives_up).rows, whole.rows)
+        assert np.array_equal(observe(system, "articulated", run.t, states, None).rows, whole.rows)
+        assert whole.trouble is None and len(whole.rows) == len(run.t)
+        states[4, 0] = np.nan
+        broken = observe(system, "articulated", run.t, states, solve.batch)
+    assert len(broken.rows) == 4 and isinstance(broken.trouble, fm.DynamicsError)
+    assert np.array_equal(broken.rows, whole.rows[:4])
+
+
+def test_outputs_that_overflow_end_the_samples():
+    """Squares of speeds overflow before the speeds do: the samples before are kept."""
+    builder = fm.SceneBuilder("spun").rigid_body("bob", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    builder.revolute("axle", "ground", "bob", rate=1e160)
+    run = fm.simulate(builder.scene(), 1e-165, "rk4", step=1e-166, samples=3)
+    assert run.status is Status.NONFINITE and len(run.t) == 0
+    assert run.message.startswith("stopped at t = 0 s: the result at t = 0 s is not finite")
+    assert run.momentum.shape == (0, 6) and run.energy["kinetic"].shape == (0,)

@@ -1,0 +1,209 @@
+"""Evaluators: the accelerations of a system to the bit, in one array, and with all its refusals."""
+
+import copy
+import gc
+import pickle
+import threading
+import tracemalloc
+import warnings
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.run.warm_up import looped
+from flexmb.system.algorithms import ALGORITHMS
+from flexmb.system.evaluator import Evaluator
+from tests.trees import random_scene
+
+
+@pytest.fixture(scope="module")
+def system() -> fm.System:
+    """A tree with quaternions, flexible bodies, wheels and prescribed speeds."""
+    return fm.compile(random_scene(3))
+
+
+def moving(system: fm.System, seed: int) -> fm.State:
+    start, rng = system.initial_state, np.random.default_rng(seed)
+    return system.state(start.q, start.u + 0.1 * rng.normal(size=system.nu), 0.25)
+
+
+@pytest.mark.parametrize("algorithm", ALGORITHMS)
+def test_it_gives_the_accelerations_to_the_bit(system, algorithm):
+    evaluator = system.evaluator(algorithm)
+    for seed in range(3):
+        state = moving(system, seed)
+        found = evaluator(state.t, state.q, state.u)
+        assert np.array_equal(found, system.accelerations(state, algorithm))
+        assert np.array_equal(found, system.evaluate(state.t, state.q, state.u, algorithm).accelerations)
+
+
+def test_the_array_is_used_again_and_only_read(system):
+    evaluator, state, other = system.evaluator(), moving(system, 0), moving(system, 1)
+    first = evaluator(state.t, state.q, state.u)
+    kept = first.copy()
+    assert evaluator(other.t, other.q, other.u) is first is evaluator.accelerations
+    assert not np.array_equal(first, kept)
+    with pytest.raises(ValueError, match="read-only"):
+        first[:] = 0.0
+    assert system.accelerations(state).flags.writeable
+
+
+def test_a_call_allocates_nothing(system):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    q, u = state.q, state.u
+    evaluator(state.t, q, u)
+    tracemalloc.start()
+    before = tracemalloc.get_traced_memory()[0]
+    tracemalloc.reset_peak()
+    for _ in range(100):
+        evaluator(0.25, q, u)
+    _, peak = tracemalloc.get_traced_memory()
+    tracemalloc.stop()
+    assert peak - before < 8 * system.nu
+
+
+def test_neither_state_nor_evaluators_disturb_each_other(system):
+    one, another = system.evaluator(), system.evaluator()
+    state, other = moving(system, 0), moving(system, 1)
+    q, u = state.q.copy(), state.u.copy()
+    found = one(state.t, state.q, state.u)
+    expected = found.copy()
+    another(other.t, other.q, other.u), system.accelerations(other), system.mass_matrix(other)
+    assert np.array_equal(found, expected)
+    assert np.array_equal(state.q, q) and np.array_equal(state.u, u)
+
+
+def test_numbers_of_any_real_type_are_taken(system):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    q, u = np.float32(state.q), np.float32(state.u)
+    expected = evaluator(0.25, q.astype(float), u.astype(float)).copy()
+    strided = np.repeat(q.astype(float), 2)[::2]
+    fixed = q.astype(float)
+    fixed.flags.writeable = False
+    for given in (q, q.astype(float).tolist(), tuple(q.tolist()), strided, fixed, q.astype(">f8")):
+        assert np.array_equal(evaluator(0.25, given, u), expected)
+    assert np.array_equal(evaluator(np.float64(0.25), q, u), expected)
+    assert np.array_equal(evaluator(0, q, u), evaluator(0.0, q, u))
+
+
+WRONG = {
+    "q too short": lambda t, q, u: (t, q[1:], u),
+    "q too long": lambda t, q, u: (t, np.append(q, 0.0), u),
+    "u too long": lambda t, q, u: (t, q, np.append(u, 0.0)),
+    "an entry of q in u": lambda t, q, u: (t, q[:-1], np.append(q[-1], u)),
+    "a column": lambda t, q, u: (t, q[:, None], u),
+    "complex": lambda t, q, u: (t, q + 0j, u),
+    "words": lambda t, q, u: (t, "q", u),
+    "None": lambda t, q, u: (t, q, None),
+    "NaN": lambda t, q, u: (t, q * np.nan, u),
+    "infinite": lambda t, q, u: (t, q, u + np.inf),
+    "no orientation": lambda t, q, u: (t, 0.0 * q, u),
+    "t NaN": lambda t, q, u: (np.nan, q, u),
+    "t infinite": lambda t, q, u: (np.inf, q, u),
+    "t a word": lambda t, q, u: ("0", q, u),
+    "t true": lambda t, q, u: (True, q, u),
+    "t complex": lambda t, q, u: (1j, q, u),
+}
+
+
+@pytest.mark.parametrize("wrong", WRONG)
+def test_what_is_wrong_is_refused_in_the_words_of_evaluate(system, wrong):
+    assert len(system.layout.quaternions)
+    evaluator, state = system.evaluator(), moving(system, 0)
+    given = WRONG[wrong](state.t, state.q, state.u)
+    with pytest.raises((ValueError, TypeError)) as ours:
+        evaluator(*given)
+    with pytest.raises(type(ours.value)) as theirs:
+        system.evaluate(*given)
+    assert str(ours.value) == str(theirs.value)
+    assert np.array_equal(evaluator(state.t, state.q, state.u), system.accelerations(state))  # it goes on
+
+
+def on_two_hinges(inertia: float, mass: float = 1e-30) -> fm.System:
+    """A body turned twice about the same axis, by way of one that weighs next to nothing."""
+    builder = fm.SceneBuilder("twice").rigid_body("link", mass=mass, inertia=(inertia,) * 3)
+    builder.rigid_body("bob", mass=1.0, inertia=(0.1, 0.1, 0.1))
+    return fm.compile(builder.revolute("a", "ground", "link").revolute("b", "link", "bob").scene())
+
+
+def test_what_has_no_accelerations_or_hardly_any_says_so_as_ever():
+    heavy = on_two_hinges(1e-3)
+    assert np.all(np.isfinite(heavy.evaluator()(0.0, np.zeros(2), np.ones(2))))
+    for inertia in (1e-14, 1e-17):
+        system = on_two_hinges(inertia)
+        said = [outcome(lambda s=system: s.accelerations(s.initial_state))]
+        said.append(outcome(lambda s=system: s.evaluator()(0.0, np.zeros(2), np.zeros(2))))
+        assert said[0] == said[1] and said[0][0]
+
+
+def outcome(call) -> tuple[str, str]:
+    """Class and text of the error or warning."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        try:
+            call()
+        except (fm.DynamicsError, fm.PrecisionWarning) as raised:
+            return type(raised).__name__, str(raised)
+    return "", ""
+
+
+def test_results_that_overflow_are_refused(system):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    with pytest.raises(fm.DynamicsError, match=r"the result at t = 0.25 s is not finite"):
+        evaluator(0.25, state.q, np.full(system.nu, 1e200))
+
+
+def test_it_holds_what_it_reads():
+    """The system is let go, its arrays are not."""
+    system = fm.compile(random_scene(5))
+    state, expected = moving(system, 0), system.accelerations(moving(system, 0))
+    evaluator = system.evaluator()
+    del system
+    for _ in range(3):
+        gc.collect()
+        _ = [np.full(1000, np.nan) for _ in range(1000)]
+        assert np.array_equal(evaluator(state.t, state.q, state.u), expected)
+
+
+def test_each_thread_has_its_own(system):
+    states = [moving(system, seed) for seed in range(4)]
+    expected = [system.accelerations(state) for state in states]
+    right = [False] * 4
+
+    def work(i: int, evaluator: Evaluator) -> None:
+        state = states[i]
+        right[i] = all(np.array_equal(evaluator(state.t, state.q, state.u), expected[i]) for _ in range(300))
+
+    threads = [threading.Thread(target=work, args=(i, system.evaluator())) for i in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert all(right)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda x: pickle.loads(pickle.dumps(x))])
+def test_copies_have_addresses_of_their_own(system, copied):
+    """A copy that kept an address would read freed memory, or write into the original."""
+    state = moving(system, 0)
+    expected = system.accelerations(state), system.mass_matrix(state), fm.simulate(system, 1e-3, samples=3).q
+    other, evaluator = copied(system), copied(system.evaluator("composite"))
+    assert not other._evaluators and not other.kept
+    found = other.accelerations(state), other.mass_matrix(state), fm.simulate(other, 1e-3, samples=3).q
+    assert all(np.array_equal(a, b) for a, b in zip(found, expected, strict=True))
+    assert np.array_equal(evaluator(state.t, state.q, state.u), system.accelerations(state, "composite"))
+    other._w.body["velocity"][:] = np.nan
+    assert np.array_equal(system.mass_matrix(state), expected[1])
+    with pytest.raises(TypeError, match="cannot be copied"):
+        copied(system._invert)
+
+
+def test_closed_chains_and_unknown_algorithms_are_refused(system):
+    with pytest.raises(NotImplementedError, match="use accelerations"):
+        fm.compile(looped()).evaluator()
+    for name in ("nonsense", None, ["articulated"]):
+        with pytest.raises(ValueError, match="algorithm is"):
+            system.evaluator(name)
+        with pytest.raises((ValueError, TypeError)):
+            system.accelerations(system.initial_state, name)
