@@ -290,13 +290,11 @@ class System(Mechanics):
 
     def _driven(self, names: Iterable[str]) -> dict[str, Index]:
         """Places in u of the prescribed coordinates, by hinge or wheel."""
-        found = {}
-        for name in names:
-            place = self.speed(name)
-            driven = self.constants.speed["prescribed"][place] >= 0
-            if np.any(driven):
-                found[name] = place.start + np.flatnonzero(driven)
-        return found
+        driven = self.constants.speed["prescribed"] >= 0
+        if not np.any(driven):
+            return {}
+        places = ((name, self.speed(name)) for name in names)
+        return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
 
 
 def _find(places: dict[str, slice], name: str) -> slice:
