@@ -46,7 +46,7 @@ def pose(c, w, k, R, arm):
 
 @helper
 def cross_hinge(c, w, k, V, A):
-    """Velocity and bias of O from those of the same point of the parent, in outboard axes: H u and the Coriolis term."""
+    """Velocity and bias of O from those of this point of the parent, in outboard axes: H u and the Coriolis term."""
     u = w.u[c.body[k].u_index]
     (x, y, z), v = V
     alpha, a = A

@@ -12,9 +12,10 @@ from rich.console import Console
 from rich.table import Table
 
 from tests.benchmarks.must_hold.catalogue import all_rows
-from tests.benchmarks.must_hold.kept import Kept, read, write
+from tests.benchmarks.must_hold.kept import Kept, Scaling, read, write
 from tests.benchmarks.must_hold.measure import measured_row
 from tests.benchmarks.must_hold.page import PAGE, figures, goal, page, verdict
+from tests.benchmarks.must_hold.row import Row
 from tests.benchmarks.must_hold.scaling import PICTURES, draw, measured_curves
 
 
@@ -26,33 +27,41 @@ def main(
         bool, typer.Option("--write", help="Keep the measurements; write the page and its pictures.")
     ] = False,
     from_kept: Annotated[bool, typer.Option("--from-kept", help="Measure nothing: show what is kept.")] = False,
-    scaling: Annotated[bool, typer.Option("--scaling", help="Measure the curves of the pictures as well.")] = False,
+    scaling: Annotated[bool, typer.Option("--scaling", help="With --write: measure the curves of pictures.")] = False,
 ) -> None:
     """Measure the rows of what must hold, each against its rival in turns."""
-    console, results = Console(), read()
-    chosen = {name: row for name, row in all_rows().items() if not words or any(word in name for word in words)}
-    found: dict[str, Kept] = {name: kept for name, kept in results.rows.items() if name in chosen}
+    console = Console()
+    chosen = {name: row for name, row in all_rows().items() if _is_asked_for(name, words)}
+    found = {name: kept for name, kept in read().rows.items() if name in chosen}
+    curves = dict[str, Scaling]()
     if not from_kept:
         for name, row in chosen.items():
             found[name] = measured_row(row)
             console.print(f"{name}: {verdict(row, found[name])}, {', '.join(figures(row, found[name]))}", style="dim")
-    table = Table("row", "over, or of", "measured", "goal", "spread", "", "behind it")
-    for name, row in chosen.items():
-        value, spread, detail = figures(row, found.get(name))
-        table.add_row(name, row.what, value, goal(row), spread, verdict(row, found.get(name)), detail)
-    console.print(table)
+        pictures = [picture for name, picture in PICTURES.items() if scaling and _is_asked_for(name, words)]
+        curves = {picture.name: measured_curves(picture) for picture in pictures}
+    console.print(_table(chosen, found))
     if keep:
-        results.rows |= found
-        results.rows = {name: kept for name, kept in results.rows.items() if name in all_rows()}
-        if scaling:
-            for name, picture in PICTURES.items():
-                if not words or any(word in name for word in words):
-                    results.scaling[name] = measured_curves(picture)
+        results = read()  # another process may have kept something meanwhile
+        results.rows = {name: kept for name, kept in (results.rows | found).items() if name in all_rows()}
+        results.scaling |= curves
         write(results)
         draw(results)
         PAGE.write_text(page(results), encoding="utf-8")
     met = all(verdict(row, found.get(name)) == "met" for name, row in chosen.items())
     raise typer.Exit(0 if chosen and met else 1)
+
+
+def _is_asked_for(name: str, words: list[str] | None) -> bool:
+    return not words or any(word in name for word in words)
+
+
+def _table(rows: dict[str, Row], found: dict[str, Kept]) -> Table:
+    table = Table("row", "over, or of", "measured", "goal", "spread", "", "behind it")
+    for name, row in rows.items():
+        value, spread, detail = figures(row, found.get(name))
+        table.add_row(name, row.what, value, goal(row), spread, verdict(row, found.get(name)), detail)
+    return table
 
 
 if __name__ == "__main__":

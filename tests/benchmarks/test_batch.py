@@ -28,7 +28,7 @@ def batch(scene: Scene, samples: int = SAMPLES) -> Call:
     q, u = (np.tile(each, (samples, 1)) for each in (state.q, state.u))
 
     def call() -> None:
-        found[:] = [system.accelerations_batch(q, u, t=0.0, threads=1)]
+        found[:] = [system.accelerations_batch(q, u, threads=1).accelerations]
 
     return Call(call, samples, lambda: found[0])
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
-from crosscheck.engines.links import links
+from tests.benchmarks.peers import mujoco_forward, pinocchio_aba
 from tests.benchmarks.rivals import interleaved, record, rigid_chain
 
 
@@ -20,30 +20,13 @@ def evaluation(scene):
     return lambda: system.rhs(0.0, y, dy, system.constants, workspace)
 
 
-def pinocchio_aba(scene):
-    pin = pytest.importorskip("pinocchio", reason="the rival is not installed: pip install flexmb[peers]")
-    from crosscheck.engines.pinocchio.tree import build_tree, initial_state
-
-    tree = build_tree(links(scene), np.array(scene.gravity_m_s2))
-    data, (q, v), tau = tree.model.createData(), initial_state(tree), np.zeros(tree.model.nv)
-    return lambda: pin.aba(tree.model, data, q, v, tau)
-
-
-def mujoco_forward(scene):
-    mujoco = pytest.importorskip("mujoco", reason="the rival is not installed: pip install flexmb[peers]")
-    from crosscheck.engines.mujoco.tree import build_tree, initial_state
-
-    tree = build_tree(links(scene), np.array(scene.gravity_m_s2))
-    data = mujoco.MjData(tree.model)
-    data.qpos[:], data.qvel[:] = initial_state(tree)
-    return lambda: mujoco.mj_forward(tree.model, data)
-
-
 @pytest.mark.parametrize("bodies", [1, 10, 50, 100])
 def test_rigid_chain(benchmark, bodies):
     scene = rigid_chain(bodies)
+    for peer in ("pinocchio", "mujoco"):
+        pytest.importorskip(peer, reason="the rival is not installed: pip install flexmb[peers]")
     native = evaluation(scene)
-    times = interleaved(native, pinocchio_aba(scene), mujoco_forward(scene))
+    times = interleaved(native, pinocchio_aba(scene).call, mujoco_forward(scene).call)
     record(benchmark, times[0], pinocchio=times[1], mujoco=times[2])
     benchmark.pedantic(native, rounds=20, iterations=100)
 

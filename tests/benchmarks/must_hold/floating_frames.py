@@ -2,10 +2,10 @@
 
 The error is the largest distance of the tip from where it should be, of what bending does to it: the largest distance
 from the tip of the same bodies rigid. Every code is held against its own converged answer, because on the boom the two
-differ: Exudyn's joints on deforming nodes are other joints. Native runs by the explicit or an implicit method, whichever
-is faster. Exudyn runs as fast as we could make it: trapezoidal rule or
-generalised-alpha with the longest step that is accurate enough, modified Newton (two to five times faster here than
-Newton with a new Jacobian in every step), the faster one of its linear solvers, and one sample a second.
+differ: Exudyn's joints on deforming nodes are other joints. Both run as fast as we could make them, with one sample a
+second. Native: the explicit or an implicit method. Exudyn: the trapezoidal rule or generalised-alpha with the longest
+step that is accurate enough, modified Newton (two to five times faster here than Newton with a new Jacobian in every
+step), and the faster one of its linear solvers.
 """
 
 from __future__ import annotations

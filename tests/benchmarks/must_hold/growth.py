@@ -28,7 +28,7 @@ def rows() -> list[Row]:
     ends = [("chain", 10, 1000, 1.2), *((tree, 1000, 100_000, 1.3) for tree in PARENTS)]
     return [
         Row(
-            f"growth_{tree.replace(' ', '_')}_{many}", GROUP, f"{tree}, {many:,} over {few:,} bodies", goal,
+            f"growth_{tree.replace(' ', '_')}_{few}_{many}", GROUP, f"{tree}, {many:,} over {few:,} bodies", goal,
             partial(_growth, tree, few, many), "at most",
         )
         for tree, few, many, goal in ends

@@ -11,8 +11,8 @@ from tests.benchmarks.routes import IN_A_RUN, Evaluation, articulated
 
 def from_python(system: fm.System) -> Call:
     """The accelerations as a user calls them again and again: one call, one evaluation."""
-    state, evaluate = system.initial_state, system.evaluator()
-    return Call(lambda: evaluate(0.0, state.q, state.u), 1, lambda: evaluate(0.0, state.q, state.u))
+    q, u, evaluate = system.initial_state.q, system.initial_state.u, system.evaluator()
+    return Call(lambda: evaluate(0.0, q, u), 1, lambda: evaluate(0.0, q, u))
 
 
 def kernel(system: fm.System, route: Callable[[fm.System], Evaluation] = articulated) -> Call:

@@ -1,4 +1,4 @@
-"""Kernels do not grow unnoticed: no clock, so no noise. Where growth is meant: python -m tests.flexmb.jit.kernel_budget.
+"""Kernels do not grow unnoticed: no clock, so no noise. If growth is meant: python -m tests.flexmb.jit.kernel_budget.
 
 Every scene is compiled anew in a process of its own, 8 to 13 s of processor time each, the one with everything 40 s.
 """
