@@ -34,6 +34,7 @@ def _shared_places(c, w):
 @helper
 def _own_places(c, w):
     """What a workspace holds of the constants, of copies with constants of their own."""
+    w.displaced[0] = 1  # bodies at rest are put there again
     store3(w.ground, 0, vec3(c.ground, 0))
     for i in range(c.rest.shape[0]):
         store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
@@ -81,7 +82,7 @@ def accelerations(start, stop, copies, problem, entries, doubt):
 
 @helper
 def _gather(first, stop, rows, lanes):
-    """lanes (n,LANES) = the rows (copies,n) from `first` on, the last one before `stop` again where there are no more."""
+    """lanes (n,LANES) = the rows (copies,n) from `first` on; where there are no more, the last one before `stop`."""
     for i in range(rows.shape[1]):
         if first + LANES <= stop:
             for lane in range(LANES):
