@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flexmb.entry import articulated
-from flexmb.integrate.control import all_finite
 from flexmb.jit.kernel import by_bundle, helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.motion import coordinates
@@ -35,6 +34,7 @@ def _shared_places(c, w):
 @helper
 def _own_places(c, w):
     """What a workspace holds of the constants, of copies with constants of their own."""
+    w.displaced[0] = 1  # bodies at rest are put there again
     store3(w.ground, 0, vec3(c.ground, 0))
     for i in range(c.rest.shape[0]):
         store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
@@ -58,22 +58,38 @@ def accelerations(start, stop, copies, problem, entries, doubt):
     """
     nq, nu = copies.q.shape[1], copies.u.shape[1]
     for first in range(start, stop, LANES):
+        _gather(first, stop, copies.q, entries.trial[:nq])
+        _gather(first, stop, copies.u, entries.trial[nq:])
         for lane in range(LANES):
-            copy = min(first + lane, stop - 1)
-            entries.time[0, lane] = copies.t[copy]
-            for i in range(nq):
-                entries.trial[i, lane] = copies.q[copy, i]
-            for j in range(nu):
-                entries.trial[nq + j, lane] = copies.u[copy, j]
+            entries.time[0, lane] = copies.t[min(first + lane, stop - 1)]
         status = problem.rhs(0, problem.stages, problem.constants, problem.workspace)
+        found, trouble = entries.k[0, nq : nq + nu], entries.norm[0]
+        for lane in range(LANES):
+            trouble[lane] = 0.0
+        for j in range(nu):
+            for lane in range(LANES):
+                trouble[lane] += found[j, lane] - found[j, lane]  # NaN unless it is finite
         for lane in range(min(LANES, stop - first)):
-            found = copies.accelerations[first + lane]
             for j in range(nu):
-                found[j] = entries.k[0, nq + j, lane]
-            if status != OK or not all_finite(found):
-                copies.status[first + lane] = NONFINITE if status == OK else status
+                copies.accelerations[first + lane, j] = found[j, lane]
+            if status != OK:
+                copies.status[first + lane] = status
+            elif trouble[lane] != 0.0:
+                copies.status[first + lane] = NONFINITE
             else:
                 copies.status[first + lane] = DOUBTFUL if doubt[0] != 0 else OK
+
+
+@helper
+def _gather(first, stop, rows, lanes):
+    """lanes (n,LANES) = the rows (copies,n) from `first` on; where there are no more, the last one before `stop`."""
+    for i in range(rows.shape[1]):
+        if first + LANES <= stop:
+            for lane in range(LANES):
+                lanes[i, lane] = rows[first + lane, i]
+        else:
+            for lane in range(LANES):
+                lanes[i, lane] = rows[min(first + lane, stop - 1), i]
 
 
 @kernel

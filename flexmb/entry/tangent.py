@@ -1,11 +1,10 @@
-"""Derivatives of the equations of motion, exact to round-off, by a complex step through the compiled kernels.
+"""Derivatives of the equations of motion, exact to round-off: eight columns of the Jacobian in one evaluation.
 
     w = tangent_workspace(system.constants, system.nq, system.nu)
     status = jacobian(t, y, J, system.constants, w)
 
-The kernels of the recursion are compiled once more for a workspace whose numbers are complex. One evaluation at
-y + i h e_j has the derivative with respect to y_j as its imaginary part over h: no difference is formed, nothing
-cancels, and h = 2^-100 leaves no error of its own.
+The kernels of the recursion are compiled once more for a workspace whose numbers are duals (`flexmb.jit.duals`): they
+carry their derivatives along eight directions with them. No difference is formed, and nothing cancels.
 
 y = [q, u, work] as in `flexmb.entry.articulated.rhs`. The constants must be those of the system (`System.constants`),
 not those with reduced bodies: every body is eliminated explicitly here.
@@ -19,21 +18,25 @@ import numpy as np
 
 from flexmb.entry.articulated import rhs
 from flexmb.jit.bundle import bundle
+from flexmb.jit.duals import DUAL, rate, seeded
 from flexmb.jit.kernel import kernel
+from flexmb.jit.lanes import LANES
+from flexmb.jit.wide_arrays import as_duals
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.status import OK
 from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real
 
-STEP = 2.0**-100  # its square is nothing beside 1; a power of two, so that it divides out exactly
-
 
 @bundle
 class TangentWorkspace(Workspace):
-    """A workspace whose numbers carry a derivative, and what a Jacobian needs besides."""
+    """A workspace whose numbers are duals, and what a Jacobian needs besides."""
 
-    state: Real  # (nq+nu+1,) complex y
-    slope: Real  # (nq+nu+1,) complex dy/dt
+    numbers = DUAL
+
+    time: Real  # (1,) s
+    state: Real  # (nq+nu+1,) y
+    slope: Real  # (nq+nu+1,) dy/dt
     column: Index  # (C,) places in y that dy/dt depends on; the others' columns vanish
 
 
@@ -42,9 +45,10 @@ def tangent_workspace(c: Constants, nq: int, nu: int) -> TangentWorkspace:
     n = nq + nu + 1
     tables = workspace(c, nq, nu)
     return TangentWorkspace(
-        **{field.name: _complex_array(getattr(tables, field.name)) for field in fields(tables)},
-        state=np.zeros(n, np.complex128),
-        slope=np.zeros(n, np.complex128),
+        **{field.name: as_duals(getattr(tables, field.name)) for field in fields(tables)},
+        time=as_duals(np.zeros(1)),
+        state=as_duals(np.zeros(n)),
+        slope=as_duals(np.zeros(n)),
         column=_columns(c, nq, nu),
     )
 
@@ -55,49 +59,41 @@ def jacobian(t, y, J, c, w):
 
     Prescribed coordinates and speeds are functions of time: their columns vanish, and so do their rows.
     """
-    n = y.shape[0]
+    n, columns = y.shape[0], w.column.shape[0]
+    w.time[0] = t
     for i in range(n):
         w.state[i] = y[i]
         for j in range(n):
             J[i, j] = 0.0
-    time = complex(t, 0.0)
-    if w.column.shape[0] == 0:
-        return rhs(time, w.state, w.slope, c, w)
-    for place in range(w.column.shape[0]):
-        j = w.column[place]
-        w.state[j] = complex(y[j], STEP)
-        status = rhs(time, w.state, w.slope, c, w)
-        w.state[j] = y[j]
+    if columns == 0:
+        return rhs(w.time[0], w.state, w.slope, c, w)
+    for first in range(0, columns, LANES):
+        count = min(LANES, columns - first)
+        for lane in range(count):
+            j = w.column[first + lane]
+            w.state[j] = seeded(w.state[j], lane)
+        status = rhs(w.time[0], w.state, w.slope, c, w)
+        for lane in range(count):
+            j = w.column[first + lane]
+            w.state[j] = y[j]
+            for i in range(n):
+                J[i, j] = rate(w.slope[i], lane)
         if status != OK:
             return status
-        for i in range(n):
-            J[i, j] = w.slope[i].imag / STEP
     return OK
 
 
 @kernel
 def time_derivative(t, y, out, c, w):
     """out (n,) = partial d(dy/dt)/dt at fixed y, of the functions of time; returns a status code."""
+    w.time[0] = t
+    w.time[0] = seeded(w.time[0], 0)
     for i in range(y.shape[0]):
         w.state[i] = y[i]
-    status = rhs(complex(t, STEP), w.state, w.slope, c, w)
+    status = rhs(w.time[0], w.state, w.slope, c, w)
     for i in range(y.shape[0]):
-        out[i] = w.slope[i].imag / STEP
+        out[i] = rate(w.slope[i], 0)
     return status
-
-
-def _complex_array(array: Real | Index) -> Real:
-    """A copy whose float64 fields are complex128."""
-    return array.astype(_complex_type(array.dtype))
-
-
-def _complex_type(dtype: np.dtype) -> np.dtype:
-    if dtype.subdtype is not None:
-        base, shape = dtype.subdtype
-        return np.dtype((_complex_type(base), shape))
-    if dtype.names is not None:
-        return np.dtype([(name, _complex_type(dtype[name])) for name in dtype.names], align=True)
-    return np.dtype(np.complex128) if dtype == np.float64 else dtype
 
 
 def _columns(c: Constants, nq: int, nu: int) -> Index:

@@ -13,9 +13,9 @@ from flexmb.integrate.control import EVALUATIONS
 from flexmb.integrate.dop853_tableau import STAGES_DENSE
 from flexmb.jit.bundle import AnyBundle, bundle
 from flexmb.jit.kernel import helper, kernel, written_out
-from flexmb.jit.lane_arrays import lane_zeros
-from flexmb.jit.lanes import LANES, select
+from flexmb.jit.lanes import LANE, LANES, select
 from flexmb.jit.pointer import NOTHING, STATUS, Pointer, pointer
+from flexmb.jit.wide_arrays import wide_zeros
 from flexmb.typing import Real
 
 
@@ -23,7 +23,7 @@ from flexmb.typing import Real
 class LaneStages:
     """A step of LANES runs with states of n numbers."""
 
-    in_lanes = True
+    numbers = LANE
 
     time: Real  # (1,LANES) s, of what is evaluated or projected
     trial: Real  # (n,LANES) the state that is evaluated or projected
@@ -70,7 +70,7 @@ def lane_stages(n: int) -> LaneStages:
     stages = STAGES_DENSE  # of the method that has most
     shapes = {"time": (1,), "k": (stages, n), "f": (7, n), "h": (1,), "fraction": (1,), "norm": (3,), "chosen": (1,)}
     shapes |= {name: (n,) for name in ("trial", "y", "y_new")}
-    return LaneStages(**{name: lane_zeros(shape) for name, shape in shapes.items()})
+    return LaneStages(**{name: wide_zeros(shape) for name, shape in shapes.items()})
 
 
 def lane_entries(s: LaneStages) -> LaneEntries:

@@ -7,7 +7,8 @@ bundle.py       many arrays as one argument
 tables.py       arrays of bundles inside kernels
 lanes.py        eight copies of a number as one value, and masks: how kernels run eight scenes at once
 lane_functions.py  their elementary functions
-lane_arrays.py  arrays of them
+duals.py        a number and its derivatives along eight directions: eight columns of a Jacobian at once
+wide_arrays.py  arrays of lanes and duals
 pointer.py      kernels as arguments of kernels
 direct.py       kernels called by address, from Python and from kernels
 parts.py        helpers are compiled into their callers only

@@ -19,7 +19,6 @@ from numba.core import cgutils
 from numba.core.typing.templates import AttributeTemplate
 from numba.extending import NativeValue, infer_getattr, lower_getattr_generic, models, register_model, unbox
 
-from flexmb.jit.lanes import LANE
 from flexmb.jit.tables import BYTE, WORD, TableType, table
 
 Class = TypeVar("Class", bound=type)
@@ -34,7 +33,7 @@ def bundle(cls: Class) -> Class:
 
     Inside a kernel `b.name` is the array or bundle; in Python too. The arrays must be C-contiguous; kernels may
     write to them. A method `features` says what is in them: a frozenset of names, part of the type of the bundle. Of a
-    class with `in_lanes = True` the floats of kernels are lanes: the arrays are those of `flexmb.jit.lane_arrays`.
+    class with `numbers = LANE` or DUAL the floats are such numbers: the arrays are those of `flexmb.jit.wide_arrays`.
     """
     cls.__post_init__ = _describe  # type: ignore[attr-defined]
     cls.__reduce__ = _reduce  # type: ignore[method-assign]
@@ -55,13 +54,13 @@ def _describe(self: Any) -> None:
             row[0] = array._address
             kinds.append((name, array._numba_type_))
             continue
-        in_lanes = getattr(type(self), "in_lanes", False)
-        shape = array.shape[:-1] if in_lanes and array.dtype == np.float64 else array.shape
+        numbers = getattr(type(self), "numbers", types.float64)
+        shape = array.shape[:-1] if numbers != types.float64 and array.dtype == np.float64 else array.shape
         if not array.flags.c_contiguous or len(shape) > _DIMENSIONS:
             raise ValueError(f"{name}: a bundle holds C-contiguous arrays of at most {_DIMENSIONS} dimensions")
         row[0] = array.ctypes.data
         row[1 : 1 + len(shape)] = shape
-        kinds.append((name, _array_type(array.dtype, len(shape), in_lanes)))
+        kinds.append((name, _array_type(array.dtype, len(shape), numbers)))
         if features:
             array.setflags(write=False)
     object.__setattr__(self, "_table", table)
@@ -70,9 +69,9 @@ def _describe(self: Any) -> None:
 
 
 @cache
-def _array_type(dtype: np.dtype, dimensions: int, in_lanes: bool) -> TableType:
+def _array_type(dtype: np.dtype, dimensions: int, numbers: types.Type) -> TableType:
     """Kept, because numba takes a tenth of a millisecond to describe a record."""
-    return TableType(LANE if in_lanes and dtype == np.float64 else from_dtype(dtype), dimensions)
+    return TableType(numbers if dtype == np.float64 else from_dtype(dtype), dimensions)
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:

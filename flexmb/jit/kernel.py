@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from numba import config, njit, types
+from numba import config, njit
 from numba.extending import overload
 
 from flexmb.jit.bundle import BundleType
@@ -78,24 +78,18 @@ def by_bundle(kind: type, of_kind: Callable[..., Any], others: Callable[..., Any
     return choose
 
 
-def by_number(
-    real: Callable[..., Any], tangent: Callable[..., Any], lanes: Callable[..., Any] | None = None
-) -> Callable[..., Any]:
-    """One function for three kinds of numbers: `tangent` where an argument is complex, `lanes` (by default the same as
-    `real`) where one is a `flexmb.jit.lanes.LaneType`, `real` where all are floats.
+def by_number(one: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..., Any]:
+    """One function for two kinds of numbers: `lanes` where an argument is a `flexmb.jit.lanes.LaneType`, else `one`.
 
     Decided by type, while the caller is compiled, like `by_bundle`.
     """
-    of_lanes = real if lanes is None else lanes
 
     def choose(*args: Any) -> Any:
-        return (tangent if any(isinstance(x, complex) for x in args) else real)(*args)
+        return one(*args)
 
     @overload(choose, jit_options=AS_PART)
     def _typed(*args):
-        choice = of_lanes if LANE in args else real
-        if any(isinstance(kind, types.Complex) for kind in args):
-            choice = tangent
+        choice = lanes if LANE in args else one
 
         def call(*args):
             return choice(*args)

@@ -79,13 +79,18 @@ def _near(builder: Any, x: Any) -> tuple[Any, Any]:
 
 def _lane_by_lane(context: Any, builder: Any, function: Any, *args: Any) -> Any:
     """The library's function of one lane after the other."""
-    of = signature(types.float64, *(types.float64 for _ in args))
-    called = context.get_function(function, of)
+    called = _library(context, builder, function, len(args))
     result = cgutils.alloca_once(builder, _NUMBERS)
     with cgutils.for_range(builder, ir.IntType(64)(LANES)) as loop:
-        value = called(builder, [builder.extract_element(arg, loop.index) for arg in args])
+        value = called([builder.extract_element(arg, loop.index) for arg in args])
         builder.store(builder.insert_element(builder.load(result), value, loop.index), result)
     return builder.load(result)
+
+
+def _library(context: Any, builder: Any, function: Any, count: int) -> Any:
+    """A function of `count` floats, to be called with their values."""
+    called = context.get_function(function, signature(types.float64, *[types.float64] * count))
+    return lambda args: called(builder, args)
 
 
 @infer_global(sincos)
@@ -96,18 +101,23 @@ class _SinCos(AbstractTemplate):
 
 
 def _both(context: Any, builder: Any, x: Any) -> tuple[Any, Any]:
-    """(sin x, cos x)."""
-    size = _instruction(builder, "fabs", x)
-    near = builder.bitcast(builder.fcmp_ordered("<", size, _number(_FARTHEST)), ir.IntType(LANES))
-    sine, cosine = (cgutils.alloca_once(builder, _NUMBERS) for _ in range(2))
-    with builder.if_else(builder.icmp_unsigned("==", near, near.type(-1)), likely=True) as (all_near, some_far):
-        with all_near:
-            for place, value in zip((sine, cosine), _near(builder, x), strict=True):
-                builder.store(value, place)
-        with some_far:
-            builder.store(_lane_by_lane(context, builder, math.sin, x), sine)
-            builder.store(_lane_by_lane(context, builder, math.cos, x), cosine)
-    return builder.load(sine), builder.load(cosine)
+    """(sin x, cos x). What one lane gets does not depend on the others: far ones are put in by themselves."""
+    is_near = builder.fcmp_ordered("<", _instruction(builder, "fabs", x), _number(_FARTHEST))
+    places = [cgutils.alloca_once(builder, _NUMBERS) for _ in range(2)]
+    for place, value in zip(places, _near(builder, builder.select(is_near, x, _number(0.0))), strict=True):
+        builder.store(value, place)
+    near = builder.bitcast(is_near, ir.IntType(LANES))
+    with (
+        builder.if_then(builder.icmp_unsigned("!=", near, near.type(-1)), likely=False),
+        cgutils.for_range(builder, ir.IntType(64)(LANES)) as loop,
+        builder.if_then(builder.not_(builder.extract_element(is_near, loop.index))),
+    ):
+        far = builder.extract_element(x, loop.index)
+        for place, function in zip(places, (math.sin, math.cos), strict=True):
+            value = _library(context, builder, function, 1)([far])
+            builder.store(builder.insert_element(builder.load(place), value, loop.index), place)
+    sine, cosine = map(builder.load, places)
+    return sine, cosine
 
 
 @lower_builtin(sincos, LaneType)

@@ -39,6 +39,7 @@ BYTES = 8 * LANES  # of a lane value, and what its address must be a multiple of
 class LaneType(types.Type):
     """Eight float64; floats and integers become one by repetition."""
 
+    width = LANES
     bitwidth = 8 * BYTES
 
     def __init__(self) -> None:

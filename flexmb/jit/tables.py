@@ -4,7 +4,7 @@ Numba's own arrays carry owners, strides and reference counts, which every funct
 compiles again. A kernel needs none of this: the bundle holds its arrays, and they are contiguous. Inside a kernel a
 table reads as an array does (`c.body[k].parent`, `w.pff[k, n, i] = x`, `U[m, m + 1 : n]`, `a.shape[0]`); a nested array
 of a record is a table with constant extents. Indices are not checked, and negative ones do not count from the end.
-The floats of a record with a field PADDING are lanes: see `flexmb.jit.lane_arrays`.
+The floats of a record with a field PADDING are lanes or duals, by their last axis: see `flexmb.jit.wide_arrays`.
 """
 
 from __future__ import annotations
@@ -28,10 +28,12 @@ from numba.extending import (
     register_model,
 )
 
-from flexmb.jit.lanes import LANE, LANES
+from flexmb.jit.duals import DUAL
+from flexmb.jit.lanes import LANE
 
 WORD, BYTE = ir.IntType(64), ir.IntType(8)
-PADDING = "padding"  # the last field of records whose floats are lanes
+PADDING = "padding"  # the last field of records whose floats are lanes or duals
+_WIDE = {kind.width: kind for kind in (LANE, DUAL)}
 
 
 @cache
@@ -61,8 +63,7 @@ class RowType(types.Type):
         if isinstance(kind, types.NestedArray):
             kind, shape = kind.dtype, kind.shape
         if kind == types.float64 and PADDING in self.record.fields:
-            assert shape[-1] == LANES
-            kind, shape = LANE, shape[:-1]
+            kind, shape = _WIDE[shape[-1]], shape[:-1]
         return kind, shape
 
 
@@ -218,8 +219,13 @@ def _set_field(context, builder, sig, args, name):
 
 
 def _load(context, builder, kind, place):
+    if kind == DUAL:
+        return kind.load(builder, place)
     return context.unpack_value(builder, kind, builder.bitcast(place, context.get_data_type(kind).as_pointer()))
 
 
 def _store(context, builder, kind, value, place):
+    if kind == DUAL:
+        kind.store(builder, value, place)
+        return
     context.pack_value(builder, kind, value, builder.bitcast(place, context.get_data_type(kind).as_pointer()))

@@ -138,7 +138,7 @@ def _both_forms(t2):
 
 
 # a1 = sin t/t, a2 = (1 - cos t)/t^2, a3 = (t - sin t)/t^3, and b2 = a2'/t, b3 = a3'/t, from t^2
-exponential_coefficients = by_number(_one_form, _one_form, _both_forms)
+exponential_coefficients = by_number(_one_form, _both_forms)
 
 
 @helper

@@ -121,7 +121,7 @@ def _piece(table, row):
     return x[0], x[1], x[2], x[3], x[4], x[5], x[6]
 
 
-piece_at = by_number(_piece_at, _piece_at, _pieces_at)
+piece_at = by_number(_piece_at, _pieces_at)
 
 
 @helper

@@ -12,8 +12,8 @@ from dataclasses import fields
 import numpy as np
 
 from flexmb.jit.bundle import bundle
-from flexmb.jit.lane_arrays import in_lanes
-from flexmb.jit.lanes import LANES
+from flexmb.jit.lanes import LANE, LANES
+from flexmb.jit.wide_arrays import in_lanes
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.typing import Real, Record
 
@@ -22,14 +22,14 @@ from flexmb.typing import Real, Record
 class LaneWorkspace(Workspace):
     """What one evaluation of LANES copies writes."""
 
-    in_lanes = True
+    numbers = LANE
 
 
 @bundle
 class LaneConstants(Constants):
     """Everything that does not change in a run, of LANES copies of one structure."""
 
-    in_lanes = True
+    numbers = LANE
 
     ground: Real  # (3,LANES) acceleration of the ground, World axes
     rest: Record  # (P,) PORT_STATE of the undeformed bodies

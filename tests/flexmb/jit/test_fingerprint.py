@@ -100,12 +100,12 @@ def of_others(b):
 
 
 @helper
-def of_tangents(x):
+def of_lanes(x):
     return x
 
 
 choose = by_bundle(Some, of_some, of_others)
-root = by_number(math.sqrt, of_tangents)
+root = by_number(math.sqrt, of_lanes)
 
 
 @kernel
@@ -146,7 +146,7 @@ CODE = {
     "the choice between bundles": ("by_bundle(Some, of_some, of_others)", "by_bundle(Others, of_some, of_others)"),
     "what is chosen": ("by_bundle(Some, of_some, of_others)", "by_bundle(Some, of_others, of_some)"),
     "one variant": ("return b.values[1]", "return b.values[2]"),
-    "the variant for complex numbers": ("def of_tangents(x):\n    return x", "def of_tangents(x):\n    return -x"),
+    "the variant for lanes": ("def of_lanes(x):\n    return x", "def of_lanes(x):\n    return -x"),
     "the variant for real numbers": ("by_number(math.sqrt", "by_number(math.exp"),
     "a name that is bound anew": ("@kernel", "first = second\n\n\n@kernel"),
     "two names exchanged": ("@kernel", "first, second = second, first\n\n\n@kernel"),

@@ -8,8 +8,8 @@ from numba.core.errors import TypingError
 
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.lane_arrays import in_lanes, lane_dtype, lane_zeros
-from flexmb.jit.lanes import BYTES, LANES, every, kept, select, some
+from flexmb.jit.wide_arrays import in_lanes, wide_dtype, wide_zeros
+from flexmb.jit.lanes import BYTES, LANE, LANES, every, kept, select, some
 from flexmb.spatial.scalar import atan2, cos, sin, sincos, sqrt
 
 ULP = 2.0**-52
@@ -19,7 +19,7 @@ ROW = np.dtype([("number", np.int64), ("x", np.float64), ("v", np.float64, (2, 3
 
 @bundle
 class Numbers:
-    in_lanes = True
+    numbers = LANE
 
     a: np.ndarray  # (n,LANES)
     b: np.ndarray  # (n,LANES)
@@ -30,7 +30,7 @@ class Numbers:
 def numbers(a, b=None, out=8) -> Numbers:
     a = np.atleast_2d(a)
     b = a if b is None else np.atleast_2d(b)
-    return Numbers(in_lanes(list(a.T)), in_lanes(list(b.T)), lane_zeros((out,)), lane_zeros((3,), ROW))
+    return Numbers(in_lanes(list(a.T)), in_lanes(list(b.T)), wide_zeros((out,)), wide_zeros((3,), ROW))
 
 
 def random(seed: int, rows: int = 1) -> np.ndarray:
@@ -163,6 +163,16 @@ def test_sine_and_cosine_of_whatever_there_is():
         np.testing.assert_allclose(found, right, rtol=2 * ULP, atol=0.0)
 
 
+def test_a_lane_does_not_depend_on_its_neighbours():
+    x = np.random.default_rng(3).uniform(-9.0, 9.0, (50, LANES))
+    disturbed = x.copy()
+    disturbed[:, 3] = 1e9
+    disturbed[::2, 6] = np.nan
+    own = np.array([0, 1, 2, 4, 5, 7])
+    for one, other in zip(sines(x), sines(disturbed), strict=True):
+        np.testing.assert_array_equal(one[:, own], other[:, own])
+
+
 @kernel
 def others(n):
     n.out[0] = atan2(n.a[0], n.b[0])
@@ -202,12 +212,12 @@ def test_floats_of_records_are_lanes_and_integers_are_shared():
 
 def test_arrays_of_lanes_stand_where_vector_instructions_ask():
     for n in (1, 3):
-        rows = lane_zeros((n,), ROW)
+        rows = wide_zeros((n,), ROW)
         assert rows.ctypes.data % BYTES == 0
         assert rows.dtype.itemsize % BYTES == 0
         assert all(rows.dtype.fields[name][1] % BYTES == 0 for name in ("x", "v"))
-        assert lane_zeros((n, 2)).shape == (n, 2, LANES)
-    assert lane_dtype(np.dtype(np.int64)) == np.int64
+        assert wide_zeros((n, 2)).shape == (n, 2, LANES)
+    assert wide_dtype(np.dtype(np.int64)) == np.int64
 
 
 def test_copies_become_lanes():

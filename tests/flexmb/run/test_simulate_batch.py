@@ -29,6 +29,14 @@ def pendulum(mass: float = 1.0, damping: float = 0.05, start: float = 0.2, durat
     return scene.scene()
 
 
+@pytest.fixture(scope="module", autouse=True)
+def kernels_of_their_own():
+    """Few scenes, many methods: kernels of what these scenes contain are compiled sooner than general ones."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.delenv("FLEXMB_KERNELS", raising=False)
+        yield
+
+
 @pytest.fixture(scope="module")
 def system() -> fm.System:
     return fm.compile(pendulum())
