@@ -22,7 +22,11 @@ from flexmb.tables.workspaces import workspace
 from tests import trees
 from tests.bounds import gamma
 
-PARENTS = {"chain": lambda k: k - 1, "star": lambda k: min(k, 1) - 1, "binary tree": lambda k: (k - 1) // 2 if k else -1}
+PARENTS = {
+    "chain": lambda k: k - 1,
+    "star": lambda k: min(k, 1) - 1,
+    "binary tree": lambda k: (k - 1) // 2 if k else -1,
+}
 FEW = 100
 
 
