@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import numpy as np
 
 from flexmb.entry import articulated
+from flexmb.integrate.lane_problem import lane_entries, lane_stages
+from flexmb.jit.direct import at_address, status_at
 from flexmb.jit.kernel import by_bundle, helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.motion import coordinates
 from flexmb.spatial.vector import mat3, store3, store9, vec3
 from flexmb.tables.lane_tables import LaneConstants
 from flexmb.tables.status import NONFINITE, OK
-from flexmb.typing import Index, Real
 
 DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may be rounding
-
-
-class Copies(NamedTuple):
-    """n states, what is found of them, and a status for each: OK, why not, or DOUBTFUL."""
-
-    q: Real  # (n,nq)
-    u: Real  # (n,nu)
-    t: Real  # (n,) s
-    accelerations: Real  # (n,nu)
-    status: Index  # (n,)
 
 
 @helper
@@ -45,39 +36,46 @@ take_places = by_bundle(LaneConstants, _own_places, _shared_places)
 
 
 @kernel
-def rhs(stage, s, c, w):
-    """Slopes s.k[stage] (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
-    return articulated.rhs(s.time[0], s.trial, s.k[stage], c, w)
+def rhs(s, c, w):
+    """Slopes (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
+    return articulated.rhs(s.time[0], s.trial, s.k[s.stage[0]], c, w)
+
+
+entries_at = at_address(lane_entries(lane_stages(1), np.zeros(1, np.int64)))
 
 
 @kernel
-def accelerations(start, stop, copies, problem, entries, doubt):
-    """udot of copies start to stop - 1, LANES at a time; what is left over has the last one in its empty lanes.
+def accelerations(where, span, q, u, t, found, status):
+    """udot (n,nu) of copies span[0] to span[1] - 1 at q (n,nq), u (n,nu), t (n,), and a status (n,) for each.
 
-    By the right-hand side of runs, so that there is one kernel for both. doubt (1,) is that of the workspace.
+    `where`: addresses of `rhs`, of what it takes, and of the entries of its stages. LANES copies at a time; where fewer
+    are left, the last one is in the empty lanes too. By the right-hand side of runs: there is one kernel for both.
     """
-    nq, nu = copies.q.shape[1], copies.u.shape[1]
+    function, s, c, w, e = where
+    start, stop = span
+    entries = entries_at(e)
+    nq, nu = q.shape[1], u.shape[1]
     for first in range(start, stop, LANES):
-        _gather(first, stop, copies.q, entries.trial[:nq])
-        _gather(first, stop, copies.u, entries.trial[nq:])
+        _gather(first, stop, q, entries.trial)
+        _gather(first, stop, u, entries.trial[nq:])
         for lane in range(LANES):
-            entries.time[0, lane] = copies.t[min(first + lane, stop - 1)]
-        status = problem.rhs(0, problem.stages, problem.constants, problem.workspace)
-        found, trouble = entries.k[0, nq : nq + nu], entries.norm[0]
+            entries.time[0, lane] = t[min(first + lane, stop - 1)]
+        whole = status_at(function, (s, c, w))
+        slope, trouble = entries.k[0, nq : nq + nu], entries.norm[0]
         for lane in range(LANES):
             trouble[lane] = 0.0
         for j in range(nu):
             for lane in range(LANES):
-                trouble[lane] += found[j, lane] - found[j, lane]  # NaN unless it is finite
+                trouble[lane] += slope[j, lane] - slope[j, lane]  # NaN unless it is finite
         for lane in range(min(LANES, stop - first)):
             for j in range(nu):
-                copies.accelerations[first + lane, j] = found[j, lane]
-            if status != OK:
-                copies.status[first + lane] = status
+                found[first + lane, j] = slope[j, lane]
+            if whole != OK:
+                status[first + lane] = whole
             elif trouble[lane] != 0.0:
-                copies.status[first + lane] = NONFINITE
+                status[first + lane] = NONFINITE
             else:
-                copies.status[first + lane] = DOUBTFUL if doubt[0] != 0 else OK
+                status[first + lane] = DOUBTFUL if entries.doubt[0] != 0 else OK
 
 
 @helper

@@ -101,7 +101,7 @@ def _stages(problem, s, entries, control, counts):
         if stage == _END:
             break
         _set_times(entries, control, C[stage])
-        status = lane_derivative(problem, stage, counts)
+        status = lane_derivative(problem, s, stage, counts)
         if status != OK:
             return status
     return OK
@@ -149,7 +149,7 @@ def _first_step(problem, s, entries, control, accuracy, counts):
     for i in range(s.y.shape[0]):
         s.trial[i] = s.y[i] + s.h[0] * s.k[0, i]
     _set_times(entries, control, 1.0)
-    status = lane_derivative(problem, 1, counts)
+    status = lane_derivative(problem, s, 1, counts)
     if status != OK:
         return status
     for i in range(s.y.shape[0]):
@@ -199,7 +199,7 @@ def _interpolant(problem, s, entries, control, counts):
     for stage in range(STAGES + 1, STAGES_DENSE):
         _combine(s, A[stage], stage)
         _set_times(entries, control, C[stage])
-        status = lane_derivative(problem, stage, counts)
+        status = lane_derivative(problem, s, stage, counts)
         if status != OK:
             return status
     h = s.h[0]
@@ -357,7 +357,7 @@ def _attempt(problem, s, entries, control, accuracy, counts):
     lane_copy(s.trial, s.y_new)
     for lane in range(LANES):
         entries.time[0, lane] = min(control.end[lane], control.last[lane])
-    status = lane_derivative(problem, _END, counts)
+    status = lane_derivative(problem, s, _END, counts)
     if status != OK:
         return status
     accepted = s.chosen[0]
@@ -375,7 +375,7 @@ def _derivative_at_start(problem, s, entries, control, counts):
     for lane in range(LANES):
         entries.time[0, lane] = control.t[lane]
     lane_copy(s.y, s.trial)
-    status = lane_derivative(problem, 0, counts)
+    status = lane_derivative(problem, s, 0, counts)
     mark_finite(s.k[0], s.chosen)
     for lane in range(LANES):
         if control.status[lane] == RUNNING and entries.chosen[0, lane] == 0.0:

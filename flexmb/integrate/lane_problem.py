@@ -7,7 +7,10 @@ finds it, and runs it alone.
 
 from __future__ import annotations
 
+from dataclasses import fields
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from flexmb.integrate.control import EVALUATIONS
 from flexmb.integrate.dop853_tableau import STAGES_DENSE
@@ -16,7 +19,7 @@ from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.jit.lanes import LANE, LANES, select
 from flexmb.jit.pointer import NOTHING, STATUS, Pointer, pointer
 from flexmb.jit.wide_arrays import wide_zeros
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 
 @bundle
@@ -35,10 +38,12 @@ class LaneStages:
     fraction: Real  # (1,LANES) of the step, where the interpolant is asked
     norm: Real  # (3,LANES) sums over the components of a state
     chosen: Real  # (1,LANES) 1 for lanes that go on, 0 for those that stay
+    stage: Index  # (1,) which slope is evaluated
 
 
-class LaneEntries(NamedTuple):
-    """The same numbers as arrays of floats, of which each lane reads and writes its own."""
+@bundle
+class LaneEntries:
+    """The same numbers as floats, of which each lane reads and writes its own."""
 
     time: Real
     trial: Real
@@ -49,13 +54,14 @@ class LaneEntries(NamedTuple):
     fraction: Real
     norm: Real
     chosen: Real
+    doubt: Index  # (1,) that of the workspace
 
 
 class LaneProblem(NamedTuple):
     """y' = f(t, y) for LANES states y.
 
-    rhs(stage, stages, constants, workspace) puts f of stages.trial into stages.k[stage] and returns a status code, OK
-    unless no lane has a derivative; project(stages, constants) puts stages.trial back on its manifold.
+    rhs(stages, constants, workspace) puts f of stages.trial into stages.k[stages.stage[0]] and returns a status code,
+    OK unless no lane has a derivative; project(stages, constants) puts stages.trial back on its manifold.
     """
 
     rhs: Pointer
@@ -70,18 +76,19 @@ def lane_stages(n: int) -> LaneStages:
     stages = STAGES_DENSE  # of the method that has most
     shapes = {"time": (1,), "k": (stages, n), "f": (7, n), "h": (1,), "fraction": (1,), "norm": (3,), "chosen": (1,)}
     shapes |= {name: (n,) for name in ("trial", "y", "y_new")}
-    return LaneStages(**{name: wide_zeros(shape) for name, shape in shapes.items()})
+    return LaneStages(**{name: wide_zeros(shape) for name, shape in shapes.items()}, stage=np.zeros(1, np.int64))
 
 
-def lane_entries(s: LaneStages) -> LaneEntries:
-    """The same arrays."""
-    return LaneEntries(*(getattr(s, name) for name in LaneEntries._fields))
+def lane_entries(s: LaneStages, doubt: Index) -> LaneEntries:
+    """The same arrays, and `doubt` (1,) of a workspace."""
+    names = [field.name for field in fields(LaneEntries) if field.name != "doubt"]
+    return LaneEntries(**{name: getattr(s, name) for name in names}, doubt=doubt)
 
 
 def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, workspace: Any) -> LaneProblem:
     """Of kernels and bundles."""
     return LaneProblem(
-        pointer(rhs, STATUS, STATUS, stages, constants, workspace),
+        pointer(rhs, STATUS, stages, constants, workspace),
         pointer(project, NOTHING, stages, constants),
         AnyBundle(stages),
         AnyBundle(constants),
@@ -90,11 +97,12 @@ def lane_problem(rhs: Any, project: Any, stages: LaneStages, constants: Any, wor
 
 
 @written_out
-def lane_derivative(problem, stage, counts):
+def lane_derivative(problem, s, stage, counts):
     """The slope of this stage; returns a status code. counts (LANES,COUNTS)."""
     for lane in range(LANES):
         counts[lane, EVALUATIONS] += 1
-    return problem.rhs(stage, problem.stages, problem.constants, problem.workspace)
+    s.stage[0] = stage
+    return problem.rhs(problem.stages, problem.constants, problem.workspace)
 
 
 @helper
@@ -143,4 +151,4 @@ def first_derivative(problem, s, entries, t, counts):
     lane_copy(s.y, s.trial)
     problem.project(problem.stages, problem.constants)
     lane_copy(s.trial, s.y)
-    return lane_derivative(problem, 0, counts)
+    return lane_derivative(problem, s, 0, counts)

@@ -21,16 +21,16 @@ def _step(problem, s, entries, t, last, h, counts):
     """s.trial = y(t + h) from s.y; no stage is later than `last`. Returns a status code."""
     set_all(entries.time, t)
     lane_copy(s.y, s.trial)
-    status = lane_derivative(problem, 0, counts)
+    status = lane_derivative(problem, s, 0, counts)
     set_all(entries.time, t + 0.5 * h)
     for stage in range(1, 3):
         if status == OK:
             _advance(s, s.k[stage - 1], 0.5 * h)
-            status = lane_derivative(problem, stage, counts)
+            status = lane_derivative(problem, s, stage, counts)
     set_all(entries.time, min(t + h, last))
     if status == OK:
         _advance(s, s.k[2], h)
-        status = lane_derivative(problem, 3, counts)
+        status = lane_derivative(problem, s, 3, counts)
     for i in range(s.y.shape[0]):
         s.trial[i] = s.y[i] + h / 6.0 * (s.k[0, i] + 2.0 * (s.k[1, i] + s.k[2, i]) + s.k[3, i])
     return status

@@ -8,10 +8,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.entry import lanes
 from flexmb.integrate.control import COUNTS, STOP
 from flexmb.integrate.dop853_lanes import LaneControl, dop853_lanes, lane_control
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.lane_problem import LaneStages, first_derivative, lane_entries
+from flexmb.integrate.lane_problem import first_derivative, lane_problem
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
@@ -19,9 +20,8 @@ from flexmb.jit.lanes import LANES
 from flexmb.run.propagate import Integration, recursion
 from flexmb.run.switching import timing_of
 from flexmb.system import algorithms
-from flexmb.system.batch import Batch, in_threads
+from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.tree_system import System
-from flexmb.tables.lane_tables import LaneWorkspace
 from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Index, Real
 
@@ -73,18 +73,18 @@ class BatchRun:
         return [self._ends[min(copy, last)] for copy in copies]
 
     def _in_lanes(self, firsts: Iterable[int]) -> None:
-        with self._batch.tables() as (w, s):
+        with self._batch.tables() as tables:
             for first in firsts:
-                self._block(first, w, s)
+                self._block(first, tables)
 
-    def _block(self, first: int, w: LaneWorkspace, s: LaneStages) -> None:
+    def _block(self, first: int, tables: LaneTables) -> None:
         """Run LANES copies; those whose end the lanes do not decide are left for later."""
-        entries = lane_entries(s)
+        w, s, entries = tables
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))
         s.y[...] = found.y.T
-        problem = self._batch.problem(first // LANES, w, s)
+        problem = lane_problem(lanes.rhs, lanes.project, s, self._batch.constants(first // LANES, w), w)
         if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
             self._examine(first, found.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)

@@ -18,9 +18,10 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from flexmb.entry import lanes
-from flexmb.entry.lanes import Copies
-from flexmb.integrate.lane_problem import LaneProblem, LaneStages, lane_entries, lane_problem, lane_stages
+from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
+from flexmb.jit.direct import addresses
 from flexmb.jit.lanes import LANES
+from flexmb.jit.pointer import STATUS
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
@@ -34,6 +35,24 @@ if TYPE_CHECKING:
     from flexmb.system.tree_system import System
 
 _WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
+
+
+class Copies(NamedTuple):
+    """n states, what is found of them, and a status for each."""
+
+    q: Real  # (n,nq)
+    u: Real  # (n,nu)
+    t: Real  # (n,) s
+    accelerations: Real  # (n,nu)
+    status: Index  # (n,)
+
+
+class LaneTables(NamedTuple):
+    """What one thread writes: workspace and stages, and these as floats."""
+
+    workspace: LaneWorkspace
+    stages: LaneStages
+    entries: LaneEntries
 
 
 class BatchAccelerations(NamedTuple):
@@ -61,7 +80,7 @@ class Batch:
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
         self.in_lanes = not first.scene.closures
         self._constants: list[Constants] = [first.constants]
-        self._spare: list[tuple[LaneWorkspace, LaneStages]] = []
+        self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
             self._constants = [
                 lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
@@ -72,20 +91,21 @@ class Batch:
         return self.systems[0 if self.shares_constants else copy]
 
     @contextmanager
-    def tables(self) -> Iterator[tuple[LaneWorkspace, LaneStages]]:
+    def tables(self) -> Iterator[LaneTables]:
         """For LANES copies, nobody else's meanwhile. To make them takes longer than to evaluate a thousand copies."""
         try:
             found = self._spare.pop()
         except IndexError:
-            found = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1)
+            w, s = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1)
+            found = LaneTables(w, s, lane_entries(s, w.doubt))
         yield found
         self._spare.append(found)
 
-    def problem(self, block: int, w: LaneWorkspace, s: LaneStages) -> LaneProblem:
-        """The equations of motion of the copies LANES * block and on."""
+    def constants(self, block: int, w: LaneWorkspace) -> Constants:
+        """Of the copies LANES * block and on; makes a workspace ready for them."""
         c = self._constants[0 if self.shares_constants else block]
         lanes.begin(c, w)
-        return lane_problem(lanes.rhs, lanes.project, s, c, w)
+        return c
 
     def states(self, q: Any, u: Any) -> tuple[Real, Real]:
         """Coordinates (n,nq) and speeds (n,nu) of all copies, C-contiguous; ValueError where they do not fit."""
@@ -125,11 +145,12 @@ class Batch:
         n = len(copies.q)
 
         def work(ranges: Iterable[tuple[int, int]]) -> None:
-            with self.tables() as (w, s):
-                entries = lane_entries(s)
-                for start, stop in ranges:
-                    problem = self.problem(start // LANES, w, s)
-                    lanes.accelerations(start, stop, copies, problem, entries, w.doubt)
+            with self.tables() as (w, s, entries):
+                s.stage[0] = 0
+                for span in ranges:
+                    c = self.constants(span[0] // LANES, w)
+                    where = *addresses(lanes.rhs, STATUS, s, c, w), entries._address
+                    lanes.accelerations(where, span, *copies)
 
         step = n if self.shares_constants else LANES
         if self.shares_constants and threads > 1:
