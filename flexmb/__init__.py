@@ -67,12 +67,10 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "Interrupted",
-    "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin", "System",
-    "Trajectory", "advise",
-    "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
-    "simulate_batch",
-    "steady_spin",
+    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
+    "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
+    "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
+    "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 

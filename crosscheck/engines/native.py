@@ -55,6 +55,7 @@ class NativeEngine:
         self.summary = summary
         self._algorithm: Algorithm = algorithm
         self._method: Method = method
+        self._supported: tuple[Scene, NativeModel] | None = None  # made to see whether it can be; for `compile` to take
 
     def version(self) -> str:
         try:
@@ -64,7 +65,7 @@ class NativeEngine:
 
     def supports(self, scene: Scene) -> Support:
         try:
-            self.compile(scene)
+            self._supported = scene, self._made(scene)
         except (ValueError, NotImplementedError) as error:  # a faulty scene among the former
             return Support("no", str(error))
         reason = _approximation(scene, self._algorithm)
@@ -81,6 +82,10 @@ class NativeEngine:
 
         NotImplementedError where an algorithm or method has no loops.
         """
+        before, self._supported = self._supported, None
+        return before[1] if before is not None and before[0] is scene else self._made(scene)
+
+    def _made(self, scene: Scene) -> NativeModel:
         system = compile(scene)
         system.route(self._algorithm)
         if scene.closures and INTEGRATORS[self._method].linearises:

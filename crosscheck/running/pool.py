@@ -33,6 +33,7 @@ START_LIMIT_S = 120.0  # for a worker to start and to read its job
 TICK_S = 0.25
 LOG_LIMIT_BYTES = 64 * 2**20
 THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+KERNELS = "FLEXMB_KERNELS"  # flexmb's, which compiles for what a scene contains unless it is "general"
 STDIN, STDOUT, STDERR = 0, 1, 2
 
 Function = Callable[[Any, Callable[[Any], None]], None]
@@ -102,8 +103,9 @@ def run_jobs(
     `function` must be importable by name. `kind(job)` names what a worker has to load or compile for a job: workers
     stay with their kind while there are jobs of it. Only one worker is at a kind until its first job is done, so that
     what that job compiles and leaves on disk is not compiled twice. Whatever workers print goes to the file `log`,
-    which starts again when it becomes too long. Numerical libraries get one thread per worker. Closing the iterator
-    early stops the workers.
+    which starts again when it becomes too long. Numerical libraries get one thread per worker, and flexmb
+    compiles general kernels where FLEXMB_KERNELS says nothing: a session has dozens of scenes, and kernels made for one
+    serve few others. Closing the iterator early stops the workers.
 
     A job is stopped after `time_limit_s(job)`, or when its worker with all that this started holds more memory than
     `memory_limit_bytes` (by default an equal part of what the machine has).
@@ -151,8 +153,9 @@ def _start(worker: _Worker, function: Function, log: str) -> None:
     """Give a worker a process; the thread limits are set in the environment it inherits, before it imports anything."""
     context = get_context("spawn")
     here, there = context.Pipe()
-    before = {name: os.environ.get(name) for name in THREAD_LIMITS}
-    os.environ.update(dict.fromkeys(THREAD_LIMITS, "1"))
+    its_own = dict.fromkeys(THREAD_LIMITS, "1") | {KERNELS: os.environ.get(KERNELS, "general")}
+    before = {name: os.environ.get(name) for name in its_own}
+    os.environ.update(its_own)
     process = context.Process(target=_serve, args=(there, function, log), daemon=True)
     try:
         process.start()

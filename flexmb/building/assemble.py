@@ -3,13 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import accumulate
+from typing import TypeVar
 
 import numpy as np
 
 from flexmb.building.carried import moved_inertia
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
 from flexmb.building.links import BodyLink, Port, closure_sides, port
+from flexmb.building.models import ORIGIN
 from flexmb.building.numbering import Numbering
+from flexmb.building.rigid_arrays import Frames, inboard_frames, outboard_frames
 from flexmb.hinges.catalogue import KINDS
 from flexmb.levels.body import LEVELS
 from flexmb.scene import schema as s
@@ -21,18 +26,20 @@ from flexmb.tables.functions import pack
 DOUBTFUL = 2.0**-33  # of all that a speed moves: chains of hundreds of bodies yield no less than this
 
 
+Item = TypeVar("Item", s.Wheel, s.Load)
+
+
 class Functions:
     """Functions of time by number, each stored once."""
 
     def __init__(self) -> None:
-        self.all: list[s.Function] = []
+        self._number: dict[s.Function, int] = {}
 
     def number(self, function: s.Function | None) -> int:
-        if function is None:
-            return -1
-        if function not in self.all:
-            self.all.append(function)
-        return self.all.index(function)
+        return -1 if function is None else self._number.setdefault(function, len(self._number))
+
+    def all(self) -> list[s.Function]:
+        return list(self._number)
 
 
 class Ports:
@@ -50,7 +57,12 @@ class Ports:
         if place is None:
             return -1
         body, i = place
-        return sum(len(ports) for ports in self.by_body[:body]) + i
+        return self._first[body] + i
+
+    @cached_property
+    def _first(self) -> list[int]:
+        """By body, how many ports those before it have."""
+        return list(accumulate((len(ports) for ports in self.by_body), initial=0))
 
     def all(self) -> list[Port]:
         return [port for ports in self.by_body for port in ports]
@@ -58,7 +70,7 @@ class Ports:
 
 def body_port(link: BodyLink, node: str, offset: s.Vector) -> Port:
     """Port at a node of a link for wheels, loads and markers, in the link's frame."""
-    return port(link.model, node, offset, IDENTITY, np.eye(3))
+    return port(link.node(node), offset, IDENTITY, np.eye(3))
 
 
 @dataclass(frozen=True)
@@ -76,60 +88,63 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     `null_partitions` gives a port to inboard hinges at nodes that do not deform too, so that terms which vanish are
     computed all the same.
     """
-    index = {link.name: k for k, link in enumerate(chain)}
+    index = {link.name: k for k, link in enumerate(chain) if not isinstance(link.body, s.PointMass)}
     functions, ports = Functions(), Ports(chain)
-    wheels = [wheel for link in chain for wheel in scene.wheels if wheel.body == link.name]
-    loads = [load for link in chain for load in scene.loads if load.body == link.name]
+    wheels, loads = _by_body(scene.wheels, index), _by_body(scene.loads, index)
 
     def place(item: s.Wheel | s.Load | s.Marker) -> tuple[int, int]:
         k = index[item.body]
         return ports.add(k, body_port(chain[k], item.node, getattr(item, "offset_m", ZERO)))
 
-    inboard = [
-        link.inboard if link.parent == GROUND else _moved(link.inboard, chain[index[link.parent]]) for link in chain
-    ]
+    parent = [index.get(link.parent, -1) for link in chain]
+    placement, flexible = _on_rigid_bodies(chain, parent), _on_flexible_bodies(chain, parent)
+    for k, at in flexible.items():
+        placement.p[k], placement.R[k] = at.origin, at.frame
+    held = [k for k, p in enumerate(parent) if null_partitions and p >= 0 and k not in flexible]
+    flexible |= {k: _as_port(placement, k) for k in held}
     inboard_ports = [
-        ports.add(index[link.parent], at) if at.deforms or (null_partitions and link.parent != GROUND) else None
-        for link, at in zip(chain, inboard, strict=True)
+        ports.add(parent[k], at) if (at := flexible.get(k)) is not None and (at.deforms or null_partitions) else None
+        for k in range(len(chain))
     ]
-    outboard_ports = [ports.add(k, link.outboard) if link.outboard.deforms else None for k, link in enumerate(chain)]
+    outboard_ports = [
+        ports.add(k, link.outboard) if not link.is_rigid and link.outboard.deforms else None
+        for k, link in enumerate(chain)
+    ]
     wheel_ports, load_ports = [place(wheel) for wheel in wheels], [place(load) for load in loads]
     marker_ports = {marker.name: place(marker) for marker in scene.markers}
     sides = [
-        None if side.body == GROUND else ports.add(index[side.body], side.port(chain[index[side.body]].model))
+        None if side.body == GROUND else ports.add(index[side.body], side.port(chain[index[side.body]]))
         for closure in scene.closures
         for side in closure_sides(closure)
     ]
 
-    m = max((link.model.mode_count for link in chain), default=0)
+    m = max((link.mode_count for link in chain), default=0)
     inertia, points, of_points = inertia_arrays(chain, m)
     port_rows, of_ports = second_order_rows([at.node.second for at in ports.all()], 0, m)
     points["point"]["second"], second_shape = second_order_rows(of_points, len(of_ports), m)
     body = inertia.pop("body")
-    body["parent"] = [index.get(link.parent, -1) for link in chain]
+    body["parent"] = parent
     body["level"] = [LEVELS.index(link.level) for link in chain]
     body["hinge_kind"] = [KINDS.index(link.kind) for link in chain]
     body["axis"] = [link.kind.axis for link in chain]
     body["sequence"] = [(*link.sequence, 0, 0, 0)[:3] for link in chain]
-    body["q_index"] = [numbering.q[link.hinge.name].start for link in chain]
+    body["q_index"], body["u_index"] = np.array(numbering.hinges).reshape(-1, 2).T
     body["quaternion"] = [
-        -1 if link.kind.quaternion < 0 else numbering.q[link.hinge.name].start + link.kind.quaternion for link in chain
+        -1 if link.kind.quaternion < 0 else q + link.kind.quaternion
+        for link, (q, _) in zip(chain, numbering.hinges, strict=True)
     ]
-    body["u_index"] = [numbering.u[link.hinge.name].start for link in chain]
     body["nv"] = [link.kind.speeds for link in chain]
-    body["modes"] = [link.model.mode_count for link in chain]
-    body["eta_index"] = [numbering.q[f"{link.name}.modes"].start for link in chain]
-    body["etad_index"] = [numbering.u[f"{link.name}.modes"].start for link in chain]
+    body["modes"] = [link.mode_count for link in chain]
+    body["eta_index"], body["etad_index"] = np.array(numbering.modes).reshape(-1, 2).T
     body["inboard_port"] = [ports.number(at) for at in inboard_ports]
     body["outboard_port"] = [ports.number(at) for at in outboard_ports]
-    body["placement_position"] = [at.node.position + at.offset for at in inboard]
-    body["placement_rotation"] = [at.frame.ravel() for at in inboard]
+    body["placement_position"], body["placement_rotation"] = placement.p, placement.R.reshape(-1, 9)
     group(body, "port", [len(each) for each in ports.by_body])
-    group(body, "wheel", [sum(wheel.body == link.name for wheel in wheels) for link in chain])
-    group(body, "load", [sum(load.body == link.name for load in loads) for link in chain])
+    for name, items in (("wheel", wheels), ("load", loads)):
+        group(body, name, np.bincount(np.array([index[item.body] for item in items], int), minlength=len(chain)))
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, [ports.number(at) for at in load_ports], functions)
-    function, table = pack(functions.all)
+    function, table = pack(functions.all())
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
@@ -149,6 +164,39 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     constants = replace(constants, speed=speed)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
+
+
+def _by_body(items: tuple[Item, ...], index: dict[str, int]) -> list[Item]:
+    """In the order of the bodies, those of one body in the scene's order."""
+    return sorted(items, key=lambda item: index[item.body])
+
+
+def _on_rigid_bodies(chain: list[BodyLink], parent: list[int]) -> Frames:
+    """Inboard hinge frames in the frames of their parents' links, where the parent is rigid or the ground."""
+    placement = Frames(np.zeros((len(chain), 3, 3)), np.zeros((len(chain), 3)))
+    placed = [k for k, p in enumerate(parent) if p < 0 or chain[p].is_rigid]
+    inboard = inboard_frames([chain[k] for k in placed])
+    rigid = [k for k, link in enumerate(chain) if link.is_rigid]
+    outboard = outboard_frames([chain[k] for k in rigid])
+    base = Frames(np.tile(np.eye(3), (len(chain) + 1, 1, 1)), np.zeros((len(chain) + 1, 3)))  # the last is the ground's
+    base.R[rigid], base.p[rigid] = outboard
+    on = [parent[k] for k in placed]
+    placement.R[placed], placement.p[placed] = inboard.seen_from(Frames(base.R[on], base.p[on]))
+    return placement
+
+
+def _on_flexible_bodies(chain: list[BodyLink], parent: list[int]) -> dict[int, Port]:
+    """By link, the inboard hinge frames in the frames of their parents' links, where the parent is flexible."""
+    return {
+        k: _moved(link.inboard, chain[p])
+        for k, (link, p) in enumerate(zip(chain, parent, strict=True))
+        if p >= 0 and not chain[p].is_rigid
+    }
+
+
+def _as_port(placement: Frames, k: int) -> Port:
+    """A frame on a rigid body."""
+    return Port(ORIGIN, placement.p[k], placement.R[k])
 
 
 def _moved(inboard: Port, parent: BodyLink) -> Port:
@@ -193,29 +241,23 @@ def _speeds(
     out = np.zeros(numbering.nu, a.SPEED)
     for name in ("coordinate", "motor", "prescribed"):
         out[name] = -1
-    for k, link in enumerate(chain):
-        q, u = numbering.q[link.hinge.name].start, numbering.u[link.hinge.name].start
-        body["ball_spring"][k], damping = link.kind.ball(link.hinge)
-        if damping:
-            out["damping"][u : u + 3] = damping
+    at, rows = list[int](), list[tuple[float, ...]]()
+    for k, (link, (q, u)) in enumerate(zip(chain, numbering.hinges, strict=True)):
+        stiffness, damping = link.kind.ball(link.hinge)
+        if stiffness or damping:
+            body["ball_spring"][k], out["damping"][u : u + 3] = stiffness, damping
         for n, (_, c) in enumerate(link.scalar):
             if isinstance(c, s.AngularCoordinate):
-                spring, motor, prescribed = (
-                    (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad),
-                    c.torque_Nm,
-                    c.prescribed_rad,
-                )
+                law, load, motion = (c.stiffness_Nm_rad, c.damping_Nms_rad, c.rest_rad), c.torque_Nm, c.prescribed_rad
             else:
-                spring, motor, prescribed = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
-            out[u + n] = (q + n, functions.number(motor), functions.number(prescribed), *spring, 0.0)
+                law, load, motion = (c.stiffness_N_m, c.damping_Ns_m, c.rest_m), c.force_N, c.prescribed_m
+            at.append(u + n)
+            rows.append((q + n, functions.number(load), functions.number(motion), *law))
     for wheel in wheels:
-        out[numbering.u[wheel.name].start] = (
-            numbering.q[wheel.name].start,
-            functions.number(wheel.torque_Nm),
-            functions.number(wheel.prescribed_rad),
-            0.0,
-            wheel.friction_Nms_rad,
-            0.0,
-            0.0,
-        )
+        at.append(numbering.u[wheel.name].start)
+        motor, motion = functions.number(wheel.torque_Nm), functions.number(wheel.prescribed_rad)
+        rows.append((numbering.q[wheel.name].start, motor, motion, 0.0, wheel.friction_Nms_rad, 0.0))
+    keys = ("coordinate", "motor", "prescribed", "stiffness", "damping", "rest")
+    for key, values in zip(keys, np.array(rows, float).reshape(-1, len(keys)).T, strict=True):
+        out[key][at] = values
     return out

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from math import sqrt
+
 import numpy as np
 
 from flexmb.hinges.catalogue import KINDS
@@ -15,32 +17,28 @@ def moved_inertia(c: Constants) -> Real:
     Moments are about hinges, of chains stretched out, hinges that slide at their zeros: sqrt(J) of what is carried at a
     distance l is sqrt(J) + sqrt(m) l at most.
     """
-    bodies = len(c.body)
-    mass, inertia = c.body["rigid"][:, 0].copy(), np.sum(c.body["rigid"][:, 4:7], axis=1)
+    parent, kind, nv, speed = (c.body[key].tolist() for key in ("parent", "hinge_kind", "nv", "u_index"))
+    mass, inertia = c.body["rigid"][:, 0].tolist(), np.sum(c.body["rigid"][:, 4:7], axis=1).tolist()
+    port = np.append(np.linalg.norm(c.port["position"] + c.port["offset"], axis=1), 0.0)  # the last one: none
+    to_hinge = port[c.body["outboard_port"]].tolist()
+    placed = np.linalg.norm(c.body["placement_position"], axis=1)
+    arm = np.where(c.body["inboard_port"] >= 0, port[c.body["inboard_port"]], placed).tolist()
     moved = np.zeros(len(c.speed))
-    for k in range(bodies - 1, -1, -1):
-        body = c.body[k]
-        about_hinge = _about(inertia[k], mass[k], _distance(c, body["outboard_port"]))
-        linear = KINDS[body["hinge_kind"]].displacements
-        for n in range(body["nv"]):
-            moved[body["u_index"] + n] = mass[k] if n in linear else about_hinge
-        for n in range(body["modes"]):
-            moved[body["etad_index"] + n] = c.pair["mff"][k, n, n]
-        parent, port = body["parent"], body["inboard_port"]
-        if parent >= 0:
-            arm = float(np.linalg.norm(body["placement_position"])) if port < 0 else _distance(c, port)
-            mass[parent] += mass[k]
-            inertia[parent] += _about(about_hinge, mass[k], arm)
-    for wheel in c.wheel:
-        moved[wheel["u_index"]] = wheel["axial"]
+    for k in range(len(parent) - 1, -1, -1):
+        about_hinge = _about(inertia[k], mass[k], to_hinge[k])
+        linear = KINDS[kind[k]].displacements
+        for n in range(nv[k]):
+            moved[speed[k] + n] = mass[k] if n in linear else about_hinge
+        if parent[k] >= 0:
+            mass[parent[k]] += mass[k]
+            inertia[parent[k]] += _about(about_hinge, mass[k], arm[k])
+    for k in np.flatnonzero(c.body["modes"]):
+        first, n = c.body["etad_index"][k], c.body["modes"][k]
+        moved[first : first + n] = np.diagonal(c.pair["mff"][k])[:n]
+    moved[c.wheel["u_index"]] = c.wheel["axial"]
     return moved
 
 
 def _about(inertia: float, mass: float, distance: float) -> float:
     """Bound of the moment of inertia about a point at a distance."""
-    return float((np.sqrt(inertia) + np.sqrt(mass) * distance) ** 2)
-
-
-def _distance(c: Constants, port: int) -> float:
-    """Of a port from its body's frame, at rest."""
-    return float(np.linalg.norm(c.port["position"][port] + c.port["offset"][port])) if port >= 0 else 0.0
+    return (sqrt(inertia) + sqrt(mass) * distance) ** 2

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flexmb.building.links import BodyLink
+from flexmb.building.rigid_arrays import outboard_frames, rigid_inertia_rows
 from flexmb.levels.level import six
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.tables import arrays as a
@@ -19,22 +20,31 @@ def inertia_arrays(
 ) -> tuple[dict[str, a.Record], dict[str, a.Record], list[SecondOrder | None]]:
     """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
     second-order field of each."""
-    bodies = [link.level.tables(link.model, link.wheels) for link in chain]
     body = np.zeros(len(chain), a.BODY)
     mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
-    for k, each in enumerate(bodies):
+    body["orthogonal"] = body["uncoupled"] = True
+    rigid = [k for k, link in enumerate(chain) if link.is_rigid and link.wheels == 0]
+    alone = [chain[k] for k in rigid]
+    body["rigid"][rigid] = rigid_inertia_rows(alone, outboard_frames(alone))
+    summed = sorted(set(range(len(chain))).difference(rigid))
+    bodies = {k: chain[k].level.tables(chain[k].model, chain[k].wheels) for k in summed}
+    for k, each in bodies.items():
         n = len(each.mode)
         _drop_rounding(each.pair["mff"], len(chain[k].model.mass))
         body["rigid"][k], mode[k, :n], pair[k, :n, :n] = each.rigid, each.mode, each.pair
         body["orthogonal"][k] = _is_diagonal(each.pair["mff"])
         body["uncoupled"][k] = _is_diagonal(each.pair["stiffness"]) and _is_diagonal(each.pair["damping"])
-    body["product"], product = _rows([each.product for each in bodies], np.zeros((1 + m) * 9 * m))
-    slopes = [each.slope for each in bodies]
-    mass_slopes = [each.mass_slope for each in bodies]
-    body["slope"], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
-    body["mass_slope"], mass_slope = _rows(mass_slopes, np.zeros((m, m, m)))
-    turning = [(p, i) for p in (each.summed for each in bodies) if p is not None for i in range(len(p.mass))]
-    group(body, "point", [0 if each.summed is None else len(each.summed.mass) for each in bodies])
+    for name in ("product", "slope", "mass_slope"):
+        body[name] = -1
+    body["product"][summed], product = _rows([each.product for each in bodies.values()], np.zeros((1 + m) * 9 * m))
+    slopes = [each.slope for each in bodies.values()]
+    mass_slopes = [each.mass_slope for each in bodies.values()]
+    body["slope"][summed], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
+    body["mass_slope"][summed], mass_slope = _rows(mass_slopes, np.zeros((m, m, m)))
+    turning = [(p, i) for p in (each.summed for each in bodies.values()) if p is not None for i in range(len(p.mass))]
+    points = np.zeros(len(chain), int)
+    points[summed] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]
+    group(body, "point", points)
     point = np.zeros(len(turning), a.POINT)
     for row, (p, i) in zip(point, turning, strict=True):
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
@@ -72,7 +82,7 @@ def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[l
     return [-1 if table is None else int(i) for table, i in zip(tables, count, strict=True)], out
 
 
-def group(body: a.Record, name: str, counts: list[int]) -> None:
+def group(body: a.Record, name: str, counts: ArrayLike) -> None:
     """Consecutive groups of items by body: their start and stop."""
     stop = np.cumsum(counts)
     body[f"{name}_stop"] = stop
@@ -90,11 +100,13 @@ def shape_records(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Record:
 
 def second_order_rows(fields: list[SecondOrder | None], first: int, m: int) -> tuple[list[int], a.Record]:
     """By field the number of its row, counted from `first`, -1 for none; and the rows, SHAPE records (...,m,m)."""
-    numbers, rows = [], np.zeros((sum(field is not None for field in fields), m, m), a.SHAPE)
+    rows = np.zeros((sum(field is not None for field in fields), m, m), a.SHAPE)
+    numbers, last = [], -1
     for field in fields:
-        numbers.append(-1 if field is None else first + sum(number >= 0 for number in numbers))
+        last += field is not None
+        numbers.append(-1 if field is None else first + last)
         if field is not None:
             n = field.translation.shape[-1]
-            row = rows[numbers[-1] - first, :n, :n]
+            row = rows[last, :n, :n]
             row["translation"], row["rotation"] = (np.moveaxis(G, 0, -1) for G in (field.translation, field.rotation))
     return numbers, rows

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 
-from flexmb.building.links import BodyLink
 from flexmb.scene import schema as s
 from flexmb.tables.state import Layout
+
+if TYPE_CHECKING:
+    from flexmb.building.links import BodyLink
 
 
 class Numbering:
@@ -16,12 +20,16 @@ class Numbering:
         self.q: dict[str, slice] = {}
         self.u: dict[str, slice] = {}
         self.nq = self.nu = 0
+        self.hinges: list[tuple[int, int]] = []  # by link, where its coordinates begin in q and its speeds in u
+        self.modes: list[tuple[int, int]] = []  # likewise
         quaternions = list[int]()
         for link in chain:
             if link.kind.quaternion >= 0:
                 quaternions.append(self.nq + link.kind.quaternion)
+            self.hinges.append((self.nq, self.nu))
             self._append(link.hinge.name, link.kind.coordinates, link.kind.speeds)
-            self._append(f"{link.name}.modes", link.model.mode_count, link.model.mode_count)
+            self.modes.append((self.nq, self.nu))
+            self._append(f"{link.name}.modes", link.mode_count, link.mode_count)
             for wheel in wheels.get(link.name, ()):
                 self._append(wheel.name, 1, 1)
         for link in chain:

@@ -8,9 +8,11 @@ compared with the size of their closure.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flexmb.closure.closures import ClosureError, Closures
+from flexmb.closure.closures import ClosureError, Closures, GroupResponse
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
 from flexmb.tables.status import OK
@@ -34,10 +36,11 @@ def _closed(closures: Closures, t: float, y: Real) -> Real:
     for _ in range(STEPS):
         if _largest(errors) <= CLOSED or damping > STRONGEST:
             break
-        U, s, Vt = np.linalg.svd(closures.responses(), full_matrices=False)
+        found = decomposed(closures)
         # the damping fades with the errors: convergence is quadratic, even where redundant rows become dependent
-        floor = damping * s[0] ** 2 * min(1.0, float(np.linalg.norm(errors))) + np.finfo(float).tiny
-        trial = closures.moved(t, y, -Vt.T @ (s / (s**2 + floor) * (U.T @ errors)))
+        fading = damping * min(1.0, float(np.linalg.norm(errors)))
+        floor = fading * found.largest**2 + np.finfo(float).tiny
+        trial = closures.moved(t, y, -found.damped(errors, floor))
         smaller = np.linalg.norm(closures.errors()) < np.linalg.norm(errors)
         if smaller and closures.linearise_stiff(t, trial) == OK:
             y, errors, damping = trial, closures.errors(), damping / 10.0
@@ -61,8 +64,8 @@ def _moving(closures: Closures, t: float, y: Real) -> Real:
     for _ in range(3):
         if largest <= CLOSED:
             break
-        x = -np.linalg.lstsq(closures.responses(), rates, rcond=DEPENDENT)[0]
-        y = closures.pushed(t, y, x.astype(np.float64, copy=False))
+        found = decomposed(closures)
+        y = closures.pushed(t, y, -found.damped(rates, 0.0))
         rates, largest = closures.rates()
     if not largest <= MOVING_APART:
         where = closures.worst(rates, rates=True)
@@ -71,6 +74,32 @@ def _moving(closures: Closures, t: float, y: Real) -> Real:
             "do not allow: the mechanism is locked; free a hinge, or use flexible bodies"
         )
     return y
+
+
+class Decomposed(NamedTuple):
+    """Singular values of the responses B' of all rows, group by group: B' = U s V'."""
+
+    speeds: int
+    groups: list[tuple[GroupResponse, Real, Real, Real]]
+
+    @property
+    def largest(self) -> float:
+        """The largest of all."""
+        return max((float(s[0]) for _, _, s, _ in self.groups if len(s)), default=0.0)
+
+    def damped(self, values: Real, floor: float) -> Real:
+        """x (nu,) = V s / (s^2 + floor) U' of values (G,) of the rows; without a floor the least squares' solution."""
+        x = np.zeros(self.speeds)
+        for group, U, s, Vt in self.groups:
+            kept = s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
+            x[group.columns] += Vt[kept].T @ (s[kept] / (s[kept] ** 2 + floor) * (U[:, kept].T @ values[group.rows]))
+        return x
+
+
+def decomposed(closures: Closures) -> Decomposed:
+    """At the state that was linearised last."""
+    found = [(group, *np.linalg.svd(group.half, full_matrices=False)) for group in closures.responses()]
+    return Decomposed(len(closures.constants[0].speed), found)
 
 
 def _refuse_half_a_turn(closures: Closures) -> None:

@@ -14,6 +14,7 @@ to 2^-44. So a run ends where a pivot falls so fast that it vanishes within `AT_
 
 from math import inf
 
+from flexmb.closure.factor import columns, entry, row_place
 from flexmb.jit.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
@@ -41,39 +42,43 @@ def at_crossing(t, cc, cw):
     beside that in which the ports move as far as the mechanism is large. Their speed is the larger of those now and
     where the step started: where they come to rest, they have none.
     """
-    for a in range(cw.rank[0]):
-        i = cc.row[cw.chosen[a]].closure
-        left, fallen = cw.factor[a, a], cw.former_pivot[a] - (1.0 + ROUND_OFF) * cw.factor[a, a]
-        speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
-        if left * (t - cw.time[0]) * speed < AT_CROSSING * fallen * cw.closure[i].size:
-            return cw.chosen[a]
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            place = cc.group[g].row_start + a
+            i, left = cc.row[cw.chosen[place]].closure, cw.factor[entry(cc, g, a, a)]
+            fallen = cw.former_pivot[place] - (1.0 + ROUND_OFF) * left
+            speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
+            if left * (t - cw.time[0]) * speed < AT_CROSSING * fallen * cw.closure[i].size:
+                return cw.chosen[place]
     return -1
 
 
 @helper
-def turned_over(cw):
+def turned_over(cc, cw):
     """The first chosen row that points another way than when the step started, or -1. Needs the same."""
-    for a in range(cw.rank[0]):
-        total = 0.0
-        for j in range(cw.basis.shape[1]):
-            total += cw.basis[a, j] * cw.former[a, j]
-        if not total >= TURNED:
-            return cw.chosen[a]
+    for g in range(cc.group.shape[0]):
+        for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
+            total, at = 0.0, row_place(cc, g, place)
+            for j in range(at, at + columns(cc, g)):
+                total += cw.basis[j] * cw.former[j]
+            if not total >= TURNED:
+                return cw.chosen[place]
     return -1
 
 
 @helper
-def remember(t, cw):
+def remember(t, cc, cw):
     """Take the state that was factorised last for the one from which the next step starts."""
     cw.time[0] = t
     for i in range(cw.closure.shape[0]):
         cw.closure[i].former_speed = cw.closure[i].speed
     for r in range(cw.chosen.shape[0]):
         cw.former_rows[r] = cw.chosen[r]
-    for a in range(cw.rank[0]):
-        cw.former_pivot[a] = cw.factor[a, a]
-        for j in range(cw.basis.shape[1]):
-            cw.former[a, j] = cw.basis[a, j]
+    for j in range(cw.basis.shape[0]):
+        cw.former[j] = cw.basis[j]
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            cw.former_pivot[cc.group[g].row_start + a] = cw.factor[entry(cc, g, a, a)]
 
 
 @helper

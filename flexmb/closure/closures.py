@@ -39,6 +39,14 @@ class ClosedMotion(NamedTuple):
     closures: Real
 
 
+class GroupResponse(NamedTuple):
+    """Of one group: its rows; its columns, numbers of speeds; B' (rows,columns)."""
+
+    rows: slice
+    columns: Index
+    half: Real
+
+
 class Closures:
     """The closures of one scene and the tree under them. It owns one workspace: threads must not share it."""
 
@@ -59,7 +67,7 @@ class Closures:
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self._layout = layout
         self.constants = constants, own
-        self.rank = -1  # independent rows of a closed configuration; -1 before the first one is known
+        self._ranks = np.full(len(own.group), -1)  # independent rows of a closed configuration; -1: not yet known
         self._size = np.zeros(len(own.row))  # of the rows' ports there
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
@@ -68,7 +76,7 @@ class Closures:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
         own = workspace(cc, c)
-        own.rank[0], own.size[:], own.gain[:] = self.rank, self._size, (2.0 * rate, rate * rate)
+        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
@@ -76,7 +84,7 @@ class Closures:
         c = self.constants[0]
         if algorithm == "composite":
             return matrices(c)
-        if any(LEVELS[body["level"]].at_rest and body["modes"] for body in c.body):
+        if any(LEVELS[c.body["level"][k]].at_rest for k in np.flatnonzero(c.body["modes"])):
             return response(c)
         return Recursion()
 
@@ -108,10 +116,12 @@ class Closures:
         return self._motion(t, y, self._composite)
 
     def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
-        s.cw.rank[0], self._evaluated = self.rank, s
+        s.cw.rank[:], self._evaluated = self._ranks, s
         self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
         self._check(dynamics.closure_loads(s.w, s.cc, s.cw), int(s.fault[0]))
-        least = s.cw.row["load"] - _shadow(s.cw.row["load"], null_loads(s.cw))
+        least = s.cw.row["load"].copy()
+        for rows, null in null_loads(s.cc, s.cw):
+            least[rows] -= null @ (null.T @ least[rows])  # without their shadow on null loads they are the least of all
         return self._under(s, least)
 
     def _under(self, s: Closed, loads: Real) -> ClosedMotion:
@@ -146,11 +156,15 @@ class Closures:
         pair["mff"] += (STIFF / self._slowest) ** 2 * pair["stiffness"]
         return replace(c, pair=pair)
 
-    def responses(self) -> Real:
-        """B' (G,nu) of the rows in the size of their closures, those that suppress nothing zero: Lambda^-1 = B'B."""
-        own, weight = self._own, self.constants[1].weight
-        felt = weight * np.linalg.norm(own.half, axis=1) > DEPENDENT * own.size
-        return (self._scale("size") * felt)[:, None] * own.half
+    def responses(self) -> list[GroupResponse]:
+        """By group, B' of the rows in the size of their closures, those that suppress nothing zero: Lambda^-1 = B'B."""
+        cc, own = self.constants[1], self._own
+        scale = self._scale("size")
+        found = []
+        for rows, columns, half in blocks(cc, own):
+            felt = cc.weight[rows] * np.linalg.norm(half, axis=1) > DEPENDENT * own.size[rows]
+            found.append(GroupResponse(rows, columns, (scale[rows] * felt)[:, None] * half))
+        return found
 
     def errors(self) -> Real:
         """Values of the rows in the size of their closures (G,)."""
@@ -192,12 +206,17 @@ class Closures:
     def count_rows(self) -> None:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
-        self.rank, self._size = int(self._own.rank[0]), self._own.size.copy()
+        self._ranks, self._size = self._own.rank.copy(), self._own.size.copy()
+
+    @property
+    def rank(self) -> int:
+        """Independent rows of a closed configuration; -1 before the first one is known."""
+        return int(np.sum(self._ranks)) if np.all(self._ranks >= 0) else -1
 
     @property
     def independent(self) -> int:
         """Independent rows at the state evaluated last."""
-        return int(self._own.rank[0])
+        return int(np.sum(self._own.rank))
 
     @property
     def mobility(self) -> int:
@@ -233,21 +252,34 @@ class Closures:
 
     def null_loads(self) -> Real:
         """Orthonormal loads (G,k) of the rows that move nothing, at the state evaluated last."""
-        return null_loads(self._own)
+        found = null_loads(self.constants[1], self._own)
+        out = np.zeros((len(self._own.row), sum(null.shape[1] for _, null in found)))
+        first = 0
+        for rows, null in found:
+            out[rows, first : first + null.shape[1]] = null
+            first += null.shape[1]
+        return out
 
 
-def null_loads(cw: ClosureWorkspace) -> Real:
-    """Orthonormal loads (G,k) of the rows that move nothing."""
-    rows, rank = len(cw.half), int(cw.rank[0])
-    if rank == rows:
-        return np.zeros((rows, 0))
-    chosen, rest = cw.chosen[:rank], cw.chosen[rank:]
-    null = np.zeros((rows, rows - rank))
-    null[rest] = np.eye(rows - rank)
-    null[chosen] = -np.linalg.lstsq(cw.half[chosen].T, cw.half[rest].T, rcond=None)[0]
-    return np.linalg.qr(null)[0]
+def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse]:
+    """B' of every group."""
+    for group in cc.group:
+        rows = slice(int(group["row_start"]), int(group["row_stop"]))
+        columns = cc.column[group["column_start"] : group["column_stop"]]
+        shape = rows.stop - rows.start, len(columns)
+        half = cw.half[group["half"] : group["half"] + shape[0] * shape[1]].reshape(shape)
+        yield GroupResponse(rows, columns, half)
 
 
-def _shadow(loads: Real, null: Real) -> Real:
-    """The part of loads that lies in the span of orthonormal null loads: without it they are the least of all."""
-    return np.asarray(null @ (null.T @ loads))
+def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
+    """Orthonormal loads (rows,k) of the rows of a group that move nothing, of all groups that have such loads."""
+    found = []
+    for (rows, _, half), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
+        if rank < len(half):
+            order = cw.chosen[rows] - rows.start
+            chosen, rest = order[:rank], order[rank:]
+            null = np.zeros((len(half), len(rest)))
+            null[rest] = np.eye(len(rest))
+            null[chosen] = -np.linalg.lstsq(half[chosen].T, half[rest].T, rcond=None)[0]
+            found.append((rows, np.linalg.qr(null)[0]))
+    return found

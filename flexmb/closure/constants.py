@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.building.links import BodyLink, closure_sides
 from flexmb.closure import tables as t
+from flexmb.closure.groups import group_tables, groups
 from flexmb.scene import schema as s
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.tables.arrays import Constants
@@ -30,40 +31,52 @@ def closure_constants(
     """Constants of a scene's closures; `ports` are (body, port) of both sides of each, (-1, -1) on the ground."""
     sides = np.zeros((len(scene.closures), 2), t.SIDE)
     closures = np.zeros(len(scene.closures), t.CLOSURE)
-    rows: list[tuple[int, int, int]] = []
-    path: list[int] = []
     for i, closure in enumerate(scene.closures):
-        row = closures[i]
-        row["row_start"], row["path_start"] = len(rows), len(path)
         for j, side in enumerate(closure_sides(closure)):
             sides[i, j]["body"], sides[i, j]["port"] = ports[2 * i + j]
             if sides[i, j]["body"] == t.ON_GROUND:
                 sides[i, j]["position"] = side.offset
                 sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
-        rotations, translations = SUPPRESSED[closure.type]
-        rows += [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
-        rows += [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]
-        path += sorted(_ancestors(constants, sides[i]["body"]), reverse=True)
-        row["row_stop"], row["path_stop"] = len(rows), len(path)
+    parent = constants.body["parent"].tolist()
+    paths = [sorted(_ancestors(parent, bodies), reverse=True) for bodies in sides["body"].tolist()]
+    closures["path_stop"] = np.cumsum([len(path) for path in paths])
+    closures["path_start"] = closures["path_stop"] - [len(path) for path in paths]
+    own = [_rows(i, closure) for i, closure in enumerate(scene.closures)]
+    members = groups(constants, paths)
+    rows: list[tuple[int, int, int]] = []
+    for group, i in ((number, i) for number, each in enumerate(members) for i in each):
+        closures["group"][i], closures["row_start"][i] = group, len(rows)
+        rows += own[i]
+        closures["row_stop"][i] = len(rows)
     row_table = np.array(rows, t.ROW)
+    group_table, columns = group_tables(constants, members, paths, list(map(len, own)))
     length = _length(constants, sides)
     return t.ClosureConstants(
         side=sides,
         closure=closures,
         row=row_table,
-        path=np.array(path, np.int64),
+        path=np.array([k for path in paths for k in path], np.int64),
+        group=group_table,
+        column=columns,
         weight=np.where(row_table["type"] == t.ROTATION, length, 1.0),
         length=np.array([length]),
     )
 
 
-def _ancestors(constants: Constants, bodies: Sequence[int]) -> set[int]:
+def _rows(i: int, closure: s.Closure) -> list[tuple[int, int, int]]:
+    """(closure, type, axis) of the rows of closure number i."""
+    rotations, translations = SUPPRESSED[closure.type]
+    turning = [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
+    return turning + [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]
+
+
+def _ancestors(parent: Sequence[int], bodies: Sequence[int]) -> set[int]:
     """The bodies and all that carry them."""
     found: set[int] = set()
     for k in bodies:
-        while k >= 0:
-            found.add(int(k))
-            k = constants.body["parent"][k]
+        while k >= 0 and k not in found:
+            found.add(k)
+            k = parent[k]
     return found
 
 
@@ -78,6 +91,8 @@ def slowest_mode(chain: list[BodyLink]) -> float:
     """The lowest frequency (rad/s) of a mode by itself, body held; infinite where none has stiffness."""
     found = [np.inf]
     for link in chain:
+        if link.mode_count == 0:
+            continue
         m = link.model
         mass = np.einsum("p,pan->n", m.mass, m.translation**2)
         mass += np.einsum("pan,pab,pbn->n", m.rotation, m.inertia, m.rotation)

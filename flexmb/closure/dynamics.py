@@ -57,13 +57,14 @@ def linearise(t, y, s):
 @kernel
 def count_rows(cc, cw):
     """Independent rows at the state that was linearised last, into cw.rank and cw.chosen."""
-    cw.rank[0] = -1
+    for g in range(cw.rank.shape[0]):
+        cw.rank[g] = -1
     choose_rows(cc, cw)
 
 
 @kernel
 def move(t, y, x, what, s):
-    """Change y by M^-1 J'f, x being what f leaves at the state linearised last; find its rows' values and rates.
+    """Change y by M^-1 J'f, x (nu,) being what f leaves at the state linearised last; find its rows' values and rates.
 
     what: COORDINATES displaces it, SPEEDS adds to the speeds, NOTHING leaves it.
     """

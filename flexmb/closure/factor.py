@@ -1,5 +1,6 @@
 """Rank-revealing factorisation of Lambda^-1 = B'B: B P = Q R with column pivoting, never B'B itself.
 
+Lambda^-1 has a block for each group of closures, and each is factorised by itself (`flexmb.closure.groups`).
 Modified Gram-Schmidt; its R is as good as Householder's, and only R is used to solve (the semi-normal equations). A row
 is counted as dependent on those chosen before it when what is left of it is below `DEPENDENT` times how far the ports
 of its closure move by themselves, cw.size of `flexmb.closure.sizes`, rotations weighed with a length of the scene. On a
@@ -14,100 +15,151 @@ DEPENDENT = 1e-9
 
 
 @helper
-def norm(x):
+def norm(x, first, count):
+    """Of count numbers from x[first] on."""
     total = 0.0
-    for i in range(x.shape[0]):
-        total += x[i] * x[i]
+    for j in range(first, first + count):
+        total += x[j] * x[j]
     return sqrt(total)
 
 
 @helper
-def choose_rows(cc, cw):
-    """Order the rows by pivot and count the independent ones, at most cw.rank[0] if that is not negative.
-
-    Returns whether as many as cw.rank[0] were found; a negative cw.rank[0] receives the number.
-    """
-    rows = cc.row.shape[0]
-    wanted = cw.rank[0]
-    for r in range(rows):
-        cw.chosen[r] = r
-        for j in range(cw.half.shape[1]):
-            cw.basis[r, j] = cw.half[r, j]
-    found = 0
-    while found < rows and found != wanted:
-        best, at = DEPENDENT, -1
-        for i in range(found, rows):
-            r = cw.chosen[i]
-            if cw.size[r] > 0.0:  # ports that nothing moves have rows of zeros
-                left = cc.weight[r] * norm(cw.basis[r]) / cw.size[r]
-                if left > best:
-                    best, at = left, i
-        if at < 0:
-            break
-        cw.chosen[found], cw.chosen[at] = cw.chosen[at], cw.chosen[found]
-        first = cw.chosen[found]
-        length = norm(cw.basis[first])
-        for i in range(found + 1, rows):
-            r = cw.chosen[i]
-            _orthogonalise(cw.basis[r], cw.basis[first], length * length)
-        found += 1
-    if wanted < 0:
-        cw.rank[0] = found
-        return True
-    return found == wanted
+def rows(cc, g):
+    """How many rows group g has."""
+    return cc.group[g].row_stop - cc.group[g].row_start
 
 
 @helper
-def _orthogonalise(x, along, squared):
-    """x -= along (along . x) / squared; returns the coefficient."""
+def columns(cc, g):
+    """How many speeds loads of group g may change."""
+    return cc.group[g].column_stop - cc.group[g].column_start
+
+
+@helper
+def row_place(cc, g, r):
+    """Where row r, of group g, begins in cw.half; in cw.basis what is at place r of cw.chosen."""
+    return cc.group[g].half + (r - cc.group[g].row_start) * columns(cc, g)
+
+
+@helper
+def entry(cc, g, a, b):
+    """Place of R[a, b] of group g in cw.factor."""
+    return cc.group[g].factor + a * rows(cc, g) + b
+
+
+@helper
+def choose_rows(cc, cw):
+    """Order the rows of every group by pivot and count the independent ones, at most cw.rank if that is not negative.
+
+    Returns the first group where fewer than cw.rank were found, or -1; a negative cw.rank receives the number.
+    """
+    short = -1
+    for g in range(cc.group.shape[0]):
+        wanted = cw.rank[g]
+        found = _choose(cc, cw, g, wanted)
+        if wanted < 0:
+            cw.rank[g] = found
+        elif found != wanted and short < 0:
+            short = g
+    return short
+
+
+@helper
+def _choose(cc, cw, g, wanted):
+    """Order the rows of group g; returns how many independent ones were found, `wanted` at most."""
+    first, stop, width = cc.group[g].row_start, cc.group[g].row_stop, columns(cc, g)
+    for r in range(first, stop):
+        cw.chosen[r] = r
+    for j in range(cc.group[g].half, cc.group[g].half + (stop - first) * width):
+        cw.basis[j] = cw.half[j]  # until they are in order, rows stand in it as in `half`
+    found = 0
+    while first + found < stop and found != wanted:
+        best, at = DEPENDENT, -1
+        for place in range(first + found, stop):
+            r = cw.chosen[place]
+            if cw.size[r] > 0.0:  # ports that nothing moves have rows of zeros
+                left = cc.weight[r] * norm(cw.basis, row_place(cc, g, r), width) / cw.size[r]
+                if left > best:
+                    best, at = left, place
+        if at < 0:
+            break
+        cw.chosen[first + found], cw.chosen[at] = cw.chosen[at], cw.chosen[first + found]
+        along = row_place(cc, g, cw.chosen[first + found])
+        length = norm(cw.basis, along, width)
+        for place in range(first + found + 1, stop):
+            _orthogonalise(cw.basis, row_place(cc, g, cw.chosen[place]), along, width, length * length)
+        found += 1
+    return found
+
+
+@helper
+def _orthogonalise(basis, x, along, width, squared):
+    """x -= along (along . x) / squared, both `width` numbers of the basis from there on; returns the coefficient."""
     total = 0.0
-    for j in range(x.shape[0]):
-        total += along[j] * x[j]
+    for j in range(width):
+        total += basis[along + j] * basis[x + j]
     total /= squared
-    for j in range(x.shape[0]):
-        x[j] -= total * along[j]
+    for j in range(width):
+        basis[x + j] -= total * basis[along + j]
     return total
 
 
 @helper
 def factorise(cc, cw):
     """R of the chosen rows; returns -1, or the row that depends on those before it."""
-    for a in range(cw.rank[0]):
-        row = cw.chosen[a]
-        length = orthonormalise(cw, a, row)
-        if not cc.weight[row] * length > DEPENDENT * cw.size[row]:
-            return row
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            row = cw.chosen[cc.group[g].row_start + a]
+            length = _orthonormalise(cc, cw, g, a, row)
+            if not cc.weight[row] * length > DEPENDENT * cw.size[row]:
+                return row
     return -1
 
 
 @helper
-def orthonormalise(cw, a, row):
-    """Make a row the one numbered a of the basis, after those before it: column a of R; returns its pivot."""
-    x = cw.basis[a]
-    for j in range(x.shape[0]):
-        x[j] = cw.half[row, j]
+def _orthonormalise(cc, cw, g, a, row):
+    """Make a row the one numbered a of the basis of its group, after those before it: column a of R; its pivot."""
+    first, width = cc.group[g].row_start, columns(cc, g)
+    x, half = row_place(cc, g, first + a), row_place(cc, g, row)
+    for j in range(width):
+        cw.basis[x + j] = cw.half[half + j]
     for b in range(a):
-        cw.factor[b, a] = _orthogonalise(x, cw.basis[b], 1.0)
-    length = norm(x)
-    cw.factor[a, a] = length
-    for j in range(x.shape[0]):
-        x[j] /= length
+        cw.factor[entry(cc, g, b, a)] = _orthogonalise(cw.basis, x, row_place(cc, g, first + b), width, 1.0)
+    length = norm(cw.basis, x, width)
+    cw.factor[entry(cc, g, a, a)] = length
+    for j in range(x, x + width):
+        cw.basis[j] /= length
     return length
 
 
 @helper
-def solve(cw):
-    """Loads of the chosen rows from R'R f = cw.scratch (by chosen row), into cw.row.load; those of the others are 0."""
-    rank, R, b = cw.rank[0], cw.factor, cw.scratch
-    for a in range(rank):
-        for m in range(a):
-            b[a] -= R[m, a] * b[m]
-        b[a] /= R[a, a]
-    for a in range(rank - 1, -1, -1):
-        for m in range(a + 1, rank):
-            b[a] -= R[a, m] * b[m]
-        b[a] /= R[a, a]
+def solve(cc, cw):
+    """Loads of the chosen rows from R'R f = cw.scratch (by place in cw.chosen), into cw.row.load; others are 0."""
     for r in range(cw.row.shape[0]):
         cw.row[r].load = 0.0
-    for a in range(rank):
-        cw.row[cw.chosen[a]].load = b[a]
+    R, b = cw.factor, cw.scratch
+    for g in range(cc.group.shape[0]):
+        first, rank = cc.group[g].row_start, cw.rank[g]
+        for a in range(rank):
+            for m in range(a):
+                b[first + a] -= R[entry(cc, g, m, a)] * b[first + m]
+            b[first + a] /= R[entry(cc, g, a, a)]
+        for a in range(rank - 1, -1, -1):
+            for m in range(a + 1, rank):
+                b[first + a] -= R[entry(cc, g, a, m)] * b[first + m]
+            b[first + a] /= R[entry(cc, g, a, a)]
+        for place in range(first, first + rank):
+            cw.row[cw.chosen[place]].load = b[place]
+
+
+@helper
+def sum_rows(cc, cw, x):
+    """x (nu,) = sum of the rows of cw.half, each times its load."""
+    for j in range(x.shape[0]):
+        x[j] = 0.0
+    for g in range(cc.group.shape[0]):
+        start = cc.group[g].column_start
+        for r in range(cc.group[g].row_start, cc.group[g].row_stop):
+            load, at = cw.row[r].load, row_place(cc, g, r)
+            for n in range(columns(cc, g)):
+                x[cc.column[start + n]] += load * cw.half[at + n]

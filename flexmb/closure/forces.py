@@ -10,6 +10,7 @@ from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.tables import Recursion
 from flexmb.closure.unit_loads import apply_load, half_solve, pass_inward
 from flexmb.jain import hinge_solve, innovations
+from flexmb.jain.explicit import about_hinge
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.loads import drive_loads, hinge_loads
 from flexmb.jain.response import clear, read_speeds, write_speeds
@@ -32,8 +33,8 @@ def _tree_and_rows(route, s):
 
 
 @helper
-def _pass_load(route, s, i, x):
-    pass_inward(s.c, s.w, s.cc, s.cw, i, x)
+def _pass_load(route, s, i, x, at):
+    pass_inward(s.c, s.w, s.cc, s.cw, i, x, at)
 
 
 @helper
@@ -54,7 +55,7 @@ def _accelerate(route, s):
     for k in range(c.body.shape[0]):
         for n in range(c.body[k].modes):
             w.mode[k, n].zf -= cw.response.speed[c.body[k].etad_index + n]
-        add6(w.body[k].hinge_force, 0, vec6(cw.response.body[k].force, 0))
+        add6(about_hinge(c, w, k)[1], 0, vec6(cw.response.body[k].force, 0))
         hinge_solve.add_innovations(c, w, cw.response, k)
     outward(c, w)
     drive_loads(c, w)
@@ -76,7 +77,7 @@ def _locate(route, t, y, s):
 # By unit loads where the route is the Recursion, else by generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
 free_tree = by_bundle(Recursion, _tree_and_rows, generalised.tree_and_rows)
-# (s, i, x): x of the forces in cw.response on the bodies on the path of closure i.
+# (s, i, x, at): x of the forces in cw.response on the bodies on the path of closure i, by column from x[at] on.
 pass_load = by_bundle(Recursion, _pass_load, generalised.pass_load)
 # (s, x, v): v = M^-1 J'f, the change of all speeds, where x is that of the rows' loads f.
 respond = by_bundle(Recursion, _pass_outward, generalised.respond)
@@ -105,7 +106,7 @@ def on_branch(t, w, cc, cw):
         return OK
     row, status = at_crossing(t, cc, cw), CLOSURE_SINGULAR
     if row < 0:
-        row, status = turned_over(cw), BRANCH_UNKNOWN
+        row, status = turned_over(cc, cw), BRANCH_UNKNOWN
     if row < 0:
         return OK
     w.fault[0] = cc.row[row].closure
@@ -121,18 +122,21 @@ def row_loads(w, cc, cw):
     status = factorised(w, cc, cw)
     if status != OK:
         return status
-    for a in range(cw.rank[0]):
-        r = cw.chosen[a]
-        damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
-        cw.scratch[a] = -(cw.row[r].acceleration + damped)
-    solve(cw)
+    for g in range(cc.group.shape[0]):
+        first = cc.group[g].row_start
+        for place in range(first, first + cw.rank[g]):
+            r = cw.chosen[place]
+            damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
+            cw.scratch[place] = -(cw.row[r].acceleration + damped)
+    solve(cc, cw)
     return OK
 
 
 @helper
 def choose(w, cc, cw):
     """Choose the independent rows anew; a status code."""
-    if choose_rows(cc, cw):
+    short = choose_rows(cc, cw)
+    if short < 0:
         return OK
-    w.fault[0] = cc.row[cw.chosen[cw.row.shape[0] - 1]].closure
+    w.fault[0] = cc.row[cw.chosen[cc.group[short].row_stop - 1]].closure
     return CLOSURE_SINGULAR

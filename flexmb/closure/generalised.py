@@ -10,14 +10,15 @@ The load of a hinge is what inertia asks for, less what closures do to all that 
 of the hinge: so its components along the hinge's motions are what springs and motors do.
 """
 
+from flexmb.closure.factor import row_place, sum_rows
 from flexmb.closure.rows import evaluate_rows, load_on_b
-from flexmb.closure.unit_loads import apply_load, apply_unit_load
+from flexmb.closure.unit_loads import apply_load, apply_unit_load, write_columns
 from flexmb.jain import composite, innovations
 from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.inverse import inverse_dynamics
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.places import Matrices
-from flexmb.jain.response import clear, read_speeds, write_speeds
+from flexmb.jain.response import clear, clear_body, read_speeds, write_speeds
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.kernel import by_bundle, helper
 from flexmb.motion.coordinates import load_state
@@ -37,26 +38,39 @@ def _by_composite_bodies(route, c, w):
 
 
 @helper
-def _half_by_recursion(x, c, w, T):
-    """F^-1 T in place of T, Jain & Rodriguez (55)."""
-    clear(c, x)
-    read_speeds(x, T)
-    innovations.innovations(c, w, x)
-    write_speeds(x, T)
+def _half_by_recursion(response, s, i, x, at):
+    """F^-1 T of T in cw.response.speed, Jain & Rodriguez (55): only bodies on the path of closure i feel it."""
+    cc, g = s.cc, s.cc.closure[i].group
+    for j in range(cc.group[g].column_start, cc.group[g].column_stop):
+        response.speed[cc.column[j]] = s.cw.response.speed[cc.column[j]]
+    for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+        clear_body(s.c, response, cc.path[j])
+    for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
+        innovations.innovate(s.c, s.w, response, cc.path[j])
+    write_columns(cc, i, response, x, at)
 
 
 @helper
-def _half_by_composite_bodies(m, c, w, T):
-    """U'^-1 T of the free speeds in the first places of T, tips first; the others are zero."""
-    n, U = m.x.shape[0], m.U
+def _half_by_composite_bodies(m, s, i, x, at):
+    """U'^-1 T of the free speeds; the others are zero."""
+    cc, T, n, U = s.cc, s.cw.step, m.x.shape[0], m.U
+    g = cc.closure[i].group
+    for j in range(T.shape[0]):
+        T[j] = 0.0
+    for j in range(cc.group[g].column_start, cc.group[g].column_stop):
+        T[cc.column[j]] = s.cw.response.speed[cc.column[j]]
     for a in range(n):
         m.x[a] = T[m.speed[m.order[a]]]
     for j in range(T.shape[0]):
         T[j] = 0.0
     for a in range(n):
-        T[a] = m.x[a] / U[a, a]
+        m.x[a] /= U[a, a]
         for b in range(a + 1, n):
-            m.x[b] -= U[a, b] * T[a]
+            m.x[b] -= U[a, b] * m.x[a]
+    for a in range(n):
+        T[m.speed[m.order[a]]] = m.x[a]
+    for j in range(cc.group[g].column_start, cc.group[g].column_stop):
+        x[at + j - cc.group[g].column_start] = T[cc.column[j]]
 
 
 @helper
@@ -73,7 +87,7 @@ def _rest_by_composite_bodies(m, c, w, y, v):
     for j in range(v.shape[0]):
         v[j] = 0.0
     for a in range(n - 1, -1, -1):
-        total = y[a]
+        total = y[m.speed[m.order[a]]]
         for b in range(a + 1, n):
             total -= U[a, b] * m.x[b]
         m.x[a] = total / U[a, a]
@@ -112,16 +126,15 @@ def _half_solve(s):
     for i in range(cc.closure.shape[0]):
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             apply_unit_load(c, s.seen, cc, cw, i, r)
-            pass_load(s.route, s, i, cw.half[r])
+            pass_load(s.route, s, i, cw.half, row_place(cc, cc.closure[i].group, r))
 
 
 @helper
-def pass_load(route, s, i, T):
-    """F^-1 of the generalised forces of the forces in cw.response on the path of closure i, into T (nu,)."""
+def pass_load(route, s, i, x, at):
+    """F^-1 of the generalised forces of the forces in cw.response on the path of closure i; by column from x[at] on."""
     for j in range(s.cc.closure[i].path_start, s.cc.closure[i].path_stop):
         innovations.project(s.c, s.seen, s.cw.response, s.cc.path[j])
-    write_speeds(s.cw.response, T)
-    _half(s.route, s.c, s.w, T)
+    _half(s.route, s, i, x, at)
 
 
 @helper
@@ -134,10 +147,7 @@ def respond(route, s, y, v):
 def accelerate(route, s):
     """Let cw.row.load act beside everything else: accelerations and drive loads."""
     cw, y = s.cw, s.cw.coefficient
-    for j in range(y.shape[0]):
-        y[j] = 0.0
-        for r in range(cw.half.shape[0]):
-            y[j] += cw.row[r].load * cw.half[r, j]
+    sum_rows(s.cc, cw, y)
     respond(route, s, y, cw.step)
     driven = False
     for j in range(y.shape[0]):

@@ -7,7 +7,7 @@ likewise with J u. Prescribed coordinates stay. Only independent rows are correc
 import numpy as np
 
 from flexmb.closure.branch import has_started, is_further, recall, remember
-from flexmb.closure.factor import solve
+from flexmb.closure.factor import solve, sum_rows
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
 from flexmb.jit.kernel import helper
@@ -35,7 +35,7 @@ def project_closed(t, y, s):
         s.cw.time[1] = np.nextafter(t, -np.inf)  # the last stage of a segment is evaluated that much earlier
         recall(s.cw)
     elif is_further(t, s.cw):
-        remember(t, s.cw)
+        remember(t, s.cc, s.cw)
 
 
 @helper
@@ -86,15 +86,15 @@ def _close(t, y, s):
     for _ in range(REPEATS):
         if largest_gap(cc, cw)[0] <= CLOSED:
             break
-        for a in range(cw.rank[0]):
-            cw.scratch[a] = -cw.row[cw.chosen[a]].value
+        for place in range(cw.chosen.shape[0]):
+            cw.scratch[place] = -cw.row[cw.chosen[place]].value
         _response(s)
         displace(t, y, s)
         locate(s.route, t, y, s)
     nq = s.w.q.shape[0]
     for _ in range(2):
-        for a in range(cw.rank[0]):
-            cw.scratch[a] = -cw.row[cw.chosen[a]].rate
+        for place in range(cw.chosen.shape[0]):
+            cw.scratch[place] = -cw.row[cw.chosen[place]].rate
         _response(s)
         for j in range(s.w.u.shape[0]):
             y[nq + j] += cw.step[j]
@@ -104,13 +104,9 @@ def _close(t, y, s):
 @helper
 def _response(s):
     """cw.step = M^-1 J' (J M^-1 J')^-1 cw.scratch, with the factors of the last forward dynamics."""
-    cw, x = s.cw, s.cw.coefficient
-    solve(cw)
-    for j in range(x.shape[0]):
-        x[j] = 0.0
-        for r in range(cw.row.shape[0]):
-            x[j] += cw.row[r].load * cw.half[r, j]
-    respond(s.route, s, x, cw.step)
+    solve(s.cc, s.cw)
+    sum_rows(s.cc, s.cw, s.cw.coefficient)
+    respond(s.route, s, s.cw.coefficient, s.cw.step)
 
 
 @helper
@@ -120,7 +116,7 @@ def displace(t, y, s):
     load_state(t, y, c, w)
     for j in range(w.u.shape[0]):
         w.u[j] = s.cw.step[j]
-    configuration_rate(c, w)
+    configuration_rate(c, w, w.rate)
     for i in range(w.q.shape[0]):
         y[i] += w.rate[i]
     normalise_quaternions(y, c)

@@ -17,7 +17,7 @@ independent (`flexmb.closure.factor.DEPENDENT`): they are measured where rows ar
 
 from math import sqrt
 
-from flexmb.closure.factor import norm
+from flexmb.closure.factor import columns, norm
 from flexmb.closure.forces import pass_load
 from flexmb.closure.unit_loads import at_port, clear_path
 from flexmb.jain.ports import mode_motion
@@ -51,8 +51,7 @@ def _response(s, i, side, F):
     """|x| of a load about a port of closure i, port axes."""
     clear_path(s.c, s.cc, s.cw, i)
     at_port(s.c, s.seen, s.cw, side, F)
-    pass_load(s.route, s, i, s.cw.coefficient)
-    return norm(s.cw.coefficient)
+    return _passed(s, i)
 
 
 @helper
@@ -61,5 +60,11 @@ def _reaction(s, i, k, F):
     clear_path(s.c, s.cc, s.cw, i)
     for n in range(s.c.body[k].modes):
         s.cw.response.mode[k, n].zf = -dot6(mode_motion(s.seen, s.c.body[k].outboard_port, n), F)
-    pass_load(s.route, s, i, s.cw.coefficient)
-    return norm(s.cw.coefficient)
+    return _passed(s, i)
+
+
+@helper
+def _passed(s, i):
+    """|x| of the forces in cw.response, which are on the path of closure i."""
+    pass_load(s.route, s, i, s.cw.coefficient, 0)
+    return norm(s.cw.coefficient, 0, columns(s.cc, s.cc.closure[i].group))

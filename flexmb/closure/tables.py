@@ -2,6 +2,10 @@
 
 C closures with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
 body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes.
+
+Closures whose loads pass a common body that can move are one of K groups; groups do not feel each other's loads, so
+that Lambda^-1 has a block for each and zeros elsewhere. Rows are numbered group by group. A group has matrices of its
+own, (rows, columns) row by row in one array: a row's columns are the speeds that loads of its group may change.
 """
 
 from __future__ import annotations
@@ -35,6 +39,15 @@ CLOSURE = _record(
     ("row_stop", _I),
     ("path_start", _I),  # its rows of `path`
     ("path_stop", _I),
+    ("group", _I),
+)
+GROUP = _record(
+    ("row_start", _I),  # its rows, and their places in the order of pivots
+    ("row_stop", _I),
+    ("column_start", _I),  # its part of `column`
+    ("column_stop", _I),
+    ("half", _I),  # where its matrices begin in `half`, `basis` and `former`
+    ("factor", _I),  # and in `factor`, (rows, rows)
 )
 ROW = _record(
     ("closure", _I),
@@ -51,6 +64,8 @@ class ClosureConstants:
     closure: Record  # (C,) CLOSURE
     row: Record  # (G,) ROW
     path: Index  # bodies that a load on a closure passes on its way to the ground, tips first
+    group: Record  # (K,) GROUP
+    column: Index  # by group, the speeds of the bodies on its paths
     weight: Real  # (G,) what makes rows comparable: 1 for translations, `length` for rotations
     length: Real  # (1,) m, a length of the scene
 
@@ -78,17 +93,17 @@ class ClosureWorkspace:
 
     closure: Record  # (C,) CLOSURE_STATE
     row: Record  # (G,) ROW_STATE
-    half: Real  # (G,nu) B': D^-1/2 (1 - H Psi K) J' of every row; Lambda^-1 = B' B
-    basis: Real  # (G,nu) orthonormal basis of the chosen rows of `half`
-    factor: Real  # (G,G) R, upper: B P = Q R
-    chosen: Index  # (G,) rows by pivot; the first `rank` are independent
-    rank: Index  # (1,) independent rows; -1 until they are counted
-    scratch: Real  # (G,)
+    half: Real  # by group (rows, columns) B': D^-1/2 (1 - H Psi K) J' of every row; Lambda^-1 = B' B
+    basis: Real  # likewise, orthonormal basis of the chosen rows of `half`
+    factor: Real  # by group (rows, rows) R, upper: B P = Q R
+    chosen: Index  # (G,) by group, rows by pivot; the first `rank` of each are independent
+    rank: Index  # (K,) independent rows; -1 until they are counted
+    scratch: Real  # (G,) right sides by place in `chosen`
     size: Real  # (G,) response of the ports of a row's closure by themselves, `flexmb.closure.sizes`
     response: Response  # loads on their way inward, and what they move
     coefficient: Real  # (nu,)
     step: Real  # (nu,) a displacement or a change of speeds
-    former: Real  # (G,nu) `basis` of the last state that a run has accepted, `flexmb.closure.branch`
+    former: Real  # `basis` of the last state that a run has accepted, `flexmb.closure.branch`
     former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
     time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
@@ -127,20 +142,22 @@ class Closed:
 def workspace(c: ClosureConstants, tree: Constants) -> ClosureWorkspace:
     """A workspace of the right sizes for closures on a tree."""
     rows, nu = len(c.row), len(tree.speed)
+    heights, widths = (c.group[f"{side}_stop"] - c.group[f"{side}_start"] for side in ("row", "column"))
+    size = int(heights @ widths)
     return ClosureWorkspace(
         closure=np.zeros(len(c.closure), CLOSURE_STATE),
         row=np.zeros(rows, ROW_STATE),
-        half=np.zeros((rows, nu)),
-        basis=np.zeros((rows, nu)),
-        factor=np.zeros((rows, rows)),
+        half=np.zeros(size),
+        basis=np.zeros(size),
+        factor=np.zeros(int(heights @ heights)),
         chosen=np.arange(rows),
-        rank=np.array([-1]),
+        rank=np.full(len(c.group), -1),
         scratch=np.zeros(rows),
         size=np.zeros(rows),
         response=response(tree),
         coefficient=np.zeros(nu),
         step=np.zeros(nu),
-        former=np.zeros((rows, nu)),
+        former=np.zeros(size),
         former_pivot=np.zeros(rows),
         former_rows=np.arange(rows),
         time=np.full(2, -np.inf),

@@ -6,9 +6,10 @@ innovations of J'f are x = D^-1/2 (1 - H Psi K) J'f, Jain & Rodriguez (55), body
 loads, without M, and a load only passes the bodies between its node and the ground.
 """
 
+from flexmb.closure.factor import row_place
 from flexmb.closure.tables import ON_GROUND, ROTATION
 from flexmb.jain.innovations import innovate
-from flexmb.jain.response import clear_body, push, write_speeds
+from flexmb.jain.response import clear_body, push
 from flexmb.jit.kernel import helper
 from flexmb.spatial.spatial_vector import scale6, shift_force, times6, times6_t
 from flexmb.spatial.vector import mat3, vec3
@@ -20,15 +21,23 @@ def half_solve(c, w, cc, cw):
     for i in range(cc.closure.shape[0]):
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
             apply_unit_load(c, w, cc, cw, i, r)
-            pass_inward(c, w, cc, cw, i, cw.half[r])
+            pass_inward(c, w, cc, cw, i, cw.half, row_place(cc, cc.closure[i].group, r))
 
 
 @helper
-def pass_inward(c, w, cc, cw, i, x):
-    """x (nu,) of the forces in cw.response on the bodies that loads on closure i pass."""
+def pass_inward(c, w, cc, cw, i, x, at):
+    """x of the forces in cw.response on the bodies that loads on closure i pass; from x[at] on, by column."""
     for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
         innovate(c, w, cw.response, cc.path[j])
-    write_speeds(cw.response, x)
+    write_columns(cc, i, cw.response, x, at)
+
+
+@helper
+def write_columns(cc, i, response, x, at):
+    """Speeds of a response, as far as loads on closure i change them, from x[at] on."""
+    g = cc.closure[i].group
+    for j in range(cc.group[g].column_start, cc.group[g].column_stop):
+        x[at + j - cc.group[g].column_start] = response.speed[cc.column[j]]
 
 
 @helper
@@ -36,8 +45,9 @@ def clear_path(c, cc, cw, i):
     """No forces in cw.response, as far as loads on closure i change them."""
     for j in range(cc.closure[i].path_start, cc.closure[i].path_stop):
         clear_body(c, cw.response, cc.path[j])
-    for j in range(cw.response.speed.shape[0]):
-        cw.response.speed[j] = 0.0
+    g = cc.closure[i].group
+    for j in range(cc.group[g].column_start, cc.group[g].column_stop):
+        cw.response.speed[cc.column[j]] = 0.0
 
 
 @helper

@@ -27,14 +27,6 @@ class Copies(NamedTuple):
     status: Index  # (n,)
 
 
-class Entries(NamedTuple):
-    """`time`, `state` and `slope` of a `flexmb.tables.lane_tables.LaneWorkspace` once more, as arrays of floats."""
-
-    time: Real
-    state: Real
-    slope: Real
-
-
 @helper
 def _shared_places(c, w):
     """Constants that all copies share: the workspace was made with them."""
@@ -53,35 +45,35 @@ take_places = by_bundle(LaneConstants, _own_places, _shared_places)
 
 
 @kernel
-def accelerations(start, stop, copies, entries, c, w):
-    """udot of copies start to stop - 1, LANES at a time; what is left over has the last one in its empty lanes."""
-    nq, nu = w.q.shape[0], w.u.shape[0]
-    take_places(c, w)
+def rhs(stage, s, c, w):
+    """Slopes s.k[stage] (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
+    return articulated.rhs(s.time[0], s.trial, s.k[stage], c, w)
+
+
+@kernel
+def accelerations(start, stop, copies, problem, entries, doubt):
+    """udot of copies start to stop - 1, LANES at a time; what is left over has the last one in its empty lanes.
+
+    By the right-hand side of runs, so that there is one kernel for both. doubt (1,) is that of the workspace.
+    """
+    nq, nu = copies.q.shape[1], copies.u.shape[1]
     for first in range(start, stop, LANES):
         for lane in range(LANES):
             copy = min(first + lane, stop - 1)
             entries.time[0, lane] = copies.t[copy]
             for i in range(nq):
-                entries.state[i, lane] = copies.q[copy, i]
+                entries.trial[i, lane] = copies.q[copy, i]
             for j in range(nu):
-                entries.state[nq + j, lane] = copies.u[copy, j]
-        status = articulated.accelerations(w.time[0], w.state, c, w)
-        for j in range(nu):
-            w.slope[j] = w.speed[j].acceleration
+                entries.trial[nq + j, lane] = copies.u[copy, j]
+        status = problem.rhs(0, problem.stages, problem.constants, problem.workspace)
         for lane in range(min(LANES, stop - first)):
             found = copies.accelerations[first + lane]
             for j in range(nu):
-                found[j] = entries.slope[j, lane]
+                found[j] = entries.k[0, nq + j, lane]
             if status != OK or not all_finite(found):
                 copies.status[first + lane] = NONFINITE if status == OK else status
             else:
-                copies.status[first + lane] = DOUBTFUL if w.doubt[0] != 0 else OK
-
-
-@kernel
-def rhs(stage, s, c, w):
-    """Slopes s.k[stage] (n,) of the states s.trial (n,) at the times s.time; returns a status code of all copies."""
-    return articulated.rhs(s.time[0], s.trial, s.k[stage], c, w)
+                copies.status[first + lane] = DOUBTFUL if doubt[0] != 0 else OK
 
 
 @kernel

@@ -19,10 +19,13 @@ from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
 from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.bundle import bundle
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
+from flexmb.levels.body import AT_REST
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import store6, times6
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
+from flexmb.tables.features import WHEELS
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
@@ -128,13 +131,19 @@ def observe_motion(t, y, c, w, out):
 
 @helper
 def _observe_motion(c, w, out):
-    """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state."""
-    _world_wheel_loads(c, w, out.wheel_loads)
-    velocity_sweep(c, w, False, True)
+    """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state.
+
+    Energy and markers see bodies at rest otherwise, and all others alike.
+    """
+    if has(c, WHEELS):
+        _world_wheel_loads(c, w, out.wheel_loads)
+    if has(c, AT_REST):
+        velocity_sweep(c, w, False, True)
     energy_and_momentum(c, w, out.energy, out.momentum)
-    velocity_sweep(c, w, True, True)
-    pose_sweep(c, w)
-    acceleration_sweep(c, w)
+    if has(c, AT_REST):
+        velocity_sweep(c, w, True, True)
+        pose_sweep(c, w)
+        acceleration_sweep(c, w)
     for i in range(out.marker_port.shape[0]):
         _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -97,8 +98,13 @@ def scalar_hinge(
 
 def z_to(axis: Vector) -> Real:
     """A rotation whose third column is `axis`."""
-    z = np.asarray(axis, float) / np.linalg.norm(axis)
-    aside = np.eye(3)[np.argmin(np.abs(z))]
-    x = np.cross(aside, z)
-    x /= np.linalg.norm(x)
-    return np.column_stack([x, np.cross(z, x), z])
+    length = sqrt(axis[0] * axis[0] + axis[1] * axis[1] + axis[2] * axis[2])
+    z = axis[0] / length, axis[1] / length, axis[2] / length
+    sizes = abs(z[0]), abs(z[1]), abs(z[2])
+    i = sizes.index(min(sizes))
+    j, k = (i + 1) % 3, (i + 2) % 3
+    beside = sqrt(z[j] * z[j] + z[k] * z[k])
+    x = [0.0, 0.0, 0.0]  # e_i x z, to unit length
+    x[j], x[k] = -z[k] / beside, z[j] / beside
+    y = z[1] * x[2] - z[2] * x[1], z[2] * x[0] - z[0] * x[2], z[0] * x[1] - z[1] * x[0]
+    return np.array([x, y, z]).T

@@ -385,10 +385,10 @@ def _derivative_at_start(problem, s, entries, control, counts):
 
 @helper
 def _running(control):
+    found = False
     for lane in range(LANES):
-        if control.status[lane] == RUNNING:
-            return True
-    return False
+        found = found or control.status[lane] == RUNNING
+    return found
 
 
 @kernel

@@ -44,6 +44,7 @@ class LaneEntries(NamedTuple):
     trial: Real
     y: Real
     y_new: Real
+    k: Real
     h: Real
     fraction: Real
     norm: Real
@@ -64,9 +65,9 @@ class LaneProblem(NamedTuple):
     workspace: AnyBundle
 
 
-def lane_stages(n: int, method: str) -> LaneStages:
+def lane_stages(n: int) -> LaneStages:
     """For states of n numbers; one per thread."""
-    stages = STAGES_DENSE if method == "dop853" else 4
+    stages = STAGES_DENSE  # of the method that has most
     shapes = {"time": (1,), "k": (stages, n), "f": (7, n), "h": (1,), "fraction": (1,), "norm": (3,), "chosen": (1,)}
     shapes |= {name: (n,) for name in ("trial", "y", "y_new")}
     return LaneStages(**{name: lane_zeros(shape) for name, shape in shapes.items()})

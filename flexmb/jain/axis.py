@@ -8,7 +8,7 @@ eliminated is in `flexmb.jain.hinge_solve`.
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.rotation import turned_about_z
-from flexmb.spatial.scalar import cos, sin
+from flexmb.spatial.scalar import sincos
 from flexmb.spatial.vector import axpy
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS
 from flexmb.tables.features import AXIS
@@ -39,13 +39,14 @@ def pose(c, w, k, R, arm):
     """R_parent_O and the arm to O, in parent axes, from those of O+."""
     q = w.q[c.body[k].q_index]
     if turns(c, k):
-        return turned_about_z(R, cos(q), sin(q)), arm
+        sine, cosine = sincos(q)
+        return turned_about_z(R, cosine, sine), arm
     return R, axpy(q, (R[2], R[5], R[8]), arm)
 
 
 @helper
 def cross_hinge(c, w, k, V, A):
-    """Velocity and bias of O from those of the same point of the parent, in outboard axes: H u and the Coriolis term."""
+    """Velocity and bias of O from those of this point of the parent, in outboard axes: H u and the Coriolis term."""
     u = w.u[c.body[k].u_index]
     (x, y, z), v = V
     alpha, a = A

@@ -29,11 +29,9 @@ def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Const
     if choice == "explicit":
         return c
     variant = a.WOODBURY if choice == "woodbury" else a.CONDENSED
-    nodes = [_node_ports(c, k) for k in range(len(c.body))]
+    nodes = _node_ports(c)
     forced = choice != "fastest"
-    reduced = [
-        k for k in range(len(c.body)) if applies(c, k, variant) and (forced or is_faster(c, k, len(nodes[k])))
-    ]
+    reduced = [k for k in nodes if applies(c, k, variant) and (forced or is_faster(c, k, len(nodes[k])))]
     return _reduced_constants(c, reduced, nodes, variant) if reduced else c
 
 
@@ -49,9 +47,10 @@ def applies(c: a.Constants, k: int, variant: int) -> bool:
     free_wheel = any(
         c.speed["prescribed"][c.wheel["u_index"][i]] < 0 for i in range(body["wheel_start"], body["wheel_stop"])
     )
-    ridden = np.any((c.body["parent"] == k) & (c.body["inboard_port"] < 0))
-    floating = body["outboard_port"] >= 0 and (not LEVELS[body["level"]].at_rest or ridden)
-    if body["modes"] == 0 or floating or free_wheel:
+    if body["modes"] == 0 or free_wheel:
+        return False
+    at_rest = LEVELS[body["level"]].at_rest
+    if body["outboard_port"] >= 0 and not (at_rest and np.all(c.body["inboard_port"][c.body["parent"] == k] >= 0)):
         return False
     constant = LEVELS[body["level"]].at_rest or (
         variant == a.CONDENSED
@@ -83,14 +82,18 @@ def _is_regular(M: a.Real) -> bool:
     return bool(values[0] * WELL_CONDITIONED > values[-1])
 
 
-def _node_ports(c: a.Constants, k: int) -> list[int]:
-    """Ports of body k that deform and carry hinges, in the order of the outboard bodies."""
-    port = c.body["inboard_port"]
-    return [int(port[child]) for child in np.flatnonzero(c.body["parent"] == k) if port[child] >= 0]
+def _node_ports(c: a.Constants) -> dict[int, list[int]]:
+    """By flexible body, its ports that deform and carry hinges, in the order of the outboard bodies."""
+    found: dict[int, list[int]] = {k: [] for k in np.flatnonzero(c.body["modes"]).tolist()}
+    hinged = np.flatnonzero(c.body["inboard_port"] >= 0)
+    for parent, port in zip(c.body["parent"][hinged].tolist(), c.body["inboard_port"][hinged].tolist(), strict=True):
+        if parent in found:
+            found[parent].append(port)
+    return found
 
 
 def _reduced_constants(
-    c: a.Constants, reduced: list[int], nodes: list[list[int]], variant: int
+    c: a.Constants, reduced: list[int], nodes: dict[int, list[int]], variant: int
 ) -> a.ReducedConstants:
     most, m = max(len(nodes[k]) for k in reduced), c.mode.shape[1]
     size = 6 * max(most, 1)

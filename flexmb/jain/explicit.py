@@ -44,27 +44,33 @@ def eliminate_modes(c, w, k):
     nm = c.body[k].modes
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    if has(c, MODES):
-        if nm > 0 and not cholesky(w.pff[k], nm):
-            return False
-        note_modes(c, w, k, w.pff[k])
+    if nm > 0 and not cholesky(w.pff[k], nm):
+        return False
+    note_modes(c, w, k, w.pff[k])
     P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
-    if has(c, MODES):
-        for n in range(nm):
-            P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
-            for i in range(n):
-                s = -w.pff[k, n, i]
-                z += s * w.mode[k, i].zf
-                P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
-            s = 1.0 / w.pff[k, n, n]
-            P_fr, z = scale6(s, P_fr), s * z
-            store6(w.mode[k, n].pfr, 0, P_fr)
-            w.mode[k, n].zf = z
-            z_r = axpy6(-z, P_fr, z_r)
-            P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
+    for n in range(nm):
+        P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
+        for i in range(n):
+            s = -w.pff[k, n, i]
+            z += s * w.mode[k, i].zf
+            P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
+        s = 1.0 / w.pff[k, n, n]
+        P_fr, z = scale6(s, P_fr), s * z
+        store6(w.mode[k, n].pfr, 0, P_fr)
+        w.mode[k, n].zf = z
+        z_r = axpy6(-z, P_fr, z_r)
+        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
     store6(w.body[k].hinge_force, 0, z_r)
     store_inertia(w.body[k].hinge_inertia, 0, P)
     return True
+
+
+@helper
+def about_hinge(c, w, k):
+    """P_R (21,) and z_R (6,) of body k about O: where nothing has modes, its own about its origin."""
+    if has(c, MODES):
+        return w.body[k].hinge_inertia, w.body[k].hinge_force
+    return w.body[k].inertia, w.body[k].force
 
 
 @helper
@@ -149,7 +155,7 @@ def refer_rigid(c, w, k):
 def to_parent(c, w, k, P, F, row):
     """P_R^+ and F = z_R^+ handed to the parent: P += A Gamma A', z += A z_R^+.
 
-    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then; it is negative for all other hinges.
+    A hinge with a single axis leaves no inertia along it: `row` of P_R^+ is zero then, negative for all other hinges.
     """
     R, arm = mat3(w.body[k].rotation, 0), vec3(w.body[k].arm, 0)
     rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)

@@ -21,7 +21,7 @@ from math import log
 
 from flexmb.jain.axis import along, move_along, turns
 from flexmb.jain.doubt import note_hinge
-from flexmb.jain.explicit import cholesky
+from flexmb.jain.explicit import about_hinge, cholesky
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.variants import to_parent
 from flexmb.jit.features import has
@@ -64,16 +64,16 @@ def find_free(c, w, k):
 def eliminate(c, w, k):
     """D_R, G_R and epsilon_R, P_R^+ and z_R^+ of (63), (64), handed to the parent; returns whether D_R > 0.
 
-    Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k in w.body.hinge_inertia and hinge_force.
+    Prescribed speeds act as bias, not as freedom. Needs P_R and z_R of body k.
     """
     if has(c, PRESCRIBED):
         impose(c, w, k)
-    P = load_inertia(w.body[k].hinge_inertia, 0)
-    z = sum6(vec6(w.body[k].hinge_force, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
+    P_R, z_R = about_hinge(c, w, k)
+    P = load_inertia(P_R, 0)
+    z = sum6(vec6(z_R, 0), inertia_times(P, vec6(w.body[k].bias, 0)))
     j = c.body[k].u_index
-    if has(c, SEVERAL):
-        if c.body[k].axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0:
-            return _eliminate_several(c, w, k, P, z)
+    if has(c, SEVERAL) and (c.body[k].axis < 0 or c.body[k].outboard_port >= 0 or c.speed[j].prescribed >= 0):
+        return _eliminate_several(c, w, k, P, z)
     row = ANGULAR_Z if turns(c, k) else LINEAR_Z
     PH = inertia_column(P, row)
     D = along(c, k, PH)

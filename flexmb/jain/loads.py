@@ -3,6 +3,7 @@
 A load is the total one (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
 """
 
+from flexmb.jain.explicit import about_hinge
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import port_acceleration, port_velocity
 from flexmb.jain.wheels import spin_axis
@@ -18,14 +19,15 @@ from flexmb.tables.features import PRESCRIBED, WHEELS
 def hinge_loads(c, w):
     """Loads across all hinges, body axes, into w.body.load."""
     for k in range(c.body.shape[0]):
-        hinge_load(w, k)
+        hinge_load(c, w, k)
 
 
 @helper
-def hinge_load(w, k):
+def hinge_load(c, w, k):
     """F = P_R A + z_R at O of body k, body axes, into w.body[k].load."""
-    P, A = load_inertia(w.body[k].hinge_inertia, 0), vec6(w.body[k].accel_hinge, 0)
-    store6(w.body[k].load, 0, sum6(inertia_times(P, A), vec6(w.body[k].hinge_force, 0)))
+    P_R, z_R = about_hinge(c, w, k)
+    A = vec6(w.body[k].accel_hinge, 0)
+    store6(w.body[k].load, 0, sum6(inertia_times(load_inertia(P_R, 0), A), vec6(z_R, 0)))
 
 
 @helper
@@ -42,7 +44,7 @@ def _drive_loads(c, w, k):
     for n in range(c.body[k].nv):
         j = c.body[k].u_index + n
         if c.speed[j].prescribed >= 0:
-            hinge_load(w, k)
+            hinge_load(c, w, k)
             w.speed[j].drive = dot6(motion_column(c, w, k, n), vec6(w.body[k].load, 0)) - w.speed[j].applied
     if has(c, WHEELS):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):

@@ -39,10 +39,9 @@ def bodies(c, w):
     if has(c, LOADS):
         pose_sweep(c, w)
     for k in range(c.body.shape[0]):
-        if has(c, MODES):
-            if is_out_of_range(c, w, k):
-                w.fault[0] = k
-                return OUT_OF_RANGE
+        if has(c, MODES) and is_out_of_range(c, w, k):
+            w.fault[0] = k
+            return OUT_OF_RANGE
         inertia(c, w, k)
         if has(c, MODES):
             elastic_forces(c, w, k)
@@ -62,7 +61,8 @@ def inward(c, w):
     """
     w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
-        if not (eliminate_modes(c, w, k) and hinge_solve.eliminate(c, w, k)):
+        sound = not has(c, MODES) or eliminate_modes(c, w, k)
+        if not (sound and hinge_solve.eliminate(c, w, k)):
             w.fault[0] = k
             return False
     return True

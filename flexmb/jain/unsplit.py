@@ -6,7 +6,7 @@ D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The s
 
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
 from flexmb.jain.doubt import note_hinge, note_modes
-from flexmb.jain.explicit import cholesky, refer_to_hinge, to_parent
+from flexmb.jain.explicit import about_hinge, cholesky, refer_to_hinge, to_parent
 from flexmb.jain.hinge_solve import find_free, impose
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.sweeps import bodies
@@ -31,7 +31,7 @@ class Joint:
 
 @helper
 def forward_dynamics(c, w, x):
-    """Accelerations into w.speed.acceleration; w.body.hinge_inertia, hinge_force, accel_hinge hold P^+, z^+, alpha^+.
+    """Accelerations into w.speed.acceleration; P^+ and z^+ stand where P_R and z_R do else, alpha^+ in accel_hinge.
 
     Loads across hinges are f = P^+ alpha^+ + z^+, so that `jain.loads` finds them here too. Returns a status code.
     """
@@ -74,7 +74,8 @@ def _eliminate(c, w, x, k):
         return False
     note_modes(c, w, k, D)
     note_hinge(c, w, k, D, nm)
-    store_inertia(w.body[k].hinge_inertia, 0, P)
+    P_plus, z_plus = about_hinge(c, w, k)
+    store_inertia(P_plus, 0, P)
     for n in range(rows):
         for i in range(n):
             residual[n] -= D[n, i] * residual[i]
@@ -85,11 +86,11 @@ def _eliminate(c, w, x, k):
         for b in range(6):
             gain[n, b] *= s
         G = vec6(gain[n], 0)
-        add_inertia(w.body[k].hinge_inertia, 0, outer_inertia(G[0], G[1], -1.0))
+        add_inertia(P_plus, 0, outer_inertia(G[0], G[1], -1.0))
         z = axpy6(residual[n], G, z)
-    store6(w.body[k].hinge_force, 0, z)
+    store6(z_plus, 0, z)
     if c.body[k].parent >= 0:
-        to_parent(c, w, k, load_inertia(w.body[k].hinge_inertia, 0), z, NO_AXIS)
+        to_parent(c, w, k, load_inertia(P_plus, 0), z, NO_AXIS)
     return True
 
 

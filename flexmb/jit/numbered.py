@@ -14,10 +14,10 @@ from flexmb.jit.kernel import AS_PART
 
 
 def numbered(name: str, feature: str, functions: Sequence[Callable[..., Any]]) -> Callable[..., Any]:
-    """A helper `name(bundle, number, ...)` that hands `...` to the one of `functions`, all of one signature, of this number.
+    """A helper `name(bundle, number, ...)` that hands `...` to the one of `functions` of this number.
 
-    Only those whose number n is a feature of the bundle, "<feature> n", are compiled. The helper is written as one
-    would by hand,
+    They are of one signature. Only those whose number n is a feature of the bundle, "<feature> n", are compiled. The
+    helper is written as one would by hand,
 
         def name(bundle, number, q, i):
             if number == 1:

@@ -13,10 +13,12 @@ from typing import Any
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.compiler_machinery import register_pass
-from numba.core.typed_passes import NativeLowering
-from numba.core.untyped_passes import RewriteSemanticConstants
+from numba.core.typed_passes import InlineOverloads, NativeLowering, NopythonRewrites
+from numba.core.untyped_passes import InlineClosureLikes, RewriteSemanticConstants
 
 from flexmb.jit.features import KnownFeatures
+
+_FOR_ARRAYS_AND_CLOSURES = {InlineClosureLikes, InlineOverloads, NopythonRewrites}  # helpers have none to improve
 
 
 class _NoMachineCode:
@@ -67,7 +69,9 @@ class PartCompiler(KernelCompiler):
         """The passes of a kernel, with the last but one exchanged."""
         [manager] = super().define_pipelines()
         manager.passes = [
-            (_PartLowering, text) if which is NativeLowering else (which, text) for which, text in manager.passes
+            (_PartLowering, text) if which is NativeLowering else (which, text)
+            for which, text in manager.passes
+            if which not in _FOR_ARRAYS_AND_CLOSURES
         ]
         manager._finalized = False
         manager.finalize()

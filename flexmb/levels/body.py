@@ -16,6 +16,9 @@ BY_NAME = {level.name: level for level in LEVELS}
 
 _inertia_and_bias = numbered("inertia_and_bias", LEVEL, [level.inertia_and_bias for level in LEVELS])
 _without_masses = numbered("without_masses", LEVEL, [level.without_masses for level in LEVELS])
+AT_REST = f"{LEVEL} {[level.at_rest for level in LEVELS].index(True)}"
+"""The feature of scenes with bodies whose kinematics are those of their rest shape."""
+
 _AT_REST = np.array([level.at_rest for level in LEVELS])
 
 

@@ -94,27 +94,25 @@ def _prescribe(t, y, c):
 
 
 @helper
-def configuration_rate(c, w):
-    """qdot(q, u) into w.rate; quaternions are taken raw, so that their norm is an invariant of the flow."""
+def configuration_rate(c, w, rate):
+    """qdot(q, u) into `rate`; quaternions are taken raw, so that their norm is an invariant of the flow."""
     for k in range(c.body.shape[0]):
         catalogue.rate(
-            c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, w.rate
+            c, c.body[k].hinge_kind, w.raw, c.body[k].q_index, w.u, c.body[k].u_index, c.body[k].sequence, rate
         )
         if has(c, MODES):
             for n in range(c.body[k].modes):
-                w.rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
+                rate[c.body[k].eta_index + n] = w.u[c.body[k].etad_index + n]
     if has(c, WHEELS):
         for i in range(c.wheel.shape[0]):
-            w.rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
+            rate[c.wheel[i].q_index] = w.u[c.wheel[i].u_index]
 
 
 @helper
 def store_slope(c, w, power, dy):
-    """dy/dt of y = [q, u, work]: the rates of q and u in the workspace, and the power that `work` collects."""
-    configuration_rate(c, w)
+    """dy/dt of y = [q, u, work]: the rates of q and u, and the power that `work` collects."""
+    configuration_rate(c, w, dy)
     nq, nu = w.q.shape[0], w.u.shape[0]
-    for i in range(nq):
-        dy[i] = w.rate[i]
     for j in range(nu):
         dy[nq + j] = w.speed[j].acceleration
     dy[nq + nu] = power
@@ -163,7 +161,6 @@ def speed_power(c, w):
             f = c.speed[j].motor
             if f >= 0:
                 total += w.function[f, 0] * rate
-        if has(c, PRESCRIBED):
-            if c.speed[j].prescribed >= 0:
-                total += w.speed[j].drive * rate
+        if has(c, PRESCRIBED) and c.speed[j].prescribed >= 0:
+            total += w.speed[j].drive * rate
     return total

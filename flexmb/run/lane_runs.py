@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any, NamedTuple
+from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.entry import articulated, lanes
-from flexmb.integrate.control import COUNTS
+from flexmb.integrate.control import COUNTS, STOP
 from flexmb.integrate.dop853_lanes import LaneControl, dop853_lanes, lane_control
-from flexmb.integrate.lane_problem import LaneEntries, first_derivative, lane_entries, lane_problem, lane_stages
-from flexmb.integrate.problem import Clock
+from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.lane_problem import LaneStages, first_derivative, lane_entries
+from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
-from flexmb.motion import coordinates
-from flexmb.run.propagate import Integration
-from flexmb.run.switching import switch_times
-from flexmb.system.algorithm import Route
+from flexmb.run.propagate import Integration, recursion
+from flexmb.run.switching import timing_of
+from flexmb.system import algorithms
 from flexmb.system.batch import Batch, in_threads
 from flexmb.system.tree_system import System
 from flexmb.tables.lane_tables import LaneWorkspace
@@ -58,7 +58,7 @@ class BatchRun:
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
-        self._ends = [np.array([*switch_times(s.scene, times[-1]), times[-1]]) for s in batch.systems]
+        self._ends = [np.array([*timing_of(system).before(times[-1]), times[-1]]) for system in batch.systems]
 
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
@@ -73,21 +73,18 @@ class BatchRun:
         return [self._ends[min(copy, last)] for copy in copies]
 
     def _in_lanes(self, firsts: Iterable[int]) -> None:
-        n = self._found.y.shape[1]
-        s = lane_stages(n, self._settings.method)
-        with self._batch.workspace() as w:
+        with self._batch.tables() as (w, s):
             for first in firsts:
-                self._block(first, s, lane_entries(s), w)
+                self._block(first, w, s)
 
-    def _block(self, first: int, s: Any, entries: LaneEntries, w: LaneWorkspace) -> None:
+    def _block(self, first: int, w: LaneWorkspace, s: LaneStages) -> None:
         """Run LANES copies; those whose end the lanes do not decide are left for later."""
-        c = self._batch.constants(first // LANES)
+        entries = lane_entries(s)
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))
         s.y[...] = found.y.T
-        lanes.begin(c, w)
-        problem = lane_problem(lanes.rhs, lanes.project, s, c, w)
+        problem = self._batch.problem(first // LANES, w, s)
         if first_derivative(problem, s, entries, self._times[0], found.counts) != OK or w.doubt[0]:
             self._examine(first, found.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
@@ -120,22 +117,39 @@ class BatchRun:
                     status[lane], self._found.fault[first + lane] = NOT_POSITIVE_DEFINITE, precision.fault
 
     def _alone(self, copies: Iterable[int]) -> None:
-        solvers: dict[System, Integration] = {}
+        """Run copies one after the other, each by its own system."""
+        found, accuracy = self._found, self._settings.accuracy(self._batch.nq, self._batch.nu)
+        last, solve = None, None
         for copy in copies:
-            system, found = self._batch.system(copy), self._found
-            if system not in solvers:
-                solvers.clear()
-                solvers[system] = Integration(
-                    self._route(system), self._settings, system.constants, system.nq, system.nu
-                )
-            solve = solvers[system]
+            system = self._batch.system(copy)
+            if solve is None or system is not last:
+                last, solve = system, Alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
-            found.counts[copy], found.out[copy] = 0, np.nan
-            status, t = solve(found.y[copy].copy(), Clock(self._times, ends), found.out[copy], found.counts[copy])
+            found.counts[copy, :STOP], found.out[copy] = 0, np.nan
+            clock, out, counts = Clock(self._times, ends), found.out[copy], found.counts[copy]
+            status, t = solve(found.y[copy].copy(), clock, accuracy, out, counts)
             found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
 
-    def _route(self, system: System) -> Route:
-        """With the modes of every body eliminated explicitly, as in lanes."""
-        if not self._batch.in_lanes:
-            return system.route()
-        return Route(lambda: (system.constants, system.workspace()), articulated.rhs, coordinates.project)
+
+class Alone:
+    """An integrator for copies of one system, one at a time."""
+
+    def __init__(self, system: System, method: Integrator) -> None:
+        self._method = method
+        if system.scene.closures or method.linearises:
+            algorithm = algorithms.chosen("articulated")
+            whole = Integration(system, algorithm, system.route(), method)
+            self._solve, self._workspace = whole, whole
+        else:  # every mode is eliminated explicitly, as in lanes
+            self._workspace = system.workspace()
+            self._solve = partial(method.run, recursion(system.constants, self._workspace))
+
+    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
+        """See `Integrator`."""
+        status, t = self._solve(y, clock, accuracy, out, counts)
+        return status, t
+
+    @property
+    def fault(self) -> int:
+        """Where an evaluation failed."""
+        return int(np.atleast_1d(self._workspace.fault)[0])

@@ -94,13 +94,13 @@ def simulate(
         _refuse_without_jacobian(system, algorithm, method)
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         start = system.start_precision
-        if start.status != Status.OK:
+        if start is not None and start.status != Status.OK:
             nothing = np.empty((0, system.nq + system.nu + 1))
             raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
             return _observed(system, times, raw, algorithm, solve.batch)
         raw = integrate(system, solve, times, chosen)
         trajectory = _observed(system, times, raw, algorithm, solve.batch)
-    if start.is_low:
+    if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:

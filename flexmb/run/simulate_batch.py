@@ -16,7 +16,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings
-from flexmb.scene.check import check_run
+from flexmb.run.switching import refuse_end
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
 from flexmb.system.tree_system import System
@@ -52,30 +52,34 @@ def simulate_batch(
     t_end = arguments.number("t_end", t_end)
     chosen = Settings(method, **settings).checked(t_end)
     for system in batch.systems:
-        check_run(system.scene, t_end)
+        refuse_end(system, t_end)
     times = sample_times(samples, t_end)
-    if (q is None or u is None) and batch.shares_constants and (q is not None or u is not None):
-        start = batch.initial_states()
-        given = len(q if q is not None else u)
-        q = np.repeat(start[0], given, axis=0) if q is None else q
-        u = np.repeat(start[1], given, axis=0) if u is None else u
-    own = batch.initial_states() if q is None or u is None else (q, u)
-    rows = batch.states(own[0] if q is None else q, own[1] if u is None else u)
+    rows = batch.states(*_given(batch, q, u))
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
     if len(rows[0]):
         number = number_of_threads(threads, len(found.y) // LANES)
         stop = found.counts.T[STOP : STOP + 1]  # of all runs at once
-        _, interrupted = interruptible(
-            BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop
-        )
+        _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
             raise KeyboardInterrupt
     return _gathered(batch, times, found, len(rows[0]))
 
 
 def _batch(copies: System | Sequence[Scene]) -> Batch:
-    return copies._batch if isinstance(copies, System) else compile_batch(copies)
+    return copies.batch if isinstance(copies, System) else compile_batch(copies)
+
+
+def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
+    """Initial coordinates and speeds, those of the scenes where none are given; as many rows of either."""
+    if q is not None and u is not None:
+        return q, u
+    own_q, own_u = batch.initial_states()
+    if q is None and u is None:
+        return own_q, own_u
+    if not batch.shares_constants:
+        return own_q if q is None else q, own_u if u is None else u
+    return (np.repeat(own_q, len(u), axis=0), u) if q is None else (q, np.repeat(own_u, len(q), axis=0))
 
 
 def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:

@@ -14,7 +14,7 @@ from flexmb.system.tree_system import System
 
 
 class Timing(NamedTuple):
-    """switches: times (s), increasing, where a function jumps or is no longer smooth; end: until when all are defined."""
+    """switches (s), increasing: where a function jumps or is no longer smooth; end (s): until when all are defined."""
 
     switches: tuple[float, ...]
     end: float

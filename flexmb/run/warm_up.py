@@ -1,14 +1,18 @@
-"""Compile ahead: `python -m flexmb.run.warm_up` fills the disk cache, so that the first real run starts at once.
+"""Compile ahead: `python -m flexmb.warmup SCENE` fills the disk cache, so that the first real run starts at once.
 
-Compiled kernels depend on types only, not on the scene: one small scene of each kind compiles all that other scenes of
-its kind run. Without arguments these are the kernels that `simulate` runs for a tree by its defaults; --method,
---algorithm and --scene add others.
+Kernels are compiled for what a scene contains: those of one scene serve all that contain the same kinds of hinges,
+levels, loads and so on. Without scenes, general kernels are compiled, which contain everything: a process in whose
+environment FLEXMB_KERNELS=general is set runs every scene by them, somewhat slower than by its own. Compiled is what
+`simulate` runs by its defaults; --method, --algorithm and --scene add others.
 """
 
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from time import perf_counter
 from typing import Literal, get_args
 
@@ -17,6 +21,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.jit.folder import cache_directory
 from flexmb.run.simulate import simulate
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.system.algorithm import Algorithm
@@ -53,29 +58,53 @@ SCENES = {"tree": pendulum, "condensed": with_panel, "closed": looped}
 def warm_up(
     methods: Sequence[Method] = ("dop853", "rk4"),
     algorithms: Sequence[Algorithm] = ("articulated",),
-    scenes: Sequence[Kind] = ("tree",),
+    scenes: Sequence[Kind | Scene] = ("tree",),
 ) -> float:
     """Compile, or find compiled, all kernels behind `simulate` and `System`; returns the seconds it took.
 
-    scenes: "tree"; "condensed", trees with bodies of so many modes that they are eliminated in condensed form;
-    "closed", scenes with closures. Every method is compiled with every algorithm and scene that `simulate` runs it
-    with. Raises ValueError for a name that does not exist.
+    scenes: a scene, for its own kernels; or the name of a kind, for general ones (FLEXMB_KERNELS=general): "tree";
+    "condensed", trees with bodies of so many modes that they are eliminated in condensed form; "closed", scenes with
+    closures. Every method is compiled with every algorithm and scene that `simulate` runs it with. Raises ValueError
+    for a name that does not exist, and what `compile` raises for a scene.
     """
     for what, names, known in (
-        ("method", methods, INTEGRATORS), ("algorithm", algorithms, RUNNING), ("scene", scenes, SCENES),
+        ("method", methods, INTEGRATORS), ("algorithm", algorithms, RUNNING),
+        ("scene", [each for each in scenes if not isinstance(each, Scene)], SCENES),
     ):  # fmt: skip
         for name in names:
             arguments.one_of(what, name, known)
     start = perf_counter()
-    for kind in scenes:
-        system = compile(SCENES[kind]())
-        for algorithm in algorithms:
-            for method in methods:
-                if _runs(kind, algorithm, method):
-                    step = 1e-3 if INTEGRATORS[method].fixed else None
-                    simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
-        _pointwise(system)
+    for each in scenes:
+        if isinstance(each, Scene):
+            _compile(each, "closed" if each.closures else "tree", methods, algorithms)
+        else:
+            with _general_kernels():
+                _compile(SCENES[each](), each, methods, algorithms)
     return perf_counter() - start
+
+
+def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Sequence[Algorithm]) -> None:
+    system = compile(scene)
+    for algorithm in algorithms:
+        for method in methods:
+            if _runs(kind, algorithm, method):
+                step = 1e-3 if INTEGRATORS[method].fixed else None
+                simulate(system, 1e-3, method, samples=2, step=step, algorithm=algorithm)
+    _pointwise(system)
+
+
+@contextmanager
+def _general_kernels() -> Iterator[None]:
+    """For the tables that are made meanwhile."""
+    before = os.environ.get("FLEXMB_KERNELS")
+    os.environ["FLEXMB_KERNELS"] = "general"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ["FLEXMB_KERNELS"]
+        else:
+            os.environ["FLEXMB_KERNELS"] = before
 
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
@@ -105,15 +134,17 @@ def _bob() -> SceneBuilder:
 
 def main(words: Sequence[str] | None = None) -> None:
     """The command line."""
-    parser = argparse.ArgumentParser(prog="python -m flexmb.run.warm_up", description=(__doc__ or "").splitlines()[0])
+    parser = argparse.ArgumentParser(prog="python -m flexmb.warmup", description=__doc__)
+    parser.add_argument("files", nargs="*", type=Path, metavar="SCENE", help="scene.toml; none: general kernels")
     parser.add_argument("--method", action="append", choices=tuple(INTEGRATORS), help="beside dop853 and rk4")
     parser.add_argument("--algorithm", action="append", choices=RUNNING, help="beside articulated")
-    parser.add_argument("--scene", action="append", choices=get_args(Kind), help="beside trees")
+    parser.add_argument("--scene", action="append", choices=get_args(Kind), help="general kernels, beside trees")
     asked = parser.parse_args(words)
+    scenes: list[Kind | Scene] = [load_scene(path) for path in asked.files] or ["tree"]
     seconds = warm_up(
         ("dop853", "rk4", *(asked.method or ())),
         ("articulated", *(asked.algorithm or ())),
-        ("tree", *(asked.scene or ())),
+        [*scenes, *(asked.scene or ())],
     )
     print(f"compiled in {seconds:.1f} s, kept in {cache_directory() or 'memory only: no folder is writable'}")
 

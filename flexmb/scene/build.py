@@ -16,6 +16,7 @@ from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.check import check_scene
 from flexmb.scene.convert import ROOT, label, plain, to_struct
+from flexmb.scene.garbage import collector_paused
 from flexmb.scene.hinges import Z_AXIS
 from flexmb.scene.options import (
     Angle,
@@ -103,8 +104,9 @@ class SceneBuilder:
 
     def scene(self, *, t_end: float | None = None) -> s.Scene:
         """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs."""
-        data = self._head | {key: plain(items) for key, items in self._lists.items()}
-        scene = to_struct(data, s.Scene)
+        with collector_paused():
+            data = self._head | {key: plain(items) for key, items in self._lists.items()}
+            scene = to_struct(data, s.Scene)
         check_scene(scene, t_end)
         return scene
 

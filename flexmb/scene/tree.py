@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.columns import struct_keys
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
 from flexmb.scene.schema import PointMass, Scene
 
@@ -52,7 +53,8 @@ def ordered(scene: Scene) -> tuple[Branch, ...]:
         hinge = waiting.pop()
         branches.append(Branch(bodies[hinge.child], hinge))
         waiting.extend(reversed(outboard[hinge.child]))
-    if sorted(branch.body.name for branch in branches) != sorted(body.name for body in scene.bodies):
+    reached = {branch.body.name for branch in branches}
+    if not len(reached) == len(branches) == len(scene.bodies):
         raise ValueError(f'scene "{scene.name}" is not a tree rooted at "ground": run check_scene for the details')
     return tuple(branches)
 
@@ -92,7 +94,7 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
     if isinstance(item, PointMass) and not item.coordinates:
         return tuple(NamedCoordinate(f"coordinates[{i}]", LinearCoordinate()) for i in range(len(item.directions)))
     found: list[NamedCoordinate] = []
-    for key in item.__struct_fields__:
+    for key in struct_keys(type(item)):  # a hinge holds no other structs
         match getattr(item, key):
             case AngularCoordinate() | LinearCoordinate() as coordinate:
                 found.append(NamedCoordinate(key, coordinate))

@@ -7,6 +7,7 @@ from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import (
     add,
     add9,
+    add_sym,
     mat3,
     rotate_mat,
     rotate_plane,
@@ -14,6 +15,7 @@ from flexmb.spatial.vector import (
     rotate_sym,
     store3,
     store9,
+    store_sym,
     sym6,
     sym_add,
     sym_times,
@@ -31,10 +33,9 @@ def load_inertia(a, i):
 
 @helper
 def store_inertia(a, i, p):
-    for n in range(6):
-        a[i + n] = p[0][n]
-        a[i + 15 + n] = p[2][n]
+    store_sym(a, i, p[0])
     store9(a, i + 6, p[1])
+    store_sym(a, i + 15, p[2])
 
 
 @helper
@@ -48,10 +49,9 @@ def store_full(a, i, p):
 
 @helper
 def add_inertia(a, i, p):
-    for n in range(6):
-        a[i + n] += p[0][n]
-        a[i + 15 + n] += p[2][n]
+    add_sym(a, i, p[0])
     add9(a, i + 6, p[1])
+    add_sym(a, i + 15, p[2])
 
 
 @helper

@@ -246,3 +246,24 @@ def add9(a, i, m):
     a[i + 6] += m[6]
     a[i + 7] += m[7]
     a[i + 8] += m[8]
+
+
+@helper
+def store_sym(a, i, s):
+    # written out as in store9
+    a[i] = s[0]
+    a[i + 1] = s[1]
+    a[i + 2] = s[2]
+    a[i + 3] = s[3]
+    a[i + 4] = s[4]
+    a[i + 5] = s[5]
+
+
+@helper
+def add_sym(a, i, s):
+    a[i] += s[0]
+    a[i + 1] += s[1]
+    a[i + 2] += s[2]
+    a[i + 3] += s[3]
+    a[i + 4] += s[4]
+    a[i + 5] += s[5]

@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexmb.entry.lanes import Copies, Entries, accelerations
+from flexmb.entry import lanes
+from flexmb.entry.lanes import Copies
+from flexmb.integrate.lane_problem import LaneProblem, LaneStages, lane_entries, lane_problem, lane_stages
 from flexmb.jit.lanes import LANES
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
@@ -59,7 +61,7 @@ class Batch:
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
         self.in_lanes = not first.scene.closures
         self._constants: list[Constants] = [first.constants]
-        self._spare: list[LaneWorkspace] = []
+        self._spare: list[tuple[LaneWorkspace, LaneStages]] = []
         if self.in_lanes and not self.shares_constants:
             self._constants = [
                 lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
@@ -69,19 +71,21 @@ class Batch:
         """That of a copy."""
         return self.systems[0 if self.shares_constants else copy]
 
-    def constants(self, block: int) -> Constants:
-        """Of the copies LANES * block and on."""
-        return self._constants[0 if self.shares_constants else block]
-
     @contextmanager
-    def workspace(self) -> Iterator[LaneWorkspace]:
-        """For LANES copies, nobody else's meanwhile; it takes longer to make one than to evaluate a thousand copies."""
+    def tables(self) -> Iterator[tuple[LaneWorkspace, LaneStages]]:
+        """For LANES copies, nobody else's meanwhile. To make them takes longer than to evaluate a thousand copies."""
         try:
-            w = self._spare.pop()
+            found = self._spare.pop()
         except IndexError:
-            w = lane_workspace(self.systems[0].workspace(), self.nq, self.nu)
-        yield w
-        self._spare.append(w)
+            found = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1)
+        yield found
+        self._spare.append(found)
+
+    def problem(self, block: int, w: LaneWorkspace, s: LaneStages) -> LaneProblem:
+        """The equations of motion of the copies LANES * block and on."""
+        c = self._constants[0 if self.shares_constants else block]
+        lanes.begin(c, w)
+        return lane_problem(lanes.rhs, lanes.project, s, c, w)
 
     def states(self, q: Any, u: Any) -> tuple[Real, Real]:
         """Coordinates (n,nq) and speeds (n,nu) of all copies, C-contiguous; ValueError where they do not fit."""
@@ -121,10 +125,11 @@ class Batch:
         n = len(copies.q)
 
         def work(ranges: Iterable[tuple[int, int]]) -> None:
-            with self.workspace() as w:
-                entries = Entries(w.time, w.state, w.slope)
+            with self.tables() as (w, s):
+                entries = lane_entries(s)
                 for start, stop in ranges:
-                    accelerations(start, stop, copies, entries, self.constants(start // LANES), w)
+                    problem = self.problem(start // LANES, w, s)
+                    lanes.accelerations(start, stop, copies, problem, entries, w.doubt)
 
         step = n if self.shares_constants else LANES
         if self.shares_constants and threads > 1:
@@ -169,9 +174,10 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
 
 def _refuse_other_structure(i: int, system: System, first: System) -> None:
     if system.layout != first.layout:
-        strange = {*system.layout.q.items()} ^ {*first.layout.q.items()}
+        one, other = first.layout.q, system.layout.q
+        strange = sorted(name for name in {**one, **other} if one.get(name) != other.get(name))
         raise ValueError(
-            f"scene {i} has another structure than scene 0: the coordinates of {sorted({name for name, _ in strange})}"
+            f"scene {i} has another structure than scene 0: they differ in the coordinates of {', '.join(strange[:3])}"
         )
     if system.scene.closures or first.scene.closures:
         if system.scene.closures and first.scene.closures:
@@ -191,7 +197,8 @@ def blocks_of(copies: Sequence[Any]) -> list[list[Any]]:
 def number_of_threads(asked: int | None, most: int) -> int:
     """As many as asked for; by default one for each processor, but not more than `most`."""
     if asked is None:
-        return max(1, min(most, len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1))
+        ours = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+        return max(1, min(most, ours))
     threads = arguments.whole("threads", asked)
     if threads < 1:
         raise ValueError(f"threads is {threads}: at least one has to do the work")

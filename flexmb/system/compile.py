@@ -6,6 +6,7 @@ from typing import get_args
 
 from flexmb.jain.elimination import Elimination
 from flexmb.scene.check import check_scene
+from flexmb.scene.garbage import collector_paused
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -32,5 +33,7 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
     if scene.closures:
         from flexmb.system.closed import ClosedSystem  # a tree needs none of it
 
-        return ClosedSystem(scene)
-    return System(scene, elimination)
+        with collector_paused():
+            return ClosedSystem(scene)
+    with collector_paused():
+        return System(scene, elimination)

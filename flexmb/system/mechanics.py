@@ -257,7 +257,7 @@ class Mechanics:
     def _is_modal(self) -> NDArray[np.bool_]:
         """Which entries of u (nu,) are modal."""
         found = np.zeros(self.nu, bool)
-        for k in range(len(self.constants.body)):
+        for k in np.flatnonzero(self.constants.body["modes"]).tolist():
             found[self._modes(k)] = True
         return found
 
@@ -300,9 +300,9 @@ class Mechanics:
 
 def _owner(c: Constants, speed: int) -> int:
     """Body whose hinge, mode or wheel has a speed."""
-    for k, body in enumerate(c.body):
-        wheels = c.wheel["u_index"][body["wheel_start"] : body["wheel_stop"]]
-        first, modes = body["u_index"], body["etad_index"]
-        if first <= speed < first + body["nv"] or modes <= speed < modes + body["modes"] or speed in wheels:
-            return k
-    return 0
+    first, modes = c.body["u_index"], c.body["etad_index"]
+    of_hinge = (first <= speed) & (speed < first + c.body["nv"])
+    of_modes = (modes <= speed) & (speed < modes + c.body["modes"])
+    wheel = np.flatnonzero(c.wheel["u_index"] == speed)
+    of_wheel = (c.body["wheel_start"] <= wheel[0]) & (wheel[0] < c.body["wheel_stop"]) if len(wheel) else False
+    return int(np.argmax(of_hinge | of_modes | of_wheel)) if len(c.body) else 0

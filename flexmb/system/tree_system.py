@@ -33,6 +33,7 @@ from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.state import State, finite_result
+from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -178,14 +179,17 @@ class System(Mechanics):
         A state that has no accelerations fails no other one: its row is NaN. Raises ValueError or TypeError for arrays
         that do not fit.
         """
-        return self._batch.accelerations(q, u, t, threads=threads)
+        return self.batch.accelerations(q, u, t, threads=threads)
 
-    @cached_property
-    def _batch(self) -> Batch:
-        """Copies of this system."""
+    @property
+    def batch(self) -> Batch:
+        """Any number of copies of this system."""
         from flexmb.system.batch import Batch  # lanes are for those who ask for many states
 
-        return Batch([self])
+        if Batch not in self.kept:
+            self.kept[Batch] = Batch([self])
+        found: Batch = self.kept[Batch]
+        return found
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
@@ -203,9 +207,15 @@ class System(Mechanics):
         return self._evaluators[chosen.name]
 
     @cached_property
-    def start_precision(self) -> Precision:
-        """`precision` of the initial state, found once."""
-        return self.precision(self.initial_state)
+    def start_precision(self) -> Precision | None:
+        """`precision` of the initial state, found once; None where no pivot there is so small that it may be rounding.
+
+        Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
+        """
+        initial, w = self.initial_state, self._recursion_w
+        t, y = self.layout.entering(initial)
+        status = articulated.rhs(t, y, np.empty_like(y), self.recursion_constants, w)
+        return None if status == OK and not w.doubt[0] else self.precision(initial)
 
     @cached_property
     def state_names(self) -> tuple[labels.Names, labels.Names]:
@@ -280,13 +290,11 @@ class System(Mechanics):
 
     def _driven(self, names: Iterable[str]) -> dict[str, Index]:
         """Places in u of the prescribed coordinates, by hinge or wheel."""
-        found = {}
-        for name in names:
-            place = self.speed(name)
-            driven = self.constants.speed["prescribed"][place] >= 0
-            if np.any(driven):
-                found[name] = place.start + np.flatnonzero(driven)
-        return found
+        driven = self.constants.speed["prescribed"] >= 0
+        if not np.any(driven):
+            return {}
+        places = ((name, self.speed(name)) for name in names)
+        return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
 
 
 def _find(places: dict[str, slice], name: str) -> slice:

@@ -29,16 +29,22 @@ def _record(*fields: tuple) -> np.dtype:
     return np.dtype(list(fields), align=True)
 
 
-BODY = _record(
+BODY = _record(  # what rigid trees need comes first, so that it lies together
+    ("placement_position", _F, (3,)),  # O+ in the parent's frame
+    ("placement_rotation", _F, (9,)),  # R_parent_O+
+    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
+    # without the summed points
+    ("rigid", _F, (10,)),
     ("parent", _I),  # -1 for ground
-    ("level", _I),  # numbers of flexmb.levels.body
-    ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
     ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
-    ("sequence", _I, (3,)),  # axis numbers of a gimbal
     ("q_index", _I),  # first hinge coordinate in q
-    ("quaternion", _I),  # where the quaternion of its hinge begins in q, -1 where there is none
     ("u_index", _I),  # first hinge speed in u
+    ("hinge_kind", _I),  # numbers of flexmb.hinges.catalogue
+    ("level", _I),  # numbers of flexmb.levels.body
     ("nv", _I),  # number of hinge speeds
+    ("quaternion", _I),  # where the quaternion of its hinge begins in q, -1 where there is none
+    ("sequence", _I, (3,)),  # axis numbers of a gimbal
+    ("ball_spring", _F),  # stiffness of a spherical hinge
     ("modes", _I),  # number of modes
     ("elimination", _I),  # of the modes: EXPLICIT, WOODBURY or CONDENSED
     ("reduced", _I),  # row of the tables of ReducedConstants, where not EXPLICIT
@@ -50,15 +56,9 @@ BODY = _record(
     ("etad_index", _I),  # first modal speed in u
     ("inboard_port", _I),  # port of the inboard hinge frame O+ on the parent; -1: `placement` holds it, undeforming
     ("outboard_port", _I),  # port of the outboard hinge frame O on the body; -1: O is the body frame
-    ("placement_position", _F, (3,)),  # O+ in the parent's frame
-    ("placement_rotation", _F, (9,)),  # R_parent_O+
-    # mass, first moment (3), inertia about the origin (xx yy zz xy xz yz) at rest; levels full and linear:
-    # without the summed points
-    ("rigid", _F, (10,)),
     ("product", _I),  # level full: row of `product`
     ("slope", _I),  # level linear: row of `slope`
     ("mass_slope", _I),  # level linear: row of `mass_slope`; -1 where the modal masses do not change
-    ("ball_spring", _F),  # stiffness of a spherical hinge
     ("point_start", _I),
     ("point_stop", _I),
     ("port_start", _I),
@@ -180,24 +180,24 @@ class ReducedConstants(Constants):
     zeta: Real  # (R,21) at rest: M_rf Lam M_fr, as a spatial inertia
 
 
-BODY_STATE = _record(
+BODY_STATE = _record(  # what every evaluation writes comes first, so that it lies together
     ("rotation", _F, (9,)),  # R_parent_body
     ("arm", _F, (3,)),  # from the parent's reference (port or origin) to O, parent axes
     ("velocity", _F, (6,)),  # of the body frame, body axes
     ("bias", _F, (6,)),  # acceleration of O at zero udot and parent at rest, body axes
-    ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
-    ("accel_hinge", _F, (6,)),  # of O without the deformation part, minus gravity, body axes
-    ("pose_rotation", _F, (9,)),  # R_World_body
-    ("pose_position", _F, (3,)),
     ("inertia", _F, (21,)),  # rigid block of the articulated inertia about the body origin
     ("force", _F, (6,)),  # rigid part of the bias force
-    ("hinge_inertia", _F, (21,)),  # P_R about O
-    ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
     # of a hinge with a single axis, as flexmb.jain.hinge_solve has it
     ("gain", _F, (6,)),  # G
     ("inertia_along", _F),  # D_R
     ("rate_at_rest", _F),  # D_R^-1 epsilon_R
     ("free_count", _I),
+    ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
+    ("accel_hinge", _F, (6,)),  # of O without the deformation part, minus gravity, body axes
+    ("hinge_inertia", _F, (21,)),  # P_R about O
+    ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
+    ("pose_rotation", _F, (9,)),  # R_World_body
+    ("pose_position", _F, (3,)),
     ("load", _F, (6,)),  # load across the hinge on the body about O, body axes
 )
 HINGE_STATE = _record(  # by free speed

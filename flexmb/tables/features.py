@@ -1,8 +1,8 @@
 """What a scene contains, as names: kernels are compiled for these alone (see `flexmb.jit.features`).
 
-A name stands for code that other scenes do without; that something is there in one body is enough. A kernel of the
-environment variable FLEXMB_KERNELS=general contains everything: compiled once, for whoever runs many different scenes
-for a short time each, as a suite of tests does.
+A name stands for code that other scenes do without; that something is there in one body is enough. With the
+environment variable FLEXMB_KERNELS=general kernels contain everything and are compiled once for all scenes: for who
+runs many different ones for a moment each, as a suite of tests does.
 """
 
 from __future__ import annotations
@@ -40,8 +40,14 @@ MODAL_DAMPING = "modal damping"
 
 
 def features(c: Constants) -> frozenset[str]:
-    """Of the tables of a scene; GENERAL alone where the environment asks for it."""
-    if os.environ.get("FLEXMB_KERNELS") == "general":
+    """Of the tables of a scene; GENERAL alone where the environment asks for it.
+
+    Raises ValueError for a value of FLEXMB_KERNELS that means nothing.
+    """
+    asked = os.environ.get("FLEXMB_KERNELS", "exact")
+    if asked not in ("exact", GENERAL):
+        raise ValueError(f'FLEXMB_KERNELS is {asked!r}: use "exact", which is meant if it is not set, or "{GENERAL}"')
+    if asked == GENERAL:
         return frozenset({GENERAL})
     body, speed, pair = c.body, c.speed, c.pair
     found = {

@@ -12,7 +12,7 @@ from dataclasses import fields
 import numpy as np
 
 from flexmb.jit.bundle import bundle
-from flexmb.jit.lane_arrays import in_lanes, lane_zeros
+from flexmb.jit.lane_arrays import in_lanes
 from flexmb.jit.lanes import LANES
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.typing import Real, Record
@@ -20,13 +20,9 @@ from flexmb.typing import Real, Record
 
 @bundle
 class LaneWorkspace(Workspace):
-    """What one evaluation of LANES copies writes, and where they enter and leave."""
+    """What one evaluation of LANES copies writes."""
 
     in_lanes = True
-
-    time: Real  # (1,LANES) s
-    state: Real  # (nq+nu+1,LANES) y
-    slope: Real  # (nq+nu+1,LANES) dy/dt, or accelerations
 
 
 @bundle
@@ -39,14 +35,9 @@ class LaneConstants(Constants):
     rest: Record  # (P,) PORT_STATE of the undeformed bodies
 
 
-def lane_workspace(w: Workspace, nq: int, nu: int) -> LaneWorkspace:
+def lane_workspace(w: Workspace) -> LaneWorkspace:
     """For copies of a system with workspace w; one per thread."""
-    return LaneWorkspace(
-        **{field.name: in_lanes([getattr(w, field.name)] * LANES) for field in fields(w)},
-        time=lane_zeros((1,)),
-        state=lane_zeros((nq + nu + 1,)),
-        slope=lane_zeros((nq + nu + 1,)),
-    )
+    return LaneWorkspace(**{field.name: in_lanes([getattr(w, field.name)] * LANES) for field in fields(w)})
 
 
 def lane_constants(copies: Sequence[tuple[Constants, Workspace]]) -> LaneConstants:

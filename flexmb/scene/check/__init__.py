@@ -14,7 +14,8 @@ from flexmb.scene.check.outboard import moved_inertia
 from flexmb.scene.check.profiles import functions
 from flexmb.scene.check.topology import tree
 from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
-from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.convert import refuse_wrong_types
+from flexmb.scene.garbage import collector_paused
 from flexmb.scene.problems import Defect, SceneError
 from flexmb.scene.schema import Scene
 
@@ -31,13 +32,19 @@ def check_scene(scene: Scene, t_end: float | None = None) -> None:
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")
-    to_struct(plain(scene), Scene)  # a struct built by hand may hold values of any type
+    with collector_paused():
+        problems = _problems(scene, t_end)
+    if problems:
+        raise SceneError(scene.name, problems)
+
+
+def _problems(scene: Scene, t_end: float | None) -> list[Defect]:
+    refuse_wrong_types(scene)  # a struct built by hand may hold values of any type
     problems = [*_run_time(t_end), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]
     problems += functions(scene, t_end)
     if not problems:  # needs sound numbers, names and a tree to stand on
         problems += moved_inertia(scene)
-    if problems:
-        raise SceneError(scene.name, problems)
+    return problems
 
 
 def check_run(scene: Scene, t_end: float) -> None:

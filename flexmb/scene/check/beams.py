@@ -23,12 +23,12 @@ SHEAR = ("GAy_N", "GAz_N")
 
 def beams(scene: Scene) -> Iterator[Defect]:
     """Problems of every beam body."""
-    for place, body in sound(scene, "bodies"):
-        if isinstance(body, BeamBody):
-            yield from _mesh(place, body)
-            yield from _stations(place, body)
-            yield from _along(place, body)
-            yield from _modes(place.key("modes"), body)
+    of_beams = [i for i, body in enumerate(scene.bodies) if isinstance(body, BeamBody)]
+    for place, body in sound(scene, "bodies", of_beams):
+        yield from _mesh(place, body)
+        yield from _stations(place, body)
+        yield from _along(place, body)
+        yield from _modes(place.key("modes"), body)
 
 
 def mode_count(body: BeamBody) -> int:

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from operator import attrgetter
 from typing import Any
 
 import numpy as np
 
 from flexmb.scene.bodies import SceneStruct
 from flexmb.scene.check import inertia
-from flexmb.scene.check.profiles import initial_motion
+from flexmb.scene.check.profiles import MOTIONS, initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
+from flexmb.scene.columns import alike, column
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene, Wheel
@@ -21,19 +23,33 @@ NOT_NEGATIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping
 
 def hinges(scene: Scene) -> Iterator[Defect]:
     """Springs and dampers that dissipate or store, motors that can act, gimbal sequences that exist."""
-    for place, hinge in sound(scene, "hinges"):
+    for place, hinge in sound(scene, "hinges", _to_examine(scene)):
         yield from _springs(place, hinge)
         yield from _coordinates(place, hinge)
         if isinstance(hinge, Gimbal):
             yield from _gimbal(place, hinge)
 
 
+def _to_examine(scene: Scene) -> set[int]:
+    """Numbers of the gimbals, and of hinges with a negative spring or damper or a prescribed motion."""
+    found: set[int] = set()
+    for kind, owners, structs in alike(scene.hinges):
+        if kind is Gimbal:
+            found.update(owners)
+        for key in kind.__struct_fields__:
+            if key in NOT_NEGATIVE:
+                found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0).tolist())
+            elif key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
+                found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
+    return found
+
+
 def closures(scene: Scene) -> Iterator[Defect]:
     """A closure of a kind without an axis must not be given one."""
-    for place, closure in sound(scene, "closures"):
-        if closure.axis != Z_AXIS and closure.type not in WITH_AXIS:
-            what = f"a {closure.type} closure has no axis of its own"
-            yield Defect(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
+    given = [i for i, each in enumerate(scene.closures) if each.axis != Z_AXIS and each.type not in WITH_AXIS]
+    for place, closure in sound(scene, "closures", given):
+        what = f"a {closure.type} closure has no axis of its own"
+        yield Defect(str(place.key("axis")), what, "leave the axis out, or turn quaternion_a and quaternion_b")
 
 
 def wheels(scene: Scene) -> Iterator[Defect]:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.scene.bodies import RigidBody
-from flexmb.scene.check.walk import sound
+from flexmb.scene.check.walk import LARGEST, sound
+from flexmb.scene.columns import column
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
 
@@ -18,13 +19,26 @@ PRINTED = 1e-9
 
 def rigid_bodies(scene: Scene) -> Iterator[Defect]:
     """A mass that is not negative, and a tensor that some distribution of that mass has."""
-    for place, body in sound(scene, "bodies"):
-        if isinstance(body, RigidBody):
-            yield from mass(place.key("mass_kg"), body.mass_kg)
-            yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2)
-            if body.mass_kg == 0.0 and np.any(body.inertia_kg_m2):
-                what = "a body without mass cannot have inertia"
-                yield Defect(str(place.key("mass_kg")), what, "give its mass, or set its inertia to zero too")
+    rigid = {i: body for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)}
+    doubtful = _doubtful(list(rigid.values()))
+    for place, body in sound(scene, "bodies", [i for i, doubt in zip(rigid, doubtful, strict=True) if doubt]):
+        yield from mass(place.key("mass_kg"), body.mass_kg)
+        yield from tensor(place.key("inertia_kg_m2"), body.inertia_kg_m2)
+        if body.mass_kg == 0.0 and np.any(body.inertia_kg_m2):
+            what = "a body without mass cannot have inertia"
+            yield Defect(str(place.key("mass_kg")), what, "give its mass, or set its inertia to zero too")
+
+
+def _doubtful(bodies: Sequence[RigidBody]) -> list[bool]:
+    """Whether the mass or the tensor of each body may be at fault: half of what `tensor` lets pass is passed."""
+    m, J = column(bodies, "mass_kg"), column(bodies, "inertia_kg_m2", 3, 3)
+    J[~np.all(np.abs(J) <= LARGEST, axis=(1, 2))] = 0.0  # reported as what it is: no finite number
+    slack = 0.5 * PRINTED * np.max(np.abs(J), axis=(1, 2), initial=0.0)
+    skew = np.max(np.abs(J - np.swapaxes(J, 1, 2)), axis=(1, 2), initial=0.0) > slack
+    low, middle, high = np.linalg.eigvalsh(J).T
+    impossible = (low < -slack) | (low + middle < high - slack)
+    doubtful: list[bool] = ((m <= 0.0) | skew | impossible).tolist()
+    return doubtful
 
 
 def mass(place: Place, value: float, *, zero: bool = True) -> Iterator[Defect]:

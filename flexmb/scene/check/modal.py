@@ -25,14 +25,14 @@ SPEED = (1e-3, 20_000.0)
 
 def modal_bodies(scene: Scene) -> Iterator[Defect]:
     """Problems of every raw modal body."""
-    for place, body in sound(scene, "bodies"):
-        if isinstance(body, ModalBody):
-            arrays = yield from _read(place, body)
-            if arrays is not None:
-                yield from _points(place, body, arrays)
-                yield from _matrices(place, body, arrays)
-                yield from _shapes(place, body, arrays)
-                yield from second_order(place, body, arrays)
+    modal = [i for i, body in enumerate(scene.bodies) if isinstance(body, ModalBody)]
+    for place, body in sound(scene, "bodies", modal):
+        arrays = yield from _read(place, body)
+        if arrays is not None:
+            yield from _points(place, body, arrays)
+            yield from _matrices(place, body, arrays)
+            yield from _shapes(place, body, arrays)
+            yield from second_order(place, body, arrays)
 
 
 def modal_states(scene: Scene) -> Iterator[Defect]:

@@ -19,8 +19,10 @@ IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("ori
 def unique_names(scene: Scene) -> Iterator[Defect]:
     """Every item has a name of its own, "ground" is the inertial frame, implicit nodes are not listed again."""
     for collections in NAMESPACES:
-        yield from _unique(item for collection in collections for item in entries(scene, collection))
-    for place, body in entries(scene, "bodies"):
+        if not _are_names([item.name for collection in collections for item in getattr(scene, collection)]):
+            yield from _unique(item for collection in collections for item in entries(scene, collection))
+    with_nodes = [i for i, body in enumerate(scene.bodies) if body.name == GROUND or _nodes(body)]
+    for place, body in entries(scene, "bodies", with_nodes):
         if body.name == GROUND:
             yield Defect(str(place), 'the name "ground" is taken: it is the inertial frame', "rename the body")
         if isinstance(body, SidBody):
@@ -40,12 +42,19 @@ def unique_names(scene: Scene) -> Iterator[Defect]:
 
 def references(scene: Scene) -> Iterator[Defect]:
     """Every body and node that something refers to exists."""
-    bodies = {body.name: body for body in scene.bodies}
-    for place, hinge in entries(scene, "hinges"):
+    bodies = Bodies(scene)
+    others = [
+        i
+        for i, hinge in enumerate(scene.hinges)
+        if not (bodies.have(hinge.parent, hinge.parent_node, GROUND) and bodies.have(hinge.child, hinge.child_node))
+    ]
+    for place, hinge in entries(scene, "hinges", others):
         yield from _attachment(place, bodies, ("parent", hinge.parent), ("parent_node", hinge.parent_node), ground=True)
         yield from _attachment(place, bodies, ("child", hinge.child), ("child_node", hinge.child_node), ground=False)
     for collection in ("wheels", "point_masses", "loads", "markers"):
-        for place, item in entries(scene, collection):
+        items = getattr(scene, collection)
+        strange = [i for i, item in enumerate(items) if not bodies.have(item.body, item.node)]
+        for place, item in entries(scene, collection, strange):
             yield from _attachment(place, bodies, ("body", item.body), ("node", item.node), ground=False)
     for place, closure in entries(scene, "closures"):
         for end in ("a", "b"):
@@ -56,7 +65,39 @@ def references(scene: Scene) -> Iterator[Defect]:
             what = f'the closure joins "{closure.body_a}" to itself'
             yield Defect(str(place), what, "give two different bodies")
     for place, state in entries(scene, "modal_states"):
-        yield from _body(place.key("body"), bodies, state.body)
+        yield from _body(place.key("body"), bodies.named, state.body)
+
+
+def _nodes(body: Body) -> tuple[Any, ...]:
+    return () if isinstance(body, SidBody) else body.nodes
+
+
+def _are_names(names: list[str]) -> bool:
+    """Whether all are names, no two of them the same."""
+    return len(set(names)) == len(names) and all(name.strip() and name.isprintable() for name in names)
+
+
+class Bodies:
+    """The bodies of a scene by name, and their nodes, found when first asked for."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.named: dict[str, Body] = {body.name: body for body in scene.bodies}
+        self._nodes: dict[str, dict[str, None]] = {}
+
+    def have(self, name: str, node: str, ground: str | None = None) -> bool:
+        """Whether there is such a body, or `ground`, with such a node; of files that are not read it is unknown."""
+        if name == ground:
+            return node == "origin"
+        body = self.named.get(name)
+        if body is None or isinstance(body, SidBody):
+            return body is not None
+        return node in IMPLICIT.get(type(body), ()) or node in self.nodes(name)
+
+    def nodes(self, name: str) -> dict[str, None]:
+        """Names of the nodes of a body, in their order."""
+        if name not in self._nodes:
+            self._nodes[name] = dict.fromkeys(rest_frames(self.named[name]))
+        return self._nodes[name]
 
 
 def _unique(items: Iterator[tuple[Place, Any]]) -> Iterator[Defect]:
@@ -71,18 +112,18 @@ def _unique(items: Iterator[tuple[Place, Any]]) -> Iterator[Defect]:
 
 
 def _attachment(
-    place: Place, bodies: dict[str, Body], to: tuple[str, str], at: tuple[str, str], *, ground: bool
+    place: Place, bodies: Bodies, to: tuple[str, str], at: tuple[str, str], *, ground: bool
 ) -> Iterator[Defect]:
     (body_key, body_name), (node_key, node) = to, at
     if body_name == GROUND and ground:
         if node != "origin":
             remedy = "leave the node out and give the offset of the hinge frame instead"
             yield Defect(str(place.key(node_key)), f'the ground has no node "{node}"', remedy)
-    elif body_name not in bodies:
-        yield from _body(place.key(body_key), bodies, body_name, ground=ground)
-    elif not isinstance(body := bodies[body_name], SidBody) and node not in (frames := rest_frames(body)):
-        remedy = closest(node, frames)
-        if isinstance(body, ModalBody) and node == "origin":
+    elif body_name not in bodies.named:
+        yield from _body(place.key(body_key), bodies.named, body_name, ground=ground)
+    elif not bodies.have(body_name, node):
+        remedy = closest(node, bodies.nodes(body_name))
+        if isinstance(bodies.named[body_name], ModalBody) and node == "origin":
             remedy = 'a free-free modal body has a node "origin" only where it is listed with its mode shapes: list it'
         yield Defect(str(place.key(node_key)), f'body "{body_name}" has no node "{node}"', remedy)
 

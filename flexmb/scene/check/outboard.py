@@ -8,14 +8,14 @@ hinges.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.bodies import BeamBody, ModalBody, RigidBody, SidBody, Vector
 from flexmb.scene.check.profiles import start_of
 from flexmb.scene.check.walk import entries
+from flexmb.scene.columns import column
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -34,21 +34,8 @@ from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.problems import Defect
 from flexmb.scene.quaternions import about, rotation_matrix
 from flexmb.scene.schema import PointMass, Scene, Wheel
-from flexmb.scene.tree import GROUND, Coordinate, coordinates, node_frame, ordered
+from flexmb.scene.tree import GROUND, Coordinate, NodeFrame, coordinates, ordered, rest_frames
 from flexmb.typing import Real
-
-Pose = tuple[Real, Real]
-
-
-class Cluster(NamedTuple):
-    """A body and all that is welded to it: `inertia` (6,6) in the body's frame, None where it is not known.
-
-    `beyond`: whether mass hangs from these by moving hinges.
-    """
-
-    inertia: Real | None
-    beyond: bool
-
 
 # A moment below this share of the largest leaves no digits of the acceleration.
 NEGLIGIBLE = 1e-12
@@ -57,75 +44,137 @@ GAUSS = np.polynomial.legendre.leggauss(2)  # exact for a linear section times x
 
 def moved_inertia(scene: Scene) -> Iterator[Defect]:
     """Every free coordinate of a hinge moves inertia. The scene's numbers and tree must be sound."""
-    bodies = {body.name: body for body in scene.bodies}
-    clusters = _clusters(scene)
-    for place, hinge in entries(scene, "hinges"):
-        H = _free_directions(hinge)
-        if H.shape[1] == 0:
-            continue
-        if np.linalg.svd(H, compute_uv=False)[-1] <= NEGLIGIBLE:
+    nodes = _Nodes(scene)
+    free = _free_directions(scene.hinges)
+    ends = _motions(*nodes.frames(scene.hinges, "child"))
+    known, beyond, inertia = _clusters(scene, nodes, ends)
+    of_child = [nodes.number[hinge.child] for hinge in scene.hinges]
+    faults: dict[int, tuple[str, str]] = {}
+    for freedoms in set(map(len, free)) - {0}:
+        hinges = np.array([i for i, H in enumerate(free) if len(H) == freedoms])
+        H = np.swapaxes(np.array([free[i] for i in hinges]), 1, 2)
+        locked = np.linalg.svd(H, compute_uv=False)[:, -1] <= NEGLIGIBLE
+        for i in hinges[locked]:
             what = "the hinge starts where its axes align (gimbal lock): one of its freedoms is lost"
-            yield Defect(str(place), what, "start elsewhere, choose another sequence, or use a spherical hinge")
-            continue
-        cluster, beyond = clusters[hinge.child]
-        if cluster is None or beyond:
-            continue
-        end = _end(bodies[hinge.child], hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-        X = np.linalg.inv(_motion(end))
-        inertia = X.T @ cluster @ X
-        D = H.T @ inertia @ H
-        mass, moment = float(inertia[5, 5]), float(np.trace(inertia[:3, :3]))
-        reference = np.where(np.any(H[:3] != 0.0, axis=0), moment, mass)
-        still = np.diag(D) <= NEGLIGIBLE * reference
-        if np.any(still) or np.linalg.eigvalsh(D / np.sqrt(np.outer(np.diag(D), np.diag(D))))[0] <= NEGLIGIBLE:
-            noun = "mass along" if np.any(still) and not np.any(H[:3, still]) else "inertia about"
-            what = f'body "{hinge.child}" and what is welded to it have no {noun} a free direction of this hinge'
-            remedy = f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"
-            yield Defect(str(place), what, remedy)
+            faults[int(i)] = what, "start elsewhere, choose another sequence, or use a spherical hinge"
+        tested = [
+            n
+            for n, (i, lock) in enumerate(zip(hinges, locked, strict=True))
+            if not lock and known[of_child[i]] and not beyond[of_child[i]]
+        ]
+        bodies = [of_child[i] for i in hinges[tested]]
+        for n, noun in _unmoved(H[tested], ends[hinges[tested]], inertia[bodies]):
+            i = int(hinges[tested[n]])
+            child = scene.hinges[i].child
+            what = f'body "{child}" and what is welded to it have no {noun} a free direction of this hinge'
+            faults[i] = what, f"give them {noun.split()[0]}, weld the hinge, or prescribe the coordinate"
+    for (place, _), i in zip(entries(scene, "hinges", faults), sorted(faults), strict=True):
+        yield Defect(str(place), *faults[i])
 
 
-def _clusters(scene: Scene) -> dict[str, Cluster]:
-    """Of every body: what is welded to it and what hangs from these, gathered tip to base."""
-    bodies = {body.name: body for body in scene.bodies}
-    clusters = {name: Cluster(_spatial_inertia(scene, body), False) for name, body in bodies.items()}
+def _unmoved(H: Real, end: Real, cluster: Real) -> Iterator[tuple[int, str]]:
+    """The hinges among n along some of whose free directions H (n,6,f) no inertia moves, and what is missing there.
+
+    `end` (n,6,6): motion of the body's frame to that of the hinge's; `cluster` (n,6,6): inertia in the body's frame.
+    """
+    X = np.linalg.inv(end)
+    inertia = np.swapaxes(X, 1, 2) @ cluster @ X
+    D = np.swapaxes(H, 1, 2) @ inertia @ H
+    diagonal = np.diagonal(D, axis1=1, axis2=2)
+    mass, moment = inertia[:, 5, 5], np.trace(inertia[:, :3, :3], axis1=1, axis2=2)
+    angular = np.any(H[:, :3] != 0.0, axis=1)
+    still = diagonal <= NEGLIGIBLE * np.where(angular, moment[:, None], mass[:, None])
+    size = np.sqrt(np.where(diagonal > 0.0, diagonal, 1.0))
+    coupled = np.linalg.eigvalsh(D / (size[:, :, None] * size[:, None, :]))[:, 0] <= NEGLIGIBLE
+    for n in np.flatnonzero(np.any(still, axis=1) | coupled):
+        along = bool(np.any(still[n])) and not np.any(angular[n, still[n]])
+        yield int(n), "mass along" if along else "inertia about"
+
+
+class _Nodes:
+    """The bodies of a scene by number, and the rest frames of their nodes, found when first asked for."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.bodies = scene.bodies
+        self.number = {body.name: i for i, body in enumerate(scene.bodies)}
+        self._frames: dict[str, dict[str, NodeFrame]] = {}
+
+    def frame(self, body: str, node: str) -> NodeFrame:
+        """Rest frame of a node."""
+        if body not in self._frames:
+            self._frames[body] = rest_frames(self.bodies[self.number[body]])
+        return self._frames[body][node]
+
+    def frames(self, hinges: Sequence[Hinge], side: str) -> tuple[Real, Real]:
+        """Rotations (n,3,3) and origins (n,3), body axes, of the frames of hinges on their `side`, parent or child.
+
+        Not on SID bodies, whose nodes are in their files.
+        """
+        R = rotation_matrix(column(hinges, f"{side}_quaternion", 4))
+        p = column(hinges, f"{side}_position_m", 3)
+        for i, hinge in enumerate(hinges):
+            name, node = getattr(hinge, side), getattr(hinge, f"{side}_node")
+            body = None if name == GROUND else self.bodies[self.number[name]]
+            if not (body is None or isinstance(body, SidBody) or (isinstance(body, RigidBody) and node == "origin")):
+                R[i], p[i] = _beside(self.frame(name, node), R[i], p[i])
+        return R, p
+
+
+def _beside(node: NodeFrame, R: Real, p: Real) -> tuple[Real, Real]:
+    """What is at R, p from a node, seen from its body."""
+    turn = rotation_matrix(node.quaternion)
+    return turn @ R, node.position + turn @ p
+
+
+def _clusters(scene: Scene, nodes: _Nodes, ends: Real) -> tuple[list[bool], list[bool], Real]:
+    """Of every body and all that is welded to it: whether its inertia is known, whether mass hangs from these by
+    moving hinges, and the inertia (N,6,6) in the body's frame."""
+    known, total = _spatial_inertias(scene, nodes)
+    beyond = [False] * len(known)
+    massive = np.any(total != 0.0, axis=(1, 2)).tolist()
+    number = {hinge.name: i for i, hinge in enumerate(scene.hinges)}
     for body, hinge in reversed(ordered(scene)):
         if hinge.parent == GROUND:
             continue
-        total, beyond = clusters[hinge.parent]
-        welded, further = clusters[body.name]
+        parent, k = nodes.number[hinge.parent], nodes.number[body.name]
+        beyond[parent] = beyond[parent] or beyond[k]
         if not isinstance(hinge, Weld):
-            beyond = beyond or further or welded is None or bool(np.any(welded))
-        elif total is None or welded is None:
-            total, beyond = None, beyond or further
+            beyond[parent] = beyond[parent] or massive[k] or not known[k]
+        elif known[parent] and known[k]:
+            to_parent = _motions(*nodes.frames([hinge], "parent"))[0]
+            X = np.linalg.solve(ends[number[hinge.name]], to_parent)
+            total[parent] += X.T @ total[k] @ X
+            massive[parent] = massive[parent] or massive[k]
         else:
-            parent = bodies[hinge.parent]
-            to_parent = _end(parent, hinge.parent_node, hinge.parent_position_m, hinge.parent_quaternion)
-            to_child = _end(body, hinge.child_node, hinge.child_position_m, hinge.child_quaternion)
-            X = np.linalg.solve(_motion(to_child), _motion(to_parent))
-            total, beyond = total + X.T @ welded @ X, beyond or further
-        clusters[hinge.parent] = Cluster(total, beyond)
-    return clusters
+            known[parent] = False
+    return known, beyond, total
 
 
-def _spatial_inertia(scene: Scene, body: Body) -> Real | None:
-    """Inertia (6,6) at rest in the body frame, wheels and point masses included; None for a SID body."""
-    match body:
-        case RigidBody():
-            total = _lump(body.mass_kg, body.com_m, body.inertia_kg_m2)
-        case BeamBody():
-            total = _beam(body)
-        case ModalBody():
-            a = modal_arrays(body)
-            points = zip(a.mass, a.position + a.com_offset, a.inertia, strict=True)
-            total = _sum(_lump(*point) for point in points)
-        case _:
-            return None
+def _spatial_inertias(scene: Scene, nodes: _Nodes) -> tuple[list[bool], Real]:
+    """Inertia (N,6,6) at rest in the body frame, wheels and point masses included; whether it is known: not of SID
+    bodies."""
+    rigid = [i for i, body in enumerate(scene.bodies) if isinstance(body, RigidBody)]
+    bodies = [scene.bodies[i] for i in rigid]
+    total = np.zeros((len(scene.bodies), 6, 6))
+    total[rigid] = _lumps(column(bodies, "mass_kg"), column(bodies, "com_m", 3), column(bodies, "inertia_kg_m2", 3, 3))
+    known = [True] * len(scene.bodies)
+    for i, body in enumerate(scene.bodies):
+        match body:
+            case BeamBody():
+                total[i] = _beam(body)
+            case ModalBody():
+                a = modal_arrays(body)
+                total[i] = np.sum(_lumps(a.mass, a.position + a.com_offset, a.inertia), axis=0)
+            case SidBody():
+                known[i] = False
     items: tuple[Wheel | PointMass, ...] = (*scene.wheels, *scene.point_masses)
     for item in items:
-        if item.body == body.name:
-            X = _motion(_end(body, item.node, item.offset_m, (1.0, 0.0, 0.0, 0.0)))
-            total = total + X.T @ _attached(item) @ X
-    return total
+        i = nodes.number[item.body]
+        if known[i]:
+            R, p = _beside(nodes.frame(item.body, item.node), np.eye(3), np.array(item.offset_m, float))
+            X = _motions(R[None], p[None])[0]
+            total[i] += X.T @ _attached(item) @ X
+    return known, total
 
 
 def _attached(item: Wheel | PointMass) -> Real:
@@ -154,37 +203,68 @@ def _beam(body: BeamBody) -> Real:
     return total
 
 
-def _lump(mass: float, com: Vector | Real, inertia: object) -> Real:
-    """Spatial inertia (6,6), angular first, of a lump with mass centre `com` and `inertia` (3,3) about it."""
-    c = np.cross(np.eye(3), np.asarray(com, dtype=float))  # c @ v = com x v
-    return np.block([[np.asarray(inertia, dtype=float) - mass * c @ c, mass * c], [-mass * c, mass * np.eye(3)]])
+def _lumps(mass: Real, com: Real, inertia: Real) -> Real:
+    """Spatial inertias (n,6,6), angular first, of lumps with mass centres `com` (n,3) and `inertia` about them."""
+    c, m = _skew(com), mass[:, None, None]
+    out = np.empty((len(mass), 6, 6))
+    out[:, :3, :3] = inertia - m * c @ c
+    out[:, :3, 3:] = m * c
+    out[:, 3:, :3] = -m * c
+    out[:, 3:, 3:] = m * np.eye(3)
+    return out
+
+
+def _lump(mass: float, com: Vector | Real, inertia: ArrayLike) -> Real:
+    """The same of one lump."""
+    found: Real = _lumps(np.array([mass]), np.array([com], float), np.array([inertia], float))[0]
+    return found
 
 
 def _sum(inertias: Iterable[Real]) -> Real:
     return sum(inertias, np.zeros((6, 6)))
 
 
-def _end(body: Body, node: str, position: Vector, quaternion: Quaternion) -> Pose:
-    """Rotation (3,3) and origin, in the body frame, of the frame offset from a node."""
-    frame = node_frame(body, node)
-    turn = rotation_matrix(frame.quaternion)
-    return turn @ rotation_matrix(quaternion), np.add(frame.position, turn @ np.asarray(position, dtype=float))
+def _motions(R: Real, p: Real) -> Real:
+    """X (n,6,6): spatial velocity [w; v] of the body frame to that of the frame at R, p in it, in that frame's axes."""
+    out = np.zeros((len(R), 6, 6))
+    out[:, :3, :3] = out[:, 3:, 3:] = turn = np.swapaxes(R, 1, 2)
+    out[:, 3:, :3] = -turn @ _skew(p)
+    return out
 
 
-def _motion(pose: Pose) -> Real:
-    """X (6,6): spatial velocity [w; v] of the body frame to that of the frame at `pose`, in that frame's axes."""
-    turn, position = pose
-    R = turn.T
-    return np.block([[R, np.zeros((3, 3))], [-R @ np.cross(np.eye(3), position), R]])
+def _skew(v: Real) -> Real:
+    """(n,3,3) matrices of v x, v (n,3)."""
+    out = np.zeros((len(v), 3, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        out[:, k, j], out[:, j, k] = v[:, i], -v[:, i]
+    return out
 
 
-def _free_directions(hinge: Hinge) -> Real:
-    """Free columns of the hinge map at the start (6,n), outboard hinge axes; prescribed coordinates are left out."""
+def _free_directions(hinges: Sequence[Hinge]) -> list[Real]:
+    """By hinge, free rows (n,6) of its map at the start, outboard hinge axes; prescribed coordinates are left out."""
+    single = [i for i, hinge in enumerate(hinges) if _turns_or_slides_freely(hinge)]
+    rows = np.zeros((len(single), 1, 6))
+    rows[:, 0, :3] = rows[:, 0, 3:] = column([hinges[i] for i in single], "axis", 3)
+    turns = np.array([isinstance(hinges[i], Revolute) for i in single], bool)
+    rows[turns, 0, 3:] = rows[~turns, 0, :3] = 0.0
+    by_number = dict(zip(single, rows, strict=True))
+    return [by_number[i] if i in by_number else _directions_of(hinge) for i, hinge in enumerate(hinges)]
+
+
+def _turns_or_slides_freely(hinge: Hinge) -> bool:
+    """Whether it is one of the two most frequent hinges, free to move."""
+    if isinstance(hinge, Revolute):
+        return hinge.rotation.prescribed_rad is None
+    return isinstance(hinge, Prismatic) and hinge.translation.prescribed_m is None
+
+
+def _directions_of(hinge: Hinge) -> Real:
+    """Those of one hinge."""
     angular = np.eye(6)[:3]
     directions: Sequence[ArrayLike]
     match hinge:
         case Spherical():
-            return angular.T
+            return angular
         case Free():
             return np.eye(6)
         case Revolute() | Prismatic() | Cylindrical():
@@ -198,13 +278,13 @@ def _free_directions(hinge: Hinge) -> Real:
         case Gimbal():
             directions = _carried(hinge.sequence, hinge)
         case _:
-            return np.zeros((6, 0))
+            return np.zeros((0, 6))
     kept = [
         np.asarray(direction, dtype=float)
         for direction, (_, coordinate) in zip(directions, coordinates(hinge), strict=True)
         if _profile(coordinate) is None
     ]
-    return np.array(kept).reshape(-1, 6).T
+    return np.array(kept).reshape(-1, 6)
 
 
 def _carried(sequence: str, hinge: Universal | Gimbal) -> list[Real]:

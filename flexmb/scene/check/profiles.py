@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from math import cos, sin
+from typing import Any, get_args
 
 from flexmb.scene.bodies import SceneStruct
-from flexmb.scene.check.walk import non_finite, values
+from flexmb.scene.check.walk import non_finite, suspicious, values
+from flexmb.scene.columns import alike
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.problems import Defect, Place
@@ -21,13 +23,17 @@ SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
 
 def functions(scene: Scene, t_end: float | None) -> Iterator[Defect]:
     """Problems of every function in the scene; with `t_end` (s) a table must reach that far."""
-    for place, key, value in values(ROOT, scene):
+    for place, key, value in suspicious(scene, _with_functions):
         if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
             yield from _well_formed(place, value)
             if isinstance(value, Table):
                 yield from _covers(place, value, t_end)
             if isinstance(value, Pulse) and key in MOTIONS:
                 yield Defect(str(place), "a pulse jumps: no body can follow it", SMOOTH)
+
+
+def _with_functions(items: Sequence[Any]) -> set[int]:
+    return {owner for group in alike(items) if group.kind in get_args(Function) for owner in group.owners}
 
 
 def start_of(function: Function) -> tuple[float, float] | None:

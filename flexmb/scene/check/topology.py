@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flexmb.scene.check.walk import entries
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND
 
@@ -16,25 +16,32 @@ def tree(scene: Scene) -> Iterator[Defect]:
     """Problems of the hinges' graph; references to unknown bodies are reported by the name checks."""
     if not scene.bodies:
         yield Defect("$.bodies", "the scene has no body", "add a body and the hinge that holds it")
-    inboard: dict[str, list[tuple[Place, str, str]]] = {body.name: [] for body in scene.bodies}
-    for place, hinge in entries(scene, "hinges"):
+    inboard: dict[str, list[int]] = {body.name: [] for body in scene.bodies}
+    for i, hinge in enumerate(scene.hinges):
         if hinge.parent == hinge.child:
-            yield Defect(str(place), f'the hinge joins body "{hinge.child}" to itself', "give two different bodies")
+            what = f'the hinge joins body "{hinge.child}" to itself'
+            yield Defect(_where(scene, "hinges", i), what, "give two different bodies")
         if hinge.child in inboard:
-            inboard[hinge.child].append((place, hinge.name, hinge.parent))
-    for place, body in entries(scene, "bodies"):
+            inboard[hinge.child].append(i)
+    for i, body in enumerate(scene.bodies):
         hinges = inboard[body.name]
         if not hinges:
-            what = "the body is not the child of any hinge"
-            yield Defect(str(place), what, f'add its inboard hinge: a free hinge from "{GROUND}" if it floats')
-        for extra, name, _ in hinges[1:]:
-            what = f'hinge "{name}" is a second inboard hinge of body "{body.name}", beside "{hinges[0][1]}"'
-            yield Defect(str(extra), what, CLOSE_THE_LOOP)
-    parents = {name: hinges[0][2] for name, hinges in inboard.items() if hinges}
+            what, remedy = "the body is not the child of any hinge", f'a free hinge from "{GROUND}" if it floats'
+            yield Defect(_where(scene, "bodies", i), what, f"add its inboard hinge: {remedy}")
+        for extra in hinges[1:]:
+            second, first = scene.hinges[extra].name, scene.hinges[hinges[0]].name
+            what = f'hinge "{second}" is a second inboard hinge of body "{body.name}", beside "{first}"'
+            yield Defect(_where(scene, "hinges", extra), what, CLOSE_THE_LOOP)
+    parents = {name: scene.hinges[hinges[0]].parent for name, hinges in inboard.items() if hinges}
     for cycle in _cycles(parents):
-        place = inboard[cycle[0]][0][0]
+        place = _where(scene, "hinges", inboard[cycle[0]][0])
         what = f"cycle: {' -> '.join([*cycle, cycle[0]])} never reaches the ground"
-        yield Defect(str(place), what, f'hinge one of them to "{GROUND}"; {CLOSE_THE_LOOP}')
+        yield Defect(place, what, f'hinge one of them to "{GROUND}"; {CLOSE_THE_LOOP}')
+
+
+def _where(scene: Scene, collection: str, number: int) -> str:
+    (place, _), = entries(scene, collection, [number])
+    return str(place)
 
 
 def _cycles(parents: dict[str, str]) -> list[list[str]]:
@@ -42,12 +49,12 @@ def _cycles(parents: dict[str, str]) -> list[list[str]]:
     done: set[str] = set()
     cycles = []
     for start in parents:
-        path: list[str] = []
+        path: dict[str, int] = {}  # by body, how many were passed before it
         name = start
         while name in parents and name not in done and name not in path:
-            path.append(name)
+            path[name] = len(path)
             name = parents[name]
-        if name in path and len(path) - path.index(name) > 1:
-            cycles.append(path[path.index(name) :][::-1])
+        if name in path and len(path) - path[name] > 1:
+            cycles.append(list(path)[path[name] :][::-1])
         done.update(path)
     return cycles

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from itertools import chain
 from math import hypot
+from operator import attrgetter
 from typing import Any
 
 import msgspec
+import numpy as np
 
+from flexmb.scene.columns import Alike, alike, number_keys
 from flexmb.scene.convert import ROOT, label
 from flexmb.scene.problems import Defect, Place
 from flexmb.scene.schema import Scene
@@ -19,16 +23,51 @@ LARGEST = 1e60
 AXES = ("axis", "direction", "directions")
 
 
-def entries(scene: Scene, collection: str) -> Iterator[tuple[Place, Any]]:
-    """The items of one of the scene's collections with their places, named."""
-    yield from _named_items(ROOT.key(collection), collection, getattr(scene, collection))
+def entries(scene: Scene, collection: str, chosen: Iterable[int] | None = None) -> Iterator[tuple[Place, Any]]:
+    """The items of one of the scene's collections with their places, named; or those of the chosen numbers."""
+    yield from _named_items(ROOT.key(collection), collection, getattr(scene, collection), chosen)
 
 
-def sound(scene: Scene, collection: str) -> Iterator[tuple[Place, Any]]:
+def sound(scene: Scene, collection: str, chosen: Iterable[int] | None = None) -> Iterator[tuple[Place, Any]]:
     """Like `entries`, without the items that hold a NaN or an infinity: physical checks would mean nothing there."""
-    for place, item in entries(scene, collection):
-        if not any(non_finite(value) for _, _, value in values(place, item)):
-            yield place, item
+    items = getattr(scene, collection)
+    numbers = list(range(len(items)) if chosen is None else chosen)
+    unsound = not_finite([items[i] for i in numbers])
+    yield from entries(scene, collection, [number for i, number in enumerate(numbers) if i not in unsound])
+
+
+def not_finite(items: Sequence[Any]) -> set[int]:
+    """Numbers of the items that hold a number `non_finite` finds."""
+    return {
+        owner
+        for group in alike(items)
+        for key in number_keys(group.kind)
+        if not _all_finite(values := list(map(attrgetter(key), group.structs)))
+        for owner, value in zip(group.owners, values, strict=True)
+        if non_finite(value)
+    }
+
+
+def _all_finite(values: list[Any]) -> bool:
+    """Whether numbers, or nested tuples of numbers, are finite for certain; mixtures never are."""
+    try:
+        while values and isinstance(values[0], tuple):
+            values = list(chain.from_iterable(values))
+        return bool(np.all(np.abs(np.array(values, float)) <= LARGEST))
+    except (TypeError, ValueError, OverflowError):
+        return False
+
+
+def suspicious(scene: Scene, suspects: Callable[[Sequence[Any]], Iterable[int]]) -> Iterator[tuple[Place, str, Any]]:
+    """Place, key and value of every field of the scene itself, and of those items of its collections that `suspects`
+    finds."""
+    for key in scene.__struct_fields__:
+        value, spot = getattr(scene, key), ROOT.key(key)
+        if isinstance(value, tuple) and value and isinstance(value[0], msgspec.Struct):
+            for place, item in _named_items(spot, key, value, suspects(value)):
+                yield from values(place, item)
+        else:
+            yield spot, key, value
 
 
 def values(place: Place, struct: msgspec.Struct) -> Iterator[tuple[Place, str, Any]]:
@@ -56,7 +95,7 @@ def non_finite(value: Any) -> tuple[tuple[int, ...], float] | None:
 
 def finite_numbers(scene: Scene) -> Iterator[Defect]:
     """No NaN, no infinity and nothing whose powers are infinite, anywhere."""
-    for place, _, value in values(ROOT, scene):
+    for place, _, value in suspicious(scene, not_finite):
         if found := non_finite(value):
             remedy = f"give a finite number, of at most {LARGEST:g}"
             yield Defect(str(place.key(*found[0])), f"the number is {found[1]}", remedy)
@@ -64,7 +103,7 @@ def finite_numbers(scene: Scene) -> Iterator[Defect]:
 
 def unit_vectors(scene: Scene) -> Iterator[Defect]:
     """Axes and directions have unit length."""
-    for place, key, value in values(ROOT, scene):
+    for place, key, value in suspicious(scene, _off_unit_axes):
         if key in AXES and not non_finite(value):
             several = key == "directions"
             for i, vector in enumerate(value if several else (value,)):
@@ -78,7 +117,7 @@ def unit_vectors(scene: Scene) -> Iterator[Defect]:
 
 def unit_quaternions(scene: Scene) -> Iterator[Defect]:
     """Quaternions have unit length."""
-    for place, key, value in values(ROOT, scene):
+    for place, key, value in suspicious(scene, _off_unit_quaternions):
         if "quaternion" in key and not non_finite(value):
             norm = hypot(*value)
             if norm == 0.0:
@@ -87,8 +126,39 @@ def unit_quaternions(scene: Scene) -> Iterator[Defect]:
                 yield Defect(str(place), f"not a unit quaternion: its norm is {norm:.9g}", _unit(value, norm))
 
 
-def _named_items(spot: Place, key: str, items: tuple[Any, ...]) -> Iterator[tuple[Place, Any]]:
-    for i, item in enumerate(items):
+def _off_unit_axes(items: Sequence[Any]) -> set[int]:
+    return _off_unit(items, lambda key: key in AXES)
+
+
+def _off_unit_quaternions(items: Sequence[Any]) -> set[int]:
+    return _off_unit(items, lambda key: "quaternion" in key)
+
+
+def _off_unit(items: Sequence[Any], wanted: Callable[[str], bool]) -> set[int]:
+    """Items with a vector under a wanted key that may not have unit length."""
+    return {
+        owner
+        for group in alike(items)
+        for key in filter(wanted, group.kind.__struct_fields__)
+        for owner in _not_unit(group, key)
+    }
+
+
+def _not_unit(group: Alike, key: str) -> list[int]:
+    values = list(map(attrgetter(key), group.structs))
+    try:
+        length = np.linalg.norm(np.array(values, float), axis=-1)
+    except (TypeError, ValueError, OverflowError):  # tuples of several
+        return [owner for owner, value in zip(group.owners, values, strict=True) if value]
+    unit = np.abs(length - 1.0) <= 0.5 * UNIT_LENGTH  # half of it, for `hypot` rounds otherwise
+    return [group.owners[i] for i in np.flatnonzero(~unit.reshape(len(values), -1).all(axis=1)).tolist()]
+
+
+def _named_items(
+    spot: Place, key: str, items: Sequence[Any], chosen: Iterable[int] | None = None
+) -> Iterator[tuple[Place, Any]]:
+    for i in range(len(items)) if chosen is None else sorted(chosen):
+        item = items[i]
         name = label(key, item)
         yield (spot.key(i).named(name) if name else spot.key(i)), item
 

@@ -1,0 +1,90 @@
+"""Many structs at once: those of one kind together, the values of a key as an array.
+
+What looks at a scene of 10^5 bodies has no time to look at one value after another.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cache
+from itertools import chain
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+from msgspec import inspect
+
+from flexmb.typing import Real
+
+
+class Alike(NamedTuple):
+    """Structs of one kind; `owners`: the numbers of the items that they are, or are part of."""
+
+    kind: type[msgspec.Struct]
+    owners: Sequence[int]
+    structs: Sequence[Any]
+
+
+def column(structs: Sequence[Any], key: str, *shape: int) -> Real:
+    """(len, *shape) numbers that structs of one kind have under a key."""
+    values: Any = map(attrgetter(key), structs)
+    for _ in shape:
+        values = chain.from_iterable(values)
+    return np.fromiter(values, float).reshape(len(structs), *shape)
+
+
+def alike(items: Sequence[Any]) -> list[Alike]:
+    """The items of a collection and all structs inside them, kind by kind."""
+    found: list[Alike] = []
+    waiting: list[tuple[Sequence[int], Sequence[Any]]] = [(range(len(items)), items)]
+    while waiting:
+        owners, structs = waiting.pop()
+        kinds = list(map(type, structs))
+        for kind in dict.fromkeys(kinds):
+            at = range(len(kinds)) if kinds.count(kind) == len(kinds) else [i for i, k in enumerate(kinds) if k is kind]
+            group = Alike(kind, [owners[i] for i in at], [structs[i] for i in at])
+            found.append(group)
+            waiting += [inner for key in struct_keys(kind) if (inner := _inside(group, key))[0]]
+    return found
+
+
+def _inside(group: Alike, key: str) -> tuple[list[int], list[Any]]:
+    """Owners and structs below a key."""
+    values = list(map(attrgetter(key), group.structs))
+    if not any(values):  # None and empty tuples; a struct is true
+        return [], []
+    pairs = [
+        (owner, each)
+        for owner, value in zip(group.owners, values, strict=True)
+        for each in (value if isinstance(value, tuple) else (value,))
+        if isinstance(each, msgspec.Struct)
+    ]
+    return [owner for owner, _ in pairs], [each for _, each in pairs]
+
+
+@cache
+def struct_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
+    """Keys below which structs may stand."""
+    return _keys(kind, lambda node: isinstance(node, inspect.StructType))
+
+
+@cache
+def number_keys(kind: type[msgspec.Struct]) -> tuple[str, ...]:
+    """Keys below which real numbers may stand, those of structs inside left out."""
+    return _keys(kind, lambda node: isinstance(node, inspect.FloatType))
+
+
+def _keys(kind: type[msgspec.Struct], wanted: Callable[[inspect.Type], bool]) -> tuple[str, ...]:
+    described = inspect.type_info(kind)
+    assert isinstance(described, inspect.StructType)
+    return tuple(field.name for field in described.fields if _holds(field.type, wanted))
+
+
+def _holds(node: inspect.Type, wanted: Callable[[inspect.Type], bool]) -> bool:
+    match node:
+        case inspect.UnionType(types=inner) | inspect.TupleType(item_types=inner):
+            return any(_holds(each, wanted) for each in inner)
+        case inspect.VarTupleType(item_type=each):
+            return _holds(each, wanted)
+    return wanted(node)

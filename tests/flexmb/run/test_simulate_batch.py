@@ -1,0 +1,169 @@
+"""Runs of many copies at once, against each copy run alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from msgspec.structs import replace
+
+import flexmb as fm
+from flexmb.run.simulate_batch import simulate_batch
+from flexmb.scene.build import SceneBuilder
+from tests.bounds import gamma
+
+STEP = 0.01
+T_END = 0.5
+FINE = {"rtol": 1e-9, "atol": 1e-11}
+AXES = ((0.0, 1.0, 0.0), (0.6, 0.8, 0.0))
+
+
+def pendulum(mass: float = 1.0, damping: float = 0.05, start: float = 0.2, duration: float = 0.1) -> fm.Scene:
+    """Two links, the first driven smoothly for a while, the second free, with a damper."""
+    scene = SceneBuilder("double pendulum", gravity=(0.0, 0.0, -9.81))
+    push = fm.SmoothStep(start_value=0.0, end_value=2.0, start_s=start, duration_s=duration)
+    motions = {"angle": 0.4, "damping": damping, "torque": push}, {"angle": -0.7, "rate": 1.0, "damping": damping}
+    for k, motion in enumerate(motions):
+        scene.rigid_body(f"b{k}", mass=mass, com=(0.0, 0.0, -0.4), inertia=np.diag([0.06, 0.06, 0.01]))
+        place = {} if k == 0 else {"parent_position": (0.0, 0.0, -0.8)}
+        scene.revolute(f"h{k}", "ground" if k == 0 else "b0", f"b{k}", axis=AXES[k], **motion, **place)
+    return scene.scene()
+
+
+@pytest.fixture(scope="module")
+def system() -> fm.System:
+    return fm.compile(pendulum())
+
+
+def starts(system: fm.System, n: int) -> tuple[np.ndarray, np.ndarray]:
+    rng, start = np.random.default_rng(0), system.initial_state
+    return start.q + 0.5 * rng.standard_normal((n, system.nq)), start.u + 0.5 * rng.standard_normal((n, system.nu))
+
+
+def alone(scene: fm.Scene, q: np.ndarray, u: np.ndarray, method: str, **settings) -> fm.Trajectory:
+    """One copy by `simulate`, from these initial angles and rates."""
+    changed = [
+        _replaced(hinge, angle_rad=float(angle), rate_rad_s=float(rate))
+        for hinge, angle, rate in zip(scene.hinges, q, u, strict=True)
+    ]
+    return fm.simulate(replace(scene, hinges=tuple(changed)), T_END, method, samples=21, **settings)
+
+
+def _replaced(hinge: fm.Revolute, **changes) -> fm.Revolute:
+    return replace(hinge, rotation=replace(hinge.rotation, **changes))
+
+
+@pytest.mark.parametrize(("method", "settings"), [("rk4", {"step": STEP}), ("dop853", FINE)])
+def test_every_copy_is_its_own_run(system, method, settings):
+    """Steps are the same to rounding, which a motion of half a second magnifies by less than a thousand."""
+    q, u = starts(system, 11)
+    found = simulate_batch(system, T_END, method, q=q, u=u, samples=21, threads=1, **settings)
+    assert found.finished
+    assert found.q.shape == (11, 21, system.nq)
+    steps = found.accepted_steps + found.rejected_steps
+    bound = 1e3 * gamma(20 * int(steps.max()))
+    for i in range(11):
+        run = alone(system.scene, q[i], u[i], method, **settings)
+        assert run.statistics.accepted_steps == found.accepted_steps[i]
+        assert run.statistics.rejected_steps == found.rejected_steps[i]
+        for got, right in ((found.q[i], run.q), (found.u[i], run.u), (found.work[i], run.work)):
+            np.testing.assert_allclose(got, right, rtol=0.0, atol=bound * (1.0 + np.max(np.abs(right))))
+        assert found.message(i) == run.message
+    assert np.max(np.abs(found.q[0] - found.q[1])) > 0.1  # the copies are not all the same
+
+
+def test_lanes_do_not_share_steps(system):
+    """Negative control: copies of different vigour need different numbers of steps, and get them."""
+    q, u = starts(system, 8)
+    u *= np.linspace(0.0, 20.0, 8)[:, None]
+    found = simulate_batch(system, T_END, q=q, u=u, **FINE)
+    assert len(set(found.accepted_steps.tolist())) > 4
+
+
+def test_output_times_of_a_run_that_are_steps_of_none(system):
+    q, u = starts(system, 9)
+    times = np.array([0.0, 1e-6, 0.123456, 0.2, 0.2000001, 0.37, T_END])
+    found = simulate_batch(system, T_END, q=q, u=u, samples=times, **FINE)
+    whole = simulate_batch(system, T_END, q=q, u=u, samples=2, **FINE)
+    np.testing.assert_array_equal(found.t, times)
+    assert np.isfinite(found.q).all()
+    np.testing.assert_array_equal(found.q[:, -1], whole.q[:, -1])
+
+
+@pytest.mark.parametrize(("method", "settings"), [("rk4", {"step": STEP}), ("dop853", FINE)])
+def test_a_copy_that_fails_fails_alone(system, method, settings):
+    q, u = starts(system, 10)
+    right = simulate_batch(system, T_END, method, q=q, u=u, samples=5, **settings)
+    u[3] = np.nan
+    u[8] = 1e160
+    found = simulate_batch(system, T_END, method, q=q, u=u, samples=5, **settings)
+    assert found.failed.tolist() == [3, 8]
+    assert set(found.status[found.failed].tolist()) <= {int(fm.Status.NONFINITE), int(fm.Status.STEP_TOO_SMALL)}
+    assert np.isnan(found.q[8, -1]).all()
+    others = right.status == found.status
+    np.testing.assert_array_equal(found.q[others], right.q[others])
+    assert "stopped" in found.message(3)
+
+
+def test_too_many_steps_stop_a_copy_where_they_stop_it_alone(system):
+    q, u = starts(system, 5)
+    found = simulate_batch(system, T_END, q=q, u=u, samples=21, max_steps=9, **FINE)
+    assert (found.status == fm.Status.MAX_STEPS).all()
+    for i in range(5):
+        run = alone(system.scene, q[i], u[i], "dop853", max_steps=9, **FINE)
+        assert run.status is fm.Status.MAX_STEPS
+        assert found.stopped_at[i] == pytest.approx(run.stopped_at, rel=1e-9)
+        assert np.isfinite(found.q[i, :, 0]).sum() == len(run.t)
+
+
+@pytest.mark.parametrize(("method", "settings"), [("rk4", {"step": STEP}), ("dop853", FINE)])
+def test_copies_with_masses_dampings_and_switch_times_of_their_own(method, settings):
+    scenes = [pendulum(1.0 + 0.1 * i, 0.05 * i, 0.2 - 0.01 * i, 0.1 + 0.005 * i) for i in range(9)]
+    found = simulate_batch(scenes, T_END, method, samples=21, threads=2, **settings)
+    assert found.finished
+    bound = 1e3 * gamma(20 * int(found.accepted_steps.max()))
+    for i, scene in enumerate(scenes):
+        run = fm.simulate(scene, T_END, method, samples=21, **settings)
+        assert run.statistics.accepted_steps == found.accepted_steps[i]
+        np.testing.assert_allclose(found.q[i], run.q, rtol=0.0, atol=bound * (1.0 + np.max(np.abs(run.q))))
+
+
+def test_threads_change_nothing(system):
+    q, u = starts(system, 40)
+    one, three = (simulate_batch(system, T_END, q=q, u=u, samples=3, threads=k, **FINE) for k in (1, 3))
+    np.testing.assert_array_equal(one.q, three.q)
+    np.testing.assert_array_equal(one.evaluations, three.evaluations)
+
+
+def test_one_of_two_states_may_be_that_of_the_scene(system):
+    q, _ = starts(system, 3)
+    found = simulate_batch(system, T_END, "rk4", q=q, step=STEP, samples=2)
+    whole = simulate_batch(system, T_END, "rk4", q=q, u=np.repeat(system.initial_state.u[None], 3, 0), step=STEP, samples=2)
+    np.testing.assert_array_equal(found.q, whole.q)
+
+
+def test_closed_chains_run_one_by_one():
+    scene, y = SceneBuilder("four bar", gravity=(0.0, 0.0, -9.81)), (0.0, 1.0, 0.0)
+    for k, x in enumerate((0.0, 1.0)):
+        scene.rigid_body(f"rocker{k}", mass=1.0, com=(0.0, 0.0, 0.5), inertia=np.diag([0.1, 0.1, 0.01]))
+        scene.revolute(f"h{k}", "ground", f"rocker{k}", parent_position=(x, 0.0, 0.0), axis=y, angle=0.3)
+    scene.rigid_body("coupler", mass=1.0, com=(0.5, 0.0, 0.0), inertia=np.diag([0.01, 0.1, 0.1]))
+    scene.revolute("joint", "rocker0", "coupler", parent_position=(0.0, 0.0, 1.0), axis=y, angle=-0.3)
+    ends = {"position_a": (0.0, 0.0, 1.0), "position_b": (1.0, 0.0, 0.0)}
+    scene.closure("loop", "revolute", "rocker1", "coupler", axis=y, **ends)
+    system = fm.compile(scene.scene())
+    start = system.initial_state
+    found = simulate_batch(system, 0.2, "rk4", q=np.array([start.q] * 2), u=np.array([start.u] * 2), step=STEP, samples=5)
+    run = fm.simulate(system, 0.2, "rk4", step=STEP, samples=5)
+    np.testing.assert_array_equal(found.q[1], run.q)
+
+
+def test_what_makes_no_sense_is_refused(system):
+    q, u = starts(system, 3)
+    with pytest.raises(ValueError, match="shape"):
+        simulate_batch(system, T_END, q=q[:, :1], u=u)
+    with pytest.raises(ValueError, match="rtol"):
+        simulate_batch(system, T_END, q=q, u=u, rtol=1.0)
+    with pytest.raises(fm.SceneError):
+        simulate_batch(system, -1.0, q=q, u=u)
+    with pytest.raises(ValueError, match="fewer samples"):
+        simulate_batch(system, T_END, q=np.zeros((20000, 2)), u=np.zeros((20000, 2)), samples=100000)

@@ -1,0 +1,95 @@
+"""What a scene contains, by name; and kernels of just that compute what general ones compute."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.jit.features import GENERAL
+from flexmb.scene.build import SceneBuilder
+from flexmb.tables import features
+from flexmb.tables.status import OK
+from flexmb.typing import Real
+from tests.bounds import gamma
+from tests.trees import RIGID, Recipe, random_scene
+
+FEW = {"conservative": True, "wheels": 0, "point_masses": 0}
+AXES = Recipe(bodies=4, carriers=("rigid",), hinges=("revolute", "prismatic"), **FEW)
+RUTHLESS_CHAIN = Recipe(bodies=3, carriers=("beam",), levels=("ruthless",), hinges=("revolute",), **FEW)
+EVERYTHING = Recipe(bodies=8, levels=("full", "ruthless", "linear", "stiffened"))
+
+
+def chain(bodies: int = 2, **hinge: float) -> fm.SceneBuilder:
+    builder = SceneBuilder("chain", gravity=(0, 0, -9.81))
+    for k in range(bodies):
+        builder.rigid_body(f"b{k}", mass=1.0, inertia=(0.1, 0.2, 0.3), com=(0.2, 0.1, 0), nodes={"tip": (1.0, 0, 0)})
+        inboard, at = ("ground", {}) if k == 0 else (f"b{k - 1}", {"parent_node": "tip"})
+        builder.revolute(f"h{k}", inboard, f"b{k}", axis=(0, 1, 0), **at, **hinge)
+    return builder
+
+
+@pytest.fixture
+def exact(monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "exact")
+
+
+def test_a_chain_has_hardly_anything(exact):
+    found = fm.compile(chain().scene()).constants.features()
+    assert found == {"axis 2", "hinge 1", "level 0"}
+
+
+def test_each_thing_has_its_name(exact):
+    assert features.SPRINGS in fm.compile(chain(stiffness=2.0).scene()).constants.features()
+    assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
+    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",)))
+    found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
+    names = {value for name, value in vars(features).items() if name.isupper() and isinstance(value, str)}
+    missing = names - {GENERAL} - {name.rstrip("0123456789- ") for name in found}
+    assert missing <= {features.BALL_SPRINGS}, missing  # drawn at random: another seed may have others
+
+
+def test_the_environment_asks_for_everything(monkeypatch):
+    monkeypatch.setenv("FLEXMB_KERNELS", "general")
+    assert fm.compile(chain().scene()).constants.features() == {GENERAL}
+    monkeypatch.setenv("FLEXMB_KERNELS", "all")
+    with pytest.raises(ValueError, match=r"'all'.*exact"):
+        fm.compile(chain().scene())
+
+
+def test_constants_are_read_only(exact):
+    with pytest.raises(ValueError, match="read-only"):
+        fm.compile(chain().scene()).constants.speed["damping"] = 3.0
+
+
+def slope(scene: fm.System, scale: float) -> Real:
+    state, w = scene.initial_state, scene.recursion_workspace()
+    y = np.concatenate([state.q * scale, state.u, [0.0]])
+    dy = np.empty_like(y)
+    assert scene.rhs(0.1, y, dy, scene.recursion_constants, w) == OK
+    return dy
+
+
+@pytest.mark.parametrize(
+    "recipe",
+    [
+        AXES,
+        RUTHLESS_CHAIN,
+        pytest.param(RIGID, marks=pytest.mark.slow),
+        pytest.param(EVERYTHING, marks=pytest.mark.slow),
+    ],
+    ids=["axes", "ruthless", "rigid", "everything"],
+)
+def test_exact_kernels_compute_what_general_ones_do(recipe, monkeypatch):
+    scene = random_scene(5, recipe)
+    found = []
+    for kernels in ("general", "exact"):
+        monkeypatch.setenv("FLEXMB_KERNELS", kernels)
+        found.append((fm.compile(scene), slope(fm.compile(scene), 1.0)))
+    (system, general), (_, of_its_own) = found
+    M = system.mass_matrix(system.initial_state)
+    nq = system.nq
+    residual = M @ (general - of_its_own)[nq:-1]
+    size = np.max(np.abs(M) @ np.abs(general[nq:-1]))
+    assert np.max(np.abs(residual)) <= gamma(100 * len(M)) * size
+    assert np.max(np.abs((general - of_its_own)[:nq]), initial=0.0) <= gamma(100) * np.max(np.abs(general[:nq]))
