@@ -1,4 +1,4 @@
-"""Loops that do not feel each other: groups of them are solved by themselves as all are at once, at the cost of each."""
+"""Loops that do not feel each other: their groups are solved by themselves as all are at once, at the cost of each."""
 
 from __future__ import annotations
 
