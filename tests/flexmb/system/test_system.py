@@ -181,7 +181,8 @@ class Rows:
 
 def records(bundle):
     arrays = {field.name: getattr(bundle, field.name) for field in fields(bundle)}
-    return SimpleNamespace(_numba_type_=bundle._numba_type_, **{k: Rows(a) if a.dtype.names else a for k, a in arrays.items()})
+    named = {name: Rows(array) if array.dtype.names else array for name, array in arrays.items()}
+    return SimpleNamespace(_numba_type_=bundle._numba_type_, **named)
 
 system = flexmb.compile(random_scene(SEED, RECIPE))
 system.constants = system.recursion_constants = records(system.constants)
