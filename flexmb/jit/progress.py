@@ -7,6 +7,7 @@ It is a warning of the logger `flexmb.jit`, which Python shows on stderr unless 
 from __future__ import annotations
 
 import logging
+import re
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -36,7 +37,7 @@ def announced(function: FunctionType, folder: Path | None) -> Iterator[None]:
 
 
 def _sentence(function: FunctionType, folder: Path | None) -> str:
-    purpose = (function.__doc__ or "").strip().partition("\n")[0]
+    purpose = re.split(r"[.;:\n]", (function.__doc__ or "a kernel").strip(), maxsplit=1)[0]
     name = f"{function.__module__}.{function.__qualname__}"
     how_often = f"once: it is kept in {folder}" if folder else "in every process: no folder is writable to keep it"
-    return f"flexmb is compiling {name} ({purpose or 'a kernel'}) for scenes of this kind, {how_often}"
+    return f"flexmb is compiling {name} ({purpose}) for scenes of this kind, {how_often}"
