@@ -19,7 +19,7 @@ import numpy as np
 
 from flexmb.entry import lanes
 from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
-from flexmb.jit.direct import addresses
+from flexmb.jit.direct import address, addresses
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import STATUS
 from flexmb.scene.check import check_scene
@@ -149,7 +149,7 @@ class Batch:
                 s.stage[0] = 0
                 for span in ranges:
                     c = self.constants(span[0] // LANES, w)
-                    where = *addresses(lanes.rhs, STATUS, s, c, w), entries._address
+                    where = *addresses(lanes.rhs, STATUS, s, c, w), address(entries)
                     lanes.accelerations(where, span, *copies)
 
         step = n if self.shares_constants else LANES

@@ -19,12 +19,15 @@ FUNCTIONS = {
     "campbell": ["system", "hinge", "rates"],
     "advise": ["scene", "tolerance", "quantity", "t_end"],
     "simulate": ["scene", "t_end", "method", "rtol", "atol", "algorithm"],
+    "compile_batch": ["scenes"],
+    "simulate_batch": ["copies", "t_end", "method", "q", "u", "threads", "rtol", "atol"],
 }
 SYSTEM = {
     "coordinate": ["name"],
     "speed": ["name"],
     "state": ["q", "u"],
     "accelerations": ["state", "algorithm"],
+    "accelerations_batch": ["q", "u", "t", "threads"],
     "partitions": ["state", "algorithm"],
     "mass_matrix": ["state"],
     "bias": ["state"],
@@ -35,7 +38,7 @@ SYSTEM = {
 }
 TRAJECTORY = ("t", "q", "u", "markers", "loads", "energy", "to_csv")
 # Promised by the design for later versions; CHANGELOG.md lists them under "Not yet".
-LATER = ("simulate_batch",)
+LATER: tuple[str, ...] = ()
 
 
 def _parameters(function: object) -> set[str]:

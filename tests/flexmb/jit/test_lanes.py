@@ -8,8 +8,8 @@ from numba.core.errors import TypingError
 
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper, kernel
-from flexmb.jit.wide_arrays import in_lanes, wide_dtype, wide_zeros
 from flexmb.jit.lanes import BYTES, LANE, LANES, every, kept, select, some
+from flexmb.jit.wide_arrays import in_lanes, wide_dtype, wide_zeros
 from flexmb.spatial.scalar import atan2, cos, sin, sincos, sqrt
 
 ULP = 2.0**-52
