@@ -14,7 +14,7 @@ to 2^-44. So a run ends where a pivot falls so fast that it vanishes within `AT_
 
 from math import inf
 
-from flexmb.closure.factor import columns, entry, row_place
+from flexmb.closure.factor import entry
 from flexmb.jit.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
@@ -57,12 +57,13 @@ def at_crossing(t, cc, cw):
 def turned_over(cc, cw):
     """The first chosen row that points another way than when the step started, or -1. Needs the same."""
     for g in range(cc.group.shape[0]):
-        for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
-            total, at = 0.0, row_place(cc, g, place)
-            for j in range(at, at + columns(cc, g)):
+        width = cc.group[g].column_stop - cc.group[g].column_start
+        for a in range(cw.rank[g]):
+            total, at = 0.0, cc.group[g].half + a * width
+            for j in range(at, at + width):
                 total += cw.basis[j] * cw.former[j]
             if not total >= TURNED:
-                return cw.chosen[place]
+                return cw.chosen[cc.group[g].row_start + a]
     return -1
 
 

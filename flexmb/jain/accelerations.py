@@ -7,13 +7,13 @@ is for accelerations that x holds: the workspace w itself, or a response to forc
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, times6_t, vec6
 from flexmb.spatial.vector import cross, mat3, sub, times_t, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
-@helper
+@sweep
 def acceleration_sweep(c, w):
     """Accelerations of all bodies for given udot in w.speed.acceleration (24): inverse dynamics, outward."""
     for k in range(c.body.shape[0]):

@@ -4,7 +4,7 @@ from flexmb.jain.forces import load_at_port
 from flexmb.jain.ports import port_velocity
 from flexmb.jain.wheels import spin_axis
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.body import body_inertia
 from flexmb.motion.coordinates import speed_power
 from flexmb.spatial.inertia import inertia_times, load_inertia
@@ -16,7 +16,7 @@ from flexmb.tables.features import BALL_SPRINGS, LOADS, MODAL_DAMPING, MODES, SP
 KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 
 
-@helper
+@sweep
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 

@@ -8,7 +8,7 @@ from flexmb.hinges import catalogue
 from flexmb.jain import axis
 from flexmb.jain.ports import move_port, port_bias, port_velocity
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.spatial_vector import (
     ZERO6,
@@ -38,7 +38,7 @@ from flexmb.spatial.vector import (
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
-@helper
+@sweep
 def velocity_sweep(c, w, shape, rates):
     """Poses, velocities and bias accelerations of all bodies and ports, base to tip (10), (11).
 
@@ -155,7 +155,7 @@ def _own_column(c, w, k, n):
     return column(w.hinge[k].map, n)
 
 
-@helper
+@sweep
 def pose_sweep(c, w):
     """World poses of all body frames."""
     for k in range(c.body.shape[0]):

@@ -12,7 +12,7 @@ from flexmb.jain.kinematics import pose_sweep, velocity_sweep
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import helper, sweep
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
 from flexmb.tables.features import LOADS, MODES, WHEELS
@@ -31,7 +31,7 @@ def forward_dynamics(c, w):
     return OK
 
 
-@helper
+@sweep
 def bodies(c, w):
     """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
@@ -52,7 +52,7 @@ def bodies(c, w):
     return OK
 
 
-@helper
+@sweep
 def inward(c, w):
     """The inward half of (63), (64); False where a D is not positive definite, w.fault names the body.
 
@@ -68,7 +68,7 @@ def inward(c, w):
     return True
 
 
-@helper
+@sweep
 def outward(c, w):
     """Outward half of (64): udot, modal accelerations, loads across hinges, drive loads, wheel accelerations."""
     for k in range(c.body.shape[0]):

@@ -1,6 +1,7 @@
 """How kernels are compiled, kept and counted: all of the project that knows numba.
 
-kernel.py       `kernel`, `helper`, `by_bundle`, `by_number`: what the mechanics is written with
+kernel.py       `kernel`, `helper`, `sweep`, `by_bundle`, `by_number`: what the mechanics is written with
+features.py     `has`: kernels hold what their bundles contain, and nothing else
 numbered.py     one helper for several, chosen by a number in front
 bundle.py       many arrays as one argument
 tables.py       arrays of bundles inside kernels
@@ -28,7 +29,8 @@ unoptimised (`JITCodeLibrary` and `NativeLowering`, in parts.py); how a dispatch
 version is as bytes, and what it needs to run (`NullCache`, `CompileResult`, `rtsys`, `global_compiler_lock`,
 `normalize_signature`, in cache.py); and the address of a compiled version (`CompileResultWAP`, in hooks.py).
 
-Internal to numba, with nothing in their place, are four names in bundle.py and direct.py: the protocol `_numba_type_`,
-`AttributeTemplate`, `populate_array`, and the structure of an array that `make_array` gives. All numba versions that
-were tried have them.
+Internal to numba, with nothing in their place, are: the protocol `_numba_type_`; the templates that `infer_global` and
+`infer_getattr` take, for tables and lanes; `populate_array` and the structure of an array, in direct.py; and in
+features.py the statements of a function before types are inferred, with `get_definition` and `find_const`. All numba
+versions that were tried have them.
 """

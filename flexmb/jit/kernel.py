@@ -38,6 +38,14 @@ def helper(function: Callable[..., Any]) -> Any:
     return njit(**AS_PART)(function)
 
 
+def sweep(function: Callable[..., Any]) -> Any:
+    """A helper over all bodies: part of the kernels that call it, but called there, not written out at every call.
+
+    Its arguments are few and a call costs nothing beside it; kernels that sweep several times are smaller.
+    """
+    return njit(**(AS_PART | {"forceinline": False}))(function)
+
+
 def written_out(function: Callable[..., Any]) -> Any:
     """A helper that is written out where it is called.
 

@@ -14,6 +14,7 @@ from tests.benchmarks.must_hold.row import Measured, Row
 from tests.benchmarks.must_hold.start import crosscheck, run
 
 PEERS = ("pinocchio", "mujoco", "exudyn")
+EXCEPTIONS: dict[str, str] = {}  # "case, title of the chart": why a peer may be ahead there
 
 
 def rows() -> list[Row]:
@@ -32,9 +33,10 @@ def _charts() -> Measured:
     found = Counter[str]()
     for case, chart in charts:
         found[f"{case}, {chart.title}"] += sum(1 for _ in dominated(chart))
-    worst = "; ".join(f"{name}: {count}" for name, count in found.items() if count)
-    total = float(found.total())
-    return Measured(total, total, total, f"{len(charts)} charts" + (f". {worst}" if worst else ""))
+    behind = [f"{name}: {count}" for name, count in found.items() if count and name not in EXCEPTIONS]
+    excused = [f"{name}: {EXCEPTIONS[name]}" for name in found if found[name] and name in EXCEPTIONS]
+    total = float(sum(count for name, count in found.items() if name not in EXCEPTIONS))
+    return Measured(total, total, total, "; ".join([f"{len(charts)} charts", *behind, *excused]))
 
 
 def _drawn(records: Path) -> Iterator[tuple[str, WorkPrecision]]:

@@ -22,7 +22,13 @@ def rows() -> list[Row]:
     names = {"aba": "pin.aba", "forward": "mj_forward"}
     return [
         *(
-            Row(f"python_{peer}_{n}", PYTHON, f"{names[peer]}, {n} bodies", goal, partial(_from_python, peer, n))
+            Row(
+                f"python_{peer}_{n}",
+                PYTHON,
+                f"{names[peer]}, {n} {'body' if n == 1 else 'bodies'}",
+                goal,
+                partial(_from_python, peer, n),
+            )
             for peer, n, goal in from_outside
         ),
         *(

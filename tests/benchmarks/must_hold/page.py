@@ -24,9 +24,9 @@ python -m tests.benchmarks --from-kept --write   # write this page and the pictu
 
 Rivals take turns in one process, so that a busy machine slows both, and their results are compared before they are
 timed. A figure is the median over the rounds, its spread the quartiles; of seconds of whole processes the least and the
-largest. Times are processor time. Peers run at the best settings that we found, without contacts, constraints,
-sensors or output that the scene has none of. The same rows are pytest benchmarks:
-`python -m pytest tests/benchmarks/test_must_hold.py`.
+largest. Times are processor time; behind a ratio are the native time and the rival's. Peers run at the best settings
+that we found, without contacts, constraints, sensors or output that the scene has none of.
+The same rows are pytest benchmarks: `python -m pytest tests/benchmarks/test_must_hold.py`.
 
 What these figures say is of one machine. What a change does to the work of a kernel is held without a clock by
 `tests/flexmb/jit/test_kernel_budget.py`, and accuracy by the tests of the suite: dense route, peers, identities.

@@ -9,6 +9,7 @@ import pytest
 
 import flexmb
 from flexmb.closure.branch import turned_over
+from flexmb.closure.tables import GROUP
 from flexmb.tables.status import Status
 from tests.flexmb.closure import mechanisms as m
 
@@ -100,8 +101,13 @@ def test_what_has_turned_over(row, turned):
     """The judge by itself: 60 degrees are the limit, and what is not a number is not the same branch."""
 
     def found(basis: np.ndarray) -> int:
-        cw = SimpleNamespace(basis=basis, former=np.eye(2, 3), rank=[2], chosen=[4, 7])
-        return int(turned_over.py_func(cw))
+        groups = np.zeros(2, GROUP).view(np.recarray)
+        groups.row_start, groups.column_stop, groups.half = (0, 2), 3, (0, 6)
+        ahead, former = np.eye(2, 3), np.eye(2, 3)  # the group before it has not turned
+        cw = SimpleNamespace(
+            basis=np.append(ahead, basis), former=np.append(ahead, former), rank=[2, 2], chosen=[1, 3, 4, 7]
+        )
+        return int(turned_over.py_func(SimpleNamespace(group=groups), cw))
 
     basis, angle = np.eye(2, 3), np.radians(59.0 + 2.0 * turned)
     basis[row] = np.cos(angle) * basis[row] + np.sin(angle) * np.array([0.0, 0.0, 1.0])

@@ -92,7 +92,9 @@ def test_what_was_eliminated_further_out_is_remembered():
     for seed in range(6):
         system, at = start("in_all_directions", seed, 0.0)
         doubted += refused(system, at)
-        system.recursion_constants.speed["doubtful"] = 0.0
+        speed = system.recursion_constants.speed
+        speed.flags.writeable = True
+        speed["doubtful"] = 0.0
         forgotten += refused(system, at)
     assert doubted == 6 > forgotten
 

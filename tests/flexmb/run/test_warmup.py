@@ -1,11 +1,14 @@
 """Compiling ahead: what is left to compile afterwards, counted in processes of their own, without a clock."""
 
+import os
 import subprocess
 import sys
 
 import pytest
 
-from flexmb.run.warm_up import main, warm_up
+from flexmb.run import warm_up as warming
+from flexmb.run.warm_up import looped, main, warm_up
+from flexmb.scene.files import save_scene
 
 # Compiled versions of every function of the package, before and after the scenes of the tests are run.
 PROBE = """
@@ -74,3 +77,22 @@ def test_the_command_line_refuses_them_too(capsys):
     with pytest.raises(SystemExit):
         main(["--scene", "ring"])
     assert "invalid choice: 'ring'" in capsys.readouterr().err
+
+
+def test_kinds_are_compiled_for_everything_and_scenes_for_what_they_contain(monkeypatch, tmp_path):
+    """A file is a scene of the user's; the environment is what it was before."""
+    asked = []
+
+    def note(scene, kind, methods, algorithms):
+        asked.append((scene.name, kind, os.environ.get("FLEXMB_KERNELS")))
+
+    monkeypatch.setattr(warming, "_compile", note)
+    monkeypatch.delenv("FLEXMB_KERNELS", raising=False)
+    save_scene(looped(), tmp_path / "scene.toml")
+    main([])
+    main([str(tmp_path / "scene.toml"), "--scene", "condensed"])
+    assert [each[1:] for each in asked] == [("tree", "general"), ("closed", None), ("condensed", "general")]
+    assert "FLEXMB_KERNELS" not in os.environ
+    monkeypatch.setenv("FLEXMB_KERNELS", "mine")
+    warm_up(scenes=["tree"])
+    assert os.environ["FLEXMB_KERNELS"] == "mine"

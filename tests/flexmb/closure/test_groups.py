@@ -1,0 +1,141 @@
+"""Loops that do not feel each other: their groups are solved by themselves as all are at once, at the cost of each."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from flexmb.closure import closures as closure_system
+from flexmb.closure import constants as closure_tables
+from flexmb.closure import dynamics
+from flexmb.jit.counting import count
+from flexmb.scene.build import SceneBuilder, angular
+from flexmb.scene.functions import Sine
+from flexmb.scene.schema import Scene
+from flexmb.system.compile import compile as compiled
+from flexmb.system.tree_system import System
+from tests.bounds import algebra, relative
+from tests.flexmb.closure.mechanisms import FourBar
+
+LINKS = "crank", "coupler", "rocker"
+
+
+def four_bars(loops: int, base: str = "ground", kind: str = "revolute", level: str | None = None) -> Scene:
+    """Four-bars side by side on the ground or on a base that is "welded", "driven" or "free"; each a bit different."""
+    scene = SceneBuilder("four-bars", gravity=(0.0, -9.81, 0.0))
+    root = "ground" if base == "ground" else "base"
+    if base != "ground":
+        scene.rigid_body("base", mass=20.0, inertia=(1.0, 2.0, 2.5))
+    match base:
+        case "welded":
+            scene.weld("mount", "ground", "base")
+        case "driven":
+            turn = angular(prescribed=Sine(amplitude=0.1, angular_frequency_rad_s=3.0))
+            scene.universal("mount", "ground", "base", first=turn, second=turn)
+        case "free":
+            scene.free("mount", "ground", "base", angular_velocity=(0.1, 0.2, 0.3))
+    for i in range(loops):
+        bars = FourBar(0.3 + 0.1 * np.sin(i), 0.8, 0.7 + 0.05 * np.cos(i), 1.0)
+        coupler, rocker = bars.angles(1.0 + 0.2 * i)
+        crank = 1.0 + 0.2 * i
+        for name, length in zip(LINKS, bars[:3], strict=True):
+            inertia = (1e-3, 0.1 * length, 0.1 * length)
+            scene.rigid_body(f"{name}{i}", mass=length, com=(0.5 * length, 0, 0), inertia=inertia)
+        side = {"parent_position": (0.0, 0.0, 0.1 * i)}
+        scene.revolute(f"drive{i}", root, f"crank{i}", angle=crank, rate=1.0 + 0.1 * i, **side)
+        scene.revolute(f"pin{i}", f"crank{i}", f"coupler{i}", parent_position=(bars.crank, 0, 0), angle=coupler - crank)
+        scene.revolute(f"pivot{i}", root, f"rocker{i}", parent_position=(bars.ground, 0, 0.1 * i), angle=rocker)
+        ends = {"position_a": (bars.coupler, 0, 0), "position_b": (bars.rocker, 0, 0)}
+        scene.closure(f"loop{i}", kind, f"coupler{i}", f"rocker{i}", **ends)
+    return scene.scene()
+
+
+def groups(system: System) -> int:
+    return len(system.closures.constants[1].group)
+
+
+@pytest.fixture
+def all_at_once(monkeypatch):
+    """Scenes compiled by it have all their closures in one group."""
+
+    def compile_all(scene: Scene) -> System:
+        with monkeypatch.context() as patch:
+            patch.setattr(closure_tables, "groups", lambda c, paths: [list(range(len(paths)))])
+            return compiled(scene)
+
+    return compile_all
+
+
+@pytest.mark.parametrize("base, expected", [("ground", 5), ("welded", 5), ("driven", 5), ("free", 1)])
+def test_loops_are_coupled_by_what_moves(base, expected):
+    """A free base feels every loop; the ground, and what is welded to it or driven, none."""
+    assert groups(compiled(four_bars(5, base))) == expected
+
+
+def test_a_loop_between_two_couples_them():
+    scene = four_bars(4)
+    bridge = SceneBuilder("bridge").closure("bridge", "spherical", "crank1", "crank3")._lists["closures"]
+    joined = compiled_tables(scene, bridge)
+    assert sorted(len(rows) for rows in joined) == [5, 5, 13]
+
+
+def compiled_tables(scene: Scene, more) -> list[range]:
+    """Rows of each group of a scene with more closures."""
+    values = {key: getattr(scene, key) for key in scene.__struct_fields__}
+    system = compiled(Scene(**values | {"closures": (*scene.closures, *more)}))
+    return [range(group["row_start"], group["row_stop"]) for group in system.closures.constants[1].group]
+
+
+@pytest.mark.parametrize("kind", ["revolute", "spherical", "cylindrical"])
+@pytest.mark.parametrize("base", ["ground", "driven"])
+def test_by_groups_as_all_at_once(all_at_once, base, kind):
+    """Ranks, initial states, accelerations and all loads: J M^-1 J' has zeros between groups, whoever uses them."""
+    scene = four_bars(3, base, kind)
+    apart, together = compiled(scene), all_at_once(scene)
+    assert (groups(apart), groups(together)) == (3, 1)
+    start, same = apart.initial_state, together.initial_state
+    assert (apart.closures.rank, apart.closures.mobility) == (together.closures.rank, together.closures.mobility)
+    bound = 1e3 * algebra(len(start.u), 3)  # R'R f = b is solved to the square of R's condition, about 30 here
+    assert relative(start.q, same.q) <= 2.0**-40  # the closures are closed to 2^-44 of the mechanism's size
+    for algorithm in ("articulated", "composite"):
+        one = apart.evaluate(0.0, start.q, start.u, algorithm)
+        other = together.evaluate(0.0, start.q, start.u, algorithm)
+        assert relative(one.accelerations, other.accelerations) <= bound
+        largest = max(np.max(np.abs(load)) for load in one.loads.values())
+        assert one.loads.keys() == other.loads.keys()
+        assert all(np.max(np.abs(one.loads[k] - other.loads[k])) <= bound * largest for k in one.loads)
+
+
+def test_null_loads_belong_to_their_group(all_at_once):
+    """Three planar loops of revolute hinges: three rows in each suppress nothing that is free."""
+    scene = four_bars(3)
+    apart, together = compiled(scene), all_at_once(scene)
+    null = []
+    for system in (apart, together):
+        state = system.initial_state
+        system.evaluate(0.0, state.q, state.u)
+        null.append(system.closures.null_loads())
+    assert null[0].shape == null[1].shape == (15, 9)
+    np.testing.assert_allclose(null[0] @ null[0].T, null[1] @ null[1].T, atol=1e-12)  # the same space
+
+
+def operations(system: System) -> int:
+    """Of choosing, factorising and solving the rows, unit loads included."""
+    state = system.initial_state
+    chain = system.closures.chain("articulated")
+    y = np.concatenate([state.q, state.u, [0.0]])
+    linearised = count(dynamics.linearise, 0.0, y, chain)
+    chain = linearised.arguments[2]
+    return linearised.operations.total + count(dynamics.closure_loads, chain.w, chain.cc, chain.cw).operations.total
+
+
+def test_twice_the_loops_cost_twice_as_much(all_at_once):
+    """To the operation, whereas all at once they cost more than three times as much."""
+    two, four = (four_bars(n, kind="spherical") for n in (2, 4))
+    assert operations(compiled(four)) == pytest.approx(2 * operations(compiled(two)), rel=0.02)
+    rows = [system.closures.constants[1] for system in (compiled(two), compiled(four))]
+    assert [len(each.column) for each in rows] == [6, 12]
+    assert [closure_system.workspace(each, compiled(scene).constants).half.size for each, scene in zip(
+        rows, (two, four), strict=True)] == [18, 36]  # fmt: skip
+    by_dense = [operations(all_at_once(scene)) for scene in (two, four)]
+    assert by_dense[1] > 2.2 * by_dense[0]
