@@ -7,32 +7,13 @@ import numpy as np
 from flexmb.entry import articulated
 from flexmb.integrate.lane_problem import lane_entries, lane_stages
 from flexmb.jit.direct import at_address, status_at
-from flexmb.jit.kernel import by_bundle, helper, kernel
+from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.motion import coordinates
 from flexmb.spatial.vector import mat3, store3, store9, vec3
-from flexmb.tables.lane_tables import LaneConstants
 from flexmb.tables.status import NONFINITE, OK
 
 DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may be rounding
-
-
-@helper
-def _shared_places(c, w):
-    """Constants that all copies share: the workspace was made with them."""
-
-
-@helper
-def _own_places(c, w):
-    """What a workspace holds of the constants, of copies with constants of their own."""
-    w.displaced[0] = 1  # bodies at rest are put there again
-    store3(w.ground, 0, vec3(c.ground, 0))
-    for i in range(c.rest.shape[0]):
-        store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
-        store9(w.port[i].R, 0, mat3(c.rest[i].R, 0))
-
-
-take_places = by_bundle(LaneConstants, _own_places, _shared_places)
 
 
 @kernel
@@ -98,5 +79,9 @@ def project(s, c):
 
 @kernel
 def begin(c, w):
-    """Make a workspace ready for runs with these constants."""
-    take_places(c, w)
+    """What a workspace holds of the constants, of copies with constants of their own: before they are evaluated."""
+    w.displaced[0] = 1  # bodies at rest are put there again
+    store3(w.ground, 0, vec3(c.ground, 0))
+    for i in range(c.rest.shape[0]):
+        store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
+        store9(w.port[i].R, 0, mat3(c.rest[i].R, 0))

@@ -103,7 +103,9 @@ class Batch:
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
         """Of the copies LANES * block and on; makes a workspace ready for them."""
-        c = self._constants[0 if self.shares_constants else block]
+        if self.shares_constants:
+            return self._constants[0]
+        c = self._constants[block]
         lanes.begin(c, w)
         return c
 
@@ -133,12 +135,13 @@ class Batch:
         """
         q, u = self.states(q, u)
         n = len(q)
-        times = np.broadcast_to(arguments.array("t", t), (n,)).copy()
+        times = np.full(n, t) if isinstance(t, float) else np.broadcast_to(arguments.array("t", t), (n,)).copy()
         copies = Copies(q, u, times, np.empty((n, self.nu)), np.full(n, NONFINITE))
         if self.in_lanes:
             self._in_lanes(copies, number_of_threads(threads, n // _WORTH_A_THREAD))
-        for copy in np.flatnonzero(copies.status != OK):
-            self._alone(copies, int(copy))
+        if copies.status.any():
+            for copy in np.flatnonzero(copies.status != OK):
+                self._alone(copies, int(copy))
         return BatchAccelerations(copies.accelerations, copies.status)
 
     def _in_lanes(self, copies: Copies, threads: int) -> None:
