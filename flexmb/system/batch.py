@@ -21,7 +21,7 @@ from flexmb.entry import lanes
 from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.lanes import LANES
-from flexmb.jit.pointer import STATUS
+from flexmb.jit.pointer import NOTHING, STATUS
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
@@ -150,15 +150,15 @@ class Batch:
         def work(ranges: Iterable[tuple[int, int]]) -> None:
             with self.tables() as (w, s, entries):
                 s.stage[0] = 0
+                c = self.constants(0, w)
+                begin, *_ = (0,) if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)
+                rhs, *_ = addresses(lanes.rhs, STATUS, s, c, w)
                 for span in ranges:
-                    c = self.constants(span[0] // LANES, w)
-                    where = *addresses(lanes.rhs, STATUS, s, c, w), address(entries)
-                    lanes.accelerations(where, span, *copies)
+                    lanes.accelerations((rhs, begin, address(s), address(w), address(entries)), blocks, span, *copies)
 
-        step = n if self.shares_constants else LANES
-        if self.shares_constants and threads > 1:
-            step = LANES * -(-n // (threads * LANES))
-        ranges = [(start, min(start + step, n)) for start in range(0, n, max(step, 1))]
+        blocks = np.array([address(c) for c in self._constants])
+        step = max(LANES, LANES * -(-n // (threads * LANES)))
+        ranges = [(start, min(start + step, n)) for start in range(0, n, step)]
         in_threads(work, ranges, threads)
 
     def _alone(self, copies: Copies, copy: int) -> None:
