@@ -6,33 +6,14 @@ import numpy as np
 
 from flexmb.entry import articulated
 from flexmb.integrate.lane_problem import lane_entries, lane_stages
-from flexmb.jit.direct import at_address, status_at
-from flexmb.jit.kernel import by_bundle, helper, kernel
+from flexmb.jit.direct import at_address, nothing_at, status_at
+from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
 from flexmb.motion import coordinates
 from flexmb.spatial.vector import mat3, store3, store9, vec3
-from flexmb.tables.lane_tables import LaneConstants
 from flexmb.tables.status import NONFINITE, OK
 
 DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may be rounding
-
-
-@helper
-def _shared_places(c, w):
-    """Constants that all copies share: the workspace was made with them."""
-
-
-@helper
-def _own_places(c, w):
-    """What a workspace holds of the constants, of copies with constants of their own."""
-    w.displaced[0] = 1  # bodies at rest are put there again
-    store3(w.ground, 0, vec3(c.ground, 0))
-    for i in range(c.rest.shape[0]):
-        store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
-        store9(w.port[i].R, 0, mat3(c.rest[i].R, 0))
-
-
-take_places = by_bundle(LaneConstants, _own_places, _shared_places)
 
 
 @kernel
@@ -45,14 +26,16 @@ entries_at = at_address(lane_entries(lane_stages(1), np.zeros(1, np.int64)))
 
 
 @kernel
-def accelerations(where, span, q, u, t, found, status):
+def accelerations(where, blocks, span, q, u, t, found, status):
     """udot (n,nu) of copies span[0] to span[1] - 1 at q (n,nq), u (n,nu), t (n,), and a status (n,) for each.
 
-    `where`: addresses of `rhs`, of what it takes, and of the entries of its stages. LANES copies at a time; where fewer
-    are left, the last one is in the empty lanes too. By the right-hand side of runs: there is one kernel for both.
+    `where`: addresses of `rhs` and `begin`, of stages, workspace and entries; `blocks`: of the constants of each LANES
+    copies, or of those that all share. Where fewer copies are left, the last one is in the empty lanes too. By the
+    right-hand side of runs: there is one kernel for both.
     """
-    function, s, c, w, e = where
+    function, beginning, s, w, e = where
     start, stop = span
+    c = blocks[0]
     entries = entries_at(e)
     nq, nu = q.shape[1], u.shape[1]
     for first in range(start, stop, LANES):
@@ -60,6 +43,9 @@ def accelerations(where, span, q, u, t, found, status):
         _gather(first, stop, u, entries.trial[nq:])
         for lane in range(LANES):
             entries.time[0, lane] = t[min(first + lane, stop - 1)]
+        if blocks.shape[0] > 1:
+            c = blocks[first // LANES]
+            nothing_at(beginning, (c, w))
         whole = status_at(function, (s, c, w))
         slope, trouble = entries.k[0, nq : nq + nu], entries.norm[0]
         for lane in range(LANES):
@@ -98,5 +84,9 @@ def project(s, c):
 
 @kernel
 def begin(c, w):
-    """Make a workspace ready for runs with these constants."""
-    take_places(c, w)
+    """What a workspace holds of the constants, of copies with constants of their own: before they are evaluated."""
+    w.displaced[0] = 1  # bodies at rest are put there again
+    store3(w.ground, 0, vec3(c.ground, 0))
+    for i in range(c.rest.shape[0]):
+        store3(w.port[i].r, 0, vec3(c.rest[i].r, 0))
+        store9(w.port[i].R, 0, mat3(c.rest[i].R, 0))

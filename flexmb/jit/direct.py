@@ -58,7 +58,12 @@ def addresses(compiled: Any, returned: Any, *arguments: Any) -> tuple[int, ...]:
     """Of a kernel, compiled for these arguments, and of the bundles among them, which the caller holds."""
     bundles = [argument for argument in arguments if not isinstance(argument, types.Type)]
     function = pointer(compiled, returned, *arguments).__wrapper_address__()
-    return function, *(bundle._address for bundle in bundles)
+    return function, *map(address, bundles)
+
+
+def address(bundle: Any) -> int:
+    """Of a bundle, which the caller holds."""
+    return int(bundle._address)
 
 
 def settled(compiled: Any, *kinds: Any) -> Any:

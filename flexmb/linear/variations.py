@@ -110,7 +110,7 @@ class Equations:
         self._check(jacobian(state.t, y, J, self.constants, self._w), self._w.fault[0])
         if self._w.doubt[0]:
             self.system.digits_left(state)  # raises if pivots are only rounding
-        rates = self._w.slope.real[nq + self.free]
+        rates = self._w.slope[nq + self.free, 0]  # the numbers themselves, before their derivatives
         self._check(time_derivative(state.t, y, drift, self.constants, self._w), self._w.fault[0])
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
         return Variations(

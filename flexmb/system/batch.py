@@ -19,9 +19,9 @@ import numpy as np
 
 from flexmb.entry import lanes
 from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
-from flexmb.jit.direct import addresses
+from flexmb.jit.direct import address, addresses
 from flexmb.jit.lanes import LANES
-from flexmb.jit.pointer import STATUS
+from flexmb.jit.pointer import NOTHING, STATUS
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
@@ -103,7 +103,9 @@ class Batch:
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
         """Of the copies LANES * block and on; makes a workspace ready for them."""
-        c = self._constants[0 if self.shares_constants else block]
+        if self.shares_constants:
+            return self._constants[0]
+        c = self._constants[block]
         lanes.begin(c, w)
         return c
 
@@ -133,12 +135,13 @@ class Batch:
         """
         q, u = self.states(q, u)
         n = len(q)
-        times = np.broadcast_to(arguments.array("t", t), (n,)).copy()
+        times = np.full(n, t) if isinstance(t, float) else np.broadcast_to(arguments.array("t", t), (n,)).copy()
         copies = Copies(q, u, times, np.empty((n, self.nu)), np.full(n, NONFINITE))
         if self.in_lanes:
             self._in_lanes(copies, number_of_threads(threads, n // _WORTH_A_THREAD))
-        for copy in np.flatnonzero(copies.status != OK):
-            self._alone(copies, int(copy))
+        if copies.status.any():
+            for copy in np.flatnonzero(copies.status != OK):
+                self._alone(copies, int(copy))
         return BatchAccelerations(copies.accelerations, copies.status)
 
     def _in_lanes(self, copies: Copies, threads: int) -> None:
@@ -147,15 +150,15 @@ class Batch:
         def work(ranges: Iterable[tuple[int, int]]) -> None:
             with self.tables() as (w, s, entries):
                 s.stage[0] = 0
+                c = self.constants(0, w)
+                begin, *_ = (0,) if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)
+                rhs, *_ = addresses(lanes.rhs, STATUS, s, c, w)
                 for span in ranges:
-                    c = self.constants(span[0] // LANES, w)
-                    where = *addresses(lanes.rhs, STATUS, s, c, w), entries._address
-                    lanes.accelerations(where, span, *copies)
+                    lanes.accelerations((rhs, begin, address(s), address(w), address(entries)), blocks, span, *copies)
 
-        step = n if self.shares_constants else LANES
-        if self.shares_constants and threads > 1:
-            step = LANES * -(-n // (threads * LANES))
-        ranges = [(start, min(start + step, n)) for start in range(0, n, max(step, 1))]
+        blocks = np.array([address(c) for c in self._constants])
+        step = max(LANES, LANES * -(-n // (threads * LANES)))
+        ranges = [(start, min(start + step, n)) for start in range(0, n, step)]
         in_threads(work, ranges, threads)
 
     def _alone(self, copies: Copies, copy: int) -> None:

@@ -15,18 +15,18 @@ SCENES = {"rigid": lambda: rigid_chain(20), "flexible": lambda: flexible_chain(1
 
 @pytest.mark.parametrize("kind", SCENES)
 def test_jacobian(benchmark, kind):
-    """Per column: one complex evaluation against two real ones."""
+    """All columns, eight in an evaluation of duals, against two evaluations of floats for each."""
     system = flexmb.compile(SCENES[kind]())
     state, c, w = system.initial_state, system.constants, system.workspace()
     y = np.concatenate([state.q, state.u, [0.0]])
-    n, complex_w = len(y), tangent_workspace(system.constants, system.nq, system.nu)
+    n, dual_w = len(y), tangent_workspace(system.constants, system.nq, system.nu)
     J, plus, minus = np.empty((n, n)), np.empty(n), np.empty(n)
 
     def exact() -> None:
-        jacobian(0.0, y, J, c, complex_w)
+        jacobian(0.0, y, J, c, dual_w)
 
     def differences() -> None:
-        for j in complex_w.column:
+        for j in dual_w.column:
             moved = y[j]
             y[j] = moved + 1e-6
             articulated.rhs(0.0, y, plus, c, w)

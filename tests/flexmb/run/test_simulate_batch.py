@@ -145,7 +145,8 @@ def test_threads_change_nothing(system):
 def test_one_of_two_states_may_be_that_of_the_scene(system):
     q, _ = starts(system, 3)
     found = simulate_batch(system, T_END, "rk4", q=q, step=STEP, samples=2)
-    whole = simulate_batch(system, T_END, "rk4", q=q, u=np.repeat(system.initial_state.u[None], 3, 0), step=STEP, samples=2)
+    u = np.repeat(system.initial_state.u[None], 3, axis=0)
+    whole = simulate_batch(system, T_END, "rk4", q=q, u=u, step=STEP, samples=2)
     np.testing.assert_array_equal(found.q, whole.q)
 
 
@@ -160,7 +161,8 @@ def test_closed_chains_run_one_by_one():
     scene.closure("loop", "revolute", "rocker1", "coupler", axis=y, **ends)
     system = fm.compile(scene.scene())
     start = system.initial_state
-    found = simulate_batch(system, 0.2, "rk4", q=np.array([start.q] * 2), u=np.array([start.u] * 2), step=STEP, samples=5)
+    states = {"q": np.array([start.q] * 2), "u": np.array([start.u] * 2)}
+    found = simulate_batch(system, 0.2, "rk4", **states, step=STEP, samples=5)
     run = fm.simulate(system, 0.2, "rk4", step=STEP, samples=5)
     np.testing.assert_array_equal(found.q[1], run.q)
 
