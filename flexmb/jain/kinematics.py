@@ -47,16 +47,22 @@ def velocity_sweep(c, w, shape, rates):
     """
     displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
-        if has(c, MODES):
-            exact = not is_at_rest(c.body[k].level)
-            if exact or displaced:
-                for n in range(c.body[k].modes):
-                    w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-                    w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
-                for i in range(c.body[k].port_start, c.body[k].port_stop):
-                    move_port(c, w, k, i)
-        _cross_hinge(c, w, k)
+        move_body(c, w, k, shape, rates, displaced)
     w.displaced[0] = 1 if shape or rates else 0
+
+
+@helper
+def move_body(c, w, k, shape, rates, displaced):
+    """What `velocity_sweep` does for body k, once its parent has moved; `displaced`: a ruthless body may need it too."""
+    if has(c, MODES):
+        exact = not is_at_rest(c.body[k].level)
+        if exact or displaced:
+            for n in range(c.body[k].modes):
+                w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+                w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+            for i in range(c.body[k].port_start, c.body[k].port_stop):
+                move_port(c, w, k, i)
+    _cross_hinge(c, w, k)
 
 
 @helper
@@ -159,19 +165,25 @@ def _own_column(c, w, k, n):
 def pose_sweep(c, w):
     """World poses of all body frames."""
     for k in range(c.body.shape[0]):
-        p = c.body[k].parent
-        i = c.body[k].inboard_port
-        arm = vec3(w.body[k].arm, 0)
-        R = mat3(w.body[k].rotation, 0)
-        if p >= 0:
-            R_parent = mat3(w.body[p].pose_rotation, 0)
-            if has(c, INBOARD_NODES) and i >= 0:
-                arm = add(arm, vec3(w.port[i].r, 0))
-            position = add(vec3(w.body[p].pose_position, 0), times(R_parent, arm))
-            R = matmul(R_parent, R)
-        else:
-            position = arm
-        if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
-            position = sub(position, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
-        store9(w.body[k].pose_rotation, 0, R)
-        store3(w.body[k].pose_position, 0, position)
+        pose_body(c, w, k)
+
+
+@helper
+def pose_body(c, w, k):
+    """World pose of body k, from its parent's."""
+    p = c.body[k].parent
+    i = c.body[k].inboard_port
+    arm = vec3(w.body[k].arm, 0)
+    R = mat3(w.body[k].rotation, 0)
+    if p >= 0:
+        R_parent = mat3(w.body[p].pose_rotation, 0)
+        if has(c, INBOARD_NODES) and i >= 0:
+            arm = add(arm, vec3(w.port[i].r, 0))
+        position = add(vec3(w.body[p].pose_position, 0), times(R_parent, arm))
+        R = matmul(R_parent, R)
+    else:
+        position = arm
+    if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
+        position = sub(position, times(R, vec3(w.port[c.body[k].outboard_port].r, 0)))
+    store9(w.body[k].pose_rotation, 0, R)
+    store3(w.body[k].pose_position, 0, position)

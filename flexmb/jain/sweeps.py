@@ -8,7 +8,7 @@ enters as acceleration -g of the ground.
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
 from flexmb.jain.forces import elastic_forces, node_loads
-from flexmb.jain.kinematics import pose_sweep, velocity_sweep
+from flexmb.jain.kinematics import move_body, pose_body
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.features import has
@@ -35,10 +35,9 @@ def forward_dynamics(c, w):
 def bodies(c, w):
     """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
-    velocity_sweep(c, w, False, False)
-    if has(c, LOADS):
-        pose_sweep(c, w)
-    for k in range(c.body.shape[0]):
+    displaced = w.displaced[0] != 0
+    for k in range(c.body.shape[0]):  # all of a body at once, while its rows are at hand
+        move_body(c, w, k, False, False, displaced)
         if has(c, MODES) and is_out_of_range(c, w, k):
             w.fault[0] = k
             return OUT_OF_RANGE
@@ -46,9 +45,11 @@ def bodies(c, w):
         if has(c, MODES):
             elastic_forces(c, w, k)
         if has(c, LOADS):
+            pose_body(c, w, k)
             node_loads(c, w, k)
         if has(c, WHEELS):
             wheel_forces(c, w, k)
+    w.displaced[0] = 0
     return OK
 
 
