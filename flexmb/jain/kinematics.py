@@ -53,7 +53,7 @@ def velocity_sweep(c, w, shape, rates):
 
 @helper
 def move_body(c, w, k, shape, rates, displaced):
-    """What `velocity_sweep` does for body k, once its parent has moved; `displaced`: a ruthless body may need it too."""
+    """What `velocity_sweep` does for body k after its parent; `displaced`: a ruthless body may need it too."""
     if has(c, MODES):
         exact = not is_at_rest(c.body[k].level)
         if exact or displaced:

@@ -18,7 +18,7 @@ from flexmb.typing import Real
 
 PATIENCE = 0.05  # s that compiled code may take before Python looks at the keyboard
 
-Batch = Callable[[Real, Real, Real], int]
+Sampler = Callable[[Real, Real, Real], int]
 
 
 class Rows(NamedTuple):
@@ -28,7 +28,7 @@ class Rows(NamedTuple):
     trouble: DynamicsError | KeyboardInterrupt | None
 
 
-def batch(system: System, kernel: Any, constants: Any, workspace: Any) -> Batch:
+def batch(system: System, kernel: Any, constants: Any, workspace: Any) -> Sampler:
     """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns how many, up to the first that
     is for Python to look into. It has outputs of its own."""
     out = system._observation.outputs()
@@ -38,7 +38,7 @@ def batch(system: System, kernel: Any, constants: Any, workspace: Any) -> Batch:
     return lambda times, states, rows: call(workspace.doubt, times, states, rows)
 
 
-def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Batch | None) -> Rows:
+def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:
     """Rows at all states (T,n) that are reached at these times, or up to where it fails or Ctrl-C is pressed.
 
     `sampled` does many at once; what it leaves is evaluated as a single state is, with its errors and warnings.
