@@ -15,7 +15,7 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIO
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
-from flexmb.run.observing import Batch, observe
+from flexmb.run.observing import Sampler, observe
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_end
@@ -135,7 +135,7 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Batch | None) -> Trajectory:
+def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
     start = perf_counter()
     rows, trouble = observe(system, algorithm, times, raw.states, batch)
