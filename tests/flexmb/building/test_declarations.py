@@ -23,6 +23,7 @@ from flexmb.scene.hinges import Z_AXIS, _Hinge
 from flexmb.spatial.rotation import rotation_z
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z
+from flexmb.tables.features import HINGE
 from tests import trees
 from tests.bounds import backward_error, gamma
 
@@ -115,8 +116,7 @@ def with_screw(monkeypatch):
     for room in (catalogue, assemble, carried):
         monkeypatch.setattr(room, "KINDS", kinds)
     for name in ("pose", "motion", "rate", "retract"):
-        monkeypatch.setattr(catalogue, name, numbered(name, [getattr(kind, name) for kind in kinds]))
-    monkeypatch.setattr(catalogue, "_QUATERNION", np.array([kind.quaternion for kind in kinds]))
+        monkeypatch.setattr(catalogue, name, numbered(name, HINGE, [getattr(kind, name) for kind in kinds]))
     monkeypatch.setattr(body_frames, "hinge_frame", screw_frame)
 
 

@@ -17,6 +17,7 @@ from flexmb.frisch.nested_system import NestedMotion, NestedSystem
 from tests import trees
 from tests.bounds import algebra, backward_error
 from tests.flexmb.frisch.scenes import SMALL, deformed, packed, random_scene
+from tests.unlocked import unlocked
 
 RECIPES = {
     "rigid": trees.RIGID,
@@ -117,7 +118,7 @@ def test_it_is_not_blind():
     scene = random_scene(0, SMALL)
     other = flexmb.compile(scene)
     heavier = np.array([1.01, *np.ones(len(other.body_names) - 1)])
-    other.constants.body["rigid"] *= heavier[:, None]
+    unlocked(other.constants).body["rigid"] *= heavier[:, None]
     other.constants.mode["mfr"] *= heavier[:, None, None]
     state = other.initial_state
     nested = flexmb.compile(scene).nested()

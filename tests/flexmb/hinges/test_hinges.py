@@ -10,6 +10,8 @@ from flexmb.hinges.free import HINGE as FREE
 from flexmb.hinges.gimbal2 import HINGE as GIMBAL2
 from flexmb.hinges.gimbal3 import HINGE as GIMBAL3
 from flexmb.hinges.kind import HingeKind
+from flexmb.jit.bundle import bundle
+from flexmb.jit.features import GENERAL
 from flexmb.jit.kernel import kernel
 from flexmb.scene.build import SceneBuilder, angular
 from flexmb.tables.state import DynamicsError
@@ -22,19 +24,32 @@ SEQUENCES = {GIMBAL2: ["xy", "zy", "yx"], GIMBAL3: ["xyz", "zxz", "yzx", "xyx"]}
 CASES = [(kind, sequence) for kind in KINDS for sequence in SEQUENCES.get(kind, ["xyz"])]
 
 
-@kernel
-def pose(kind, q, i, sequence):
-    return catalogue.pose(kind, q, i, sequence)
+@bundle
+class Anything:
+    """A scene with hinges of all kinds."""
+
+    nothing: np.ndarray  # (0,)
+
+    def features(self) -> frozenset[str]:
+        return frozenset({GENERAL})
+
+
+SCENE = Anything(np.zeros(0))
 
 
 @kernel
-def motion(kind, q, i, u, j, sequence, H):
-    return catalogue.motion(kind, q, i, u, j, sequence, H)
+def pose(c, kind, q, i, sequence):
+    return catalogue.pose(c, kind, q, i, sequence)
 
 
 @kernel
-def rate(kind, q, i, u, j, sequence, dq):
-    catalogue.rate(kind, q, i, u, j, sequence, dq)
+def motion(c, kind, q, i, u, j, sequence, H):
+    return catalogue.motion(c, kind, q, i, u, j, sequence, H)
+
+
+@kernel
+def rate(c, kind, q, i, u, j, sequence, dq):
+    catalogue.rate(c, kind, q, i, u, j, sequence, dq)
 
 
 class Hinge:
@@ -55,18 +70,18 @@ class Hinge:
         return q
 
     def pose(self, q: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        R, p = pose(self.kind, np.append(np.zeros(I), q), I, self.sequence)
+        R, p = pose(SCENE, self.kind, np.append(np.zeros(I), q), I, self.sequence)
         return np.reshape(R, (3, 3)), np.array(p)
 
     def motion(self, q: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, ...]:
         """H (6,6) as left by the kernel, velocity (6,), bias (6,)."""
         H = np.zeros((6, 6))
-        V, A = motion(self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, H)
+        V, A = motion(SCENE, self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, H)
         return H, np.concatenate(V), np.concatenate(A)
 
     def rate(self, q: np.ndarray, u: np.ndarray) -> np.ndarray:
         dq = np.full(I + self.nq, 9.0)
-        rate(self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, dq)
+        rate(SCENE, self.kind, np.append(np.zeros(I), q), I, np.append(np.zeros(J), u), J, self.sequence, dq)
         assert np.all(dq[:I] == 9.0), "writes outside its own coordinates"
         return dq[I:]
 

@@ -21,6 +21,7 @@ from flexmb.system.tree_system import System
 from tests import trees
 from tests.bounds import algebra, observed_order
 from tests.flexmb import spectral
+from tests.unlocked import unlocked
 
 SMALL = replace(trees.FULL, bodies=5)
 RECIPES = {
@@ -154,13 +155,13 @@ def test_a_scene_without_losses_has_no_power():
 
 
 def _unsymmetric_inertia(system: System) -> None:
-    c = system.constants
+    c = unlocked(system.constants)
     n = c.body["modes"][0]
     c.product[0, 18 * n : 27 * n] *= 30.0  # P1_n1
 
 
 def _unsymmetric_stiffness(system: System) -> None:
-    system.constants.pair["stiffness"][:, 0, 1] *= 30.0
+    unlocked(system.constants).pair["stiffness"][:, 0, 1] *= 30.0
 
 
 @pytest.mark.parametrize("tamper", [_unsymmetric_inertia, _unsymmetric_stiffness])

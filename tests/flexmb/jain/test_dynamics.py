@@ -17,6 +17,7 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError
 from tests import trees
 from tests.bounds import algebra, backward_error, gamma
+from tests.unlocked import unlocked
 
 RECIPES = {
     "rigid": trees.RIGID, "full": trees.FULL, "mixed": trees.MIXED, "free-flying": trees.FREE_FLYING,
@@ -88,7 +89,7 @@ def test_applied_forces_move_only_what_they_act_on(system):
     state, free = system.initial_state, free_speeds(system)
     before = system.accelerations(state)
     j = int(np.flatnonzero(free & (system.constants.speed["coordinate"] >= 0))[0])
-    system.constants.speed["damping"][j] += 3.0
+    unlocked(system.constants).speed["damping"][j] += 3.0
     try:
         after = system.accelerations(state)
     finally:
@@ -176,7 +177,7 @@ TAMPERS: list[tuple[trees.Recipe, Callable]] = [
 def test_a_wrong_constant_is_noticed(recipe, tamper):
     system = flexmb.compile(trees.random_scene(12, trees.replace(recipe, bodies=6)))
     assert agrees_with_the_dense_route(system)
-    tamper(system.constants)
+    tamper(unlocked(system.constants))
     assert not agrees_with_the_dense_route(system)
 
 
@@ -192,7 +193,7 @@ def massless_tip() -> System:
         .scene()
     )
     system = flexmb.compile(scene)
-    system.constants.body["rigid"][1] = 0.0
+    unlocked(system.constants).body["rigid"][1] = 0.0
     return system
 
 
