@@ -52,8 +52,15 @@ def carried_acceleration(c, w, x, k):
 @helper
 def store_body_acceleration(c, w, k, A):
     """Keep the acceleration of O (without deformation part) and go on to the body origin."""
-    store6(w.body[k].accel_hinge, 0, A)
+    if has(c, OUTBOARD_NODES):
+        store6(w.body[k].accel_hinge, 0, A)
     store_origin_acceleration(c, w, w, k, A)
+
+
+@helper
+def hinge_acceleration(c, w, k):
+    """What was kept of O, whose acceleration is that of the body where no body has its hinge on a deforming node."""
+    return vec6(w.body[k].accel_hinge if has(c, OUTBOARD_NODES) else w.body[k].accel, 0)
 
 
 @helper

@@ -3,6 +3,7 @@
 A load is the total one (constraint, spring and motor) on the outboard part, about the outboard hinge point O.
 """
 
+from flexmb.jain.accelerations import hinge_acceleration
 from flexmb.jain.explicit import about_hinge
 from flexmb.jain.kinematics import motion_column
 from flexmb.jain.ports import port_acceleration, port_velocity
@@ -26,7 +27,7 @@ def hinge_loads(c, w):
 def hinge_load(c, w, k):
     """F = P_R A + z_R at O of body k, body axes, into w.body[k].load."""
     P_R, z_R = about_hinge(c, w, k)
-    A = vec6(w.body[k].accel_hinge, 0)
+    A = hinge_acceleration(c, w, k)
     store6(w.body[k].load, 0, sum6(inertia_times(load_inertia(P_R, 0), A), vec6(z_R, 0)))
 
 

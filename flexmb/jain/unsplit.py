@@ -14,7 +14,7 @@ from flexmb.jain.wheels import wheel_acceleration
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
-from flexmb.spatial.spatial_vector import axpy6, dot6, less6, plus6, store6, sum6, vec6
+from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, plus6, store6, sub6, sum6, vec6
 from flexmb.tables.arrays import NO_AXIS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Real
@@ -31,9 +31,10 @@ class Joint:
 
 @helper
 def forward_dynamics(c, w, x):
-    """Accelerations into w.speed.acceleration; P^+ and z^+ stand where P_R and z_R do else, alpha^+ in accel_hinge.
+    """Accelerations into w.speed.acceleration; P^+ and z^+ stand where P_R and z_R do else.
 
-    Loads across hinges are f = P^+ alpha^+ + z^+, so that `jain.loads` finds them here too. Returns a status code.
+    Loads across hinges are f = P^+ alpha^+ + z^+; z^+ is changed into f - P^+ alpha, so that `jain.loads` finds them here
+    too. Returns a status code.
     """
     status = bodies(c, w)
     if status != OK:
@@ -127,6 +128,7 @@ def _accelerate(c, w, x, k):
         w.speed[c.body[k].u_index + j].acceleration = rates[n]
         A = axpy6(rates[n], motion_column(c, w, k, j), A)
     store_body_acceleration(c, w, k, A)
-    store6(w.body[k].accel_hinge, 0, A_plus)
+    P_plus, z_plus = about_hinge(c, w, k)
+    add6(z_plus, 0, inertia_times(load_inertia(P_plus, 0), sub6(A_plus, A)))
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         wheel_acceleration(c, w, k, i)

@@ -121,6 +121,8 @@ def store_slope(c, w, power, dy):
 @helper
 def hinge_forces(c, w):
     """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
+    if not (has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)):
+        return  # they are zero from the start
     for j in range(w.u.shape[0]):
         force = 0.0
         if has(c, DAMPERS):

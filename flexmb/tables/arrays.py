@@ -193,7 +193,7 @@ BODY_STATE = _record(  # what every evaluation writes comes first, so that it li
     ("rate_at_rest", _F),  # D_R^-1 epsilon_R
     ("free_count", _I),
     ("accel", _F, (6,)),  # of the body frame, minus gravity, body axes
-    ("accel_hinge", _F, (6,)),  # of O without the deformation part, minus gravity, body axes
+    ("accel_hinge", _F, (6,)),  # of O without the deformation part, likewise; not written where O is the origin of all
     ("hinge_inertia", _F, (21,)),  # P_R about O
     ("hinge_force", _F, (6,)),  # z_R about O (without P_R a)
     ("pose_rotation", _F, (9,)),  # R_World_body
