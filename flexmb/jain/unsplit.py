@@ -33,7 +33,7 @@ class Joint:
 def forward_dynamics(c, w, x):
     """Accelerations into w.speed.acceleration; P^+ and z^+ stand where P_R and z_R do else.
 
-    Loads across hinges are f = P^+ alpha^+ + z^+; z^+ is changed into f - P^+ alpha, so that `jain.loads` finds them here
+    Loads across hinges are f = P^+ alpha^+ + z^+; z^+ becomes f - P^+ alpha, so that `jain.loads` finds them here
     too. Returns a status code.
     """
     status = bodies(c, w)

@@ -85,7 +85,7 @@ def by_number(one: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..
     """
 
     def choose(*args: Any) -> Any:
-        return (lanes if LANE in args else one)(*args)
+        return (lanes if any(each is LANE for each in args) else one)(*args)
 
     @overload(choose, jit_options=AS_PART)
     def _typed(*args):
