@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.system.batch import Batch
+from flexmb.tables import arguments
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 
@@ -43,7 +44,8 @@ class BatchTrajectory:
         return np.flatnonzero(self.status != OK)
 
     def message(self, copy: int) -> str:
-        """How a run ended, in words."""
+        """How a run ended, in words; ValueError or TypeError for the number of a copy that there is not."""
+        copy = arguments.index("copy", copy, len(self.status))
         status, t = Status(int(self.status[copy])), self.stopped_at[copy]
         if status is Status.OK:
             return f"finished at t = {t:g} s"

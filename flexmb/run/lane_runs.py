@@ -22,7 +22,8 @@ from flexmb.run.switching import timing_of
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.tree_system import System
-from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NOT_POSITIVE_DEFINITE, OK
+from flexmb.tables.state import DynamicsError
+from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_POSITIVE_DEFINITE, OK
 from flexmb.typing import Index, Real
 
 _IN_LANES = ("rk4", "dop853")
@@ -112,7 +113,11 @@ class BatchRun:
             system = self._batch.systems[copy]
             y = self._found.y[first + lane]
             if np.isfinite(y).all():
-                precision = system.precision(system.state(y[: system.nq], y[system.nq : -1]))
+                try:
+                    precision = system.precision(system.state(y[: system.nq], y[system.nq : -1]))
+                except (ValueError, DynamicsError):  # no orientation, or overflow
+                    status[lane] = NONFINITE
+                    continue
                 if precision.status != OK:
                     status[lane], self._found.fault[first + lane] = NOT_POSITIVE_DEFINITE, precision.fault
 

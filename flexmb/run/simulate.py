@@ -79,7 +79,7 @@ def simulate(
     `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a second Ctrl-C while their
     outputs are evaluated keeps those that are finished.
     """
-    _refuse_unknown(settings)
+    refuse_unknown("simulate", settings)
     t_end = _end(t_end)
     if isinstance(scene, System):
         refuse_end(scene, t_end)
@@ -91,7 +91,7 @@ def simulate(
     system = scene if isinstance(scene, System) else assembled(scene)
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
-        _refuse_without_jacobian(system, algorithm, method)
+        refuse_without_jacobian(system, algorithm, method)
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         start = system.start_precision
         if start is not None and start.status != Status.OK:
@@ -108,7 +108,8 @@ def simulate(
     return trajectory
 
 
-def _refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
+def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
+    """NotImplementedError where a method that linearises finds no Jacobian."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
@@ -120,11 +121,12 @@ def _refuse_without_jacobian(system: System, algorithm: Algorithm, method: Metho
         )
 
 
-def _refuse_unknown(settings: RunSettings) -> None:
+def refuse_unknown(function: str, settings: RunSettings) -> None:
+    """TypeError for what is no setting of a run."""
     known = RunSettings.__annotations__
     for name in settings:
         if name not in known:
-            raise TypeError(f"simulate has no argument {name!r}: settings of a run are {', '.join(known)}")
+            raise TypeError(f"{function} has no argument {name!r}: settings of a run are {', '.join(known)}")
 
 
 def _end(t_end: float) -> float:

@@ -15,7 +15,7 @@ from flexmb.run.batch_trajectory import BatchTrajectory
 from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
-from flexmb.run.simulate import RunSettings
+from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_end
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
@@ -45,20 +45,23 @@ def simulate_batch(
     each processor.
 
     A run that fails fails no other one and raises nothing: `status` and `message` of the result say why it stopped.
-    Raises SceneError, ValueError or TypeError as `simulate` does, ValueError where states do not fit the copies, and
-    KeyboardInterrupt for Ctrl-C.
+    Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError where states do not
+    fit the copies, and KeyboardInterrupt for Ctrl-C.
     """
+    refuse_unknown("simulate_batch", settings)
     batch = copies if isinstance(copies, Batch) else _batch(copies)
     t_end = arguments.number("t_end", t_end)
     chosen = Settings(method, **settings).checked(t_end)
+    if chosen.integrator.linearises:
+        refuse_without_jacobian(batch.systems[0], "articulated", method)
     for system in batch.systems:
         refuse_end(system, t_end)
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
+    number = number_of_threads(threads, -(-len(rows[0]) // LANES))
     _refuse_too_many(len(rows[0]), len(times), batch)
     found = runs(*rows, len(times))
     if len(rows[0]):
-        number = number_of_threads(threads, len(found.y) // LANES)
         stop = found.counts.T[STOP : STOP + 1]  # of all runs at once
         _, interrupted = interruptible(BatchRun(batch, times, chosen, found), (len(rows[0]), number), stop)
         if interrupted:
@@ -77,9 +80,10 @@ def _given(batch: Batch, q: Any, u: Any) -> tuple[Any, Any]:
     own_q, own_u = batch.initial_states()
     if q is None and u is None:
         return own_q, own_u
-    if not batch.shares_constants:
-        return own_q if q is None else q, own_u if u is None else u
-    return (np.repeat(own_q, len(u), axis=0), u) if q is None else (q, np.repeat(own_u, len(q), axis=0))
+    given = batch.rows("q", q) if u is None else batch.rows("u", u)
+    if batch.shares_constants:
+        own_q, own_u = (np.repeat(own, len(given), axis=0) for own in (own_q, own_u))
+    return (given, own_u) if u is None else (own_q, given)
 
 
 def _refuse_too_many(n: int, samples: int, batch: Batch) -> None:

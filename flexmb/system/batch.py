@@ -10,10 +10,11 @@ fails no other one: what the lanes cannot decide is asked of its own system, alo
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,15 +25,14 @@ from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import NOTHING, STATUS
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.system.compile import assembled
+from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
 from flexmb.tables.state import DynamicsError
 from flexmb.tables.status import NONFINITE, OK
 from flexmb.typing import Index, Real
-
-if TYPE_CHECKING:
-    from flexmb.system.tree_system import System
 
 _WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
 
@@ -70,11 +70,16 @@ class BatchAccelerations(NamedTuple):
 class Batch:
     """Copies that share their structure: hinges, levels, modes, where loads act; their numbers may differ.
 
-    `systems`: one for each copy, or a single one for any number of copies.
+    `systems`: one for each copy, or a single one for any number of copies. ValueError where there is none, or where one
+    has another structure than the first.
     """
 
     def __init__(self, systems: Sequence[System]) -> None:
-        self.systems = tuple(systems)
+        self.systems = _listed("systems", systems)
+        for i, system in enumerate(self.systems):
+            if not isinstance(system, System):
+                raise TypeError(f"systems[{i}] is a {type(system).__name__}: compile_batch makes a batch of scenes")
+            _refuse_other_structure(i, system, self.systems[0])
         self.shares_constants = len(self.systems) == 1
         first = self.systems[0]
         self.layout, self.nq, self.nu = first.layout, first.nq, first.nu
@@ -87,8 +92,9 @@ class Batch:
             ]
 
     def system(self, copy: int) -> System:
-        """That of a copy."""
-        return self.systems[0 if self.shares_constants else copy]
+        """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
+        place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))
+        return self.systems[0 if self.shares_constants else place]
 
     @contextmanager
     def tables(self) -> Iterator[LaneTables]:
@@ -110,16 +116,23 @@ class Batch:
         return c
 
     def states(self, q: Any, u: Any) -> tuple[Real, Real]:
-        """Coordinates (n,nq) and speeds (n,nu) of all copies, C-contiguous; ValueError where they do not fit."""
-        rows = [arguments.array(name, x) for name, x in (("q", q), ("u", u))]
-        for name, x, size in zip("qu", rows, (self.nq, self.nu), strict=True):
-            if x.ndim != 2 or x.shape[1] != size:
-                raise ValueError(f"{name} has shape {x.shape}: give a row of {size} numbers for each copy")
-        if len(rows[0]) != len(rows[1]):
-            raise ValueError(f"there are {len(rows[0])} rows of q, but {len(rows[1])} of u")
-        if not self.shares_constants and len(rows[0]) != len(self.systems):
-            raise ValueError(f"the batch has {len(self.systems)} copies, but q has {len(rows[0])} rows")
-        return np.ascontiguousarray(rows[0]), np.ascontiguousarray(rows[1])
+        """Coordinates (n,nq) and speeds (n,nu) of all copies, in C's order.
+
+        ValueError or TypeError where they do not fit; entries that are not finite do.
+        """
+        q, u = self.rows("q", q), self.rows("u", u)
+        if len(q) != len(u):
+            raise ValueError(f"there are {len(q)} rows of q, but {len(u)} of u")
+        return q, u
+
+    def rows(self, name: str, x: Any) -> Real:
+        """Those of q (n,nq) or u (n,nu) alone, by its name."""
+        found, size = arguments.array(name, x), self.nq if name == "q" else self.nu
+        if found.ndim != 2 or found.shape[1] != size:
+            raise ValueError(f"{name} has shape {found.shape}: give a row of {size} numbers for each copy")
+        if not self.shares_constants and len(found) != len(self.systems):
+            raise ValueError(f"the batch has {len(self.systems)} copies, but {name} has {len(found)} rows")
+        return found
 
     def initial_states(self) -> tuple[Real, Real]:
         """(n,nq) and (n,nu) of the scenes at t = 0."""
@@ -131,14 +144,17 @@ class Batch:
 
         In lanes of eight copies each, whose modes are all eliminated explicitly, and in threads: by default as many as
         there are processors, if there is enough to do. A copy that has no accelerations, or whose state is not finite,
-        gets NaN and a status; it raises nothing. Scenes with closures are evaluated one by one.
+        gets NaN and a status; it raises nothing. Scenes with closures are evaluated one by one. Raises ValueError or
+        TypeError for arrays that do not fit, and for one time for all that is not finite.
         """
         q, u = self.states(q, u)
         n = len(q)
-        times = np.full(n, t) if isinstance(t, float) else np.broadcast_to(arguments.array("t", t), (n,)).copy()
+        times = arguments.vector("t", t, n) if hasattr(t, "__len__") else np.full(n, arguments.number("t", t))
+        threads = number_of_threads(threads, n // _WORTH_A_THREAD)
         copies = Copies(q, u, times, np.empty((n, self.nu)), np.full(n, NONFINITE))
         if self.in_lanes:
-            self._in_lanes(copies, number_of_threads(threads, n // _WORTH_A_THREAD))
+            self._in_lanes(copies, threads)
+        copies.status[~np.isfinite(times)] = NONFINITE  # systems without functions of time do not notice
         if copies.status.any():
             for copy in np.flatnonzero(copies.status != OK):
                 self._alone(copies, int(copy))
@@ -181,19 +197,23 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
     """Check scenes of one structure and turn them into a batch, one copy for each.
 
     They may differ in all numbers: masses, inertias, lengths, axes, stiffnesses, dampings, loads, functions, initial
-    states. Raises SceneError for a scene that is wrong, ValueError where there is none, or where one has another
-    structure than the first: another hinge, level, mode or load, or another name.
+    states. Raises SceneError for a scene that is wrong, TypeError for anything but scenes, ValueError where there is
+    none, or where one has another structure than the first: another hinge, level, mode or load, or another name.
     """
-    from flexmb.system.compile import assembled
-
-    if not scenes:
-        raise ValueError("a batch needs at least one scene")
+    scenes = _listed("scenes", scenes)
     for scene in scenes:
         check_scene(scene)
-    systems = [assembled(scene, "explicit") for scene in scenes]
-    for i, system in enumerate(systems):
-        _refuse_other_structure(i, system, systems[0])
-    return Batch(systems)
+    return Batch([assembled(scene, "explicit") for scene in scenes])
+
+
+def _listed(name: str, given: Iterable[Any]) -> tuple[Any, ...]:
+    """At least one."""
+    if isinstance(given, str) or not isinstance(given, Iterable):
+        raise TypeError(f"{name} is a {type(given).__name__}: give a list, of one for each copy")
+    found = tuple(given)
+    if not found:
+        raise ValueError(f"a batch needs at least one of {name}")
+    return found
 
 
 def _refuse_other_structure(i: int, system: System, first: System) -> None:

@@ -78,6 +78,14 @@ def whole(name: str, value: Any) -> int:
     return int(value)
 
 
+def index(name: str, value: Any, length: int) -> int:
+    """The number of one of `length` things, counted from 0."""
+    found = whole(name, value)
+    if not 0 <= found < length:
+        raise ValueError(f"{name} is {found}: there are {length}, counted from 0")
+    return found
+
+
 def one_of(name: str, value: Any, known: Iterable[str]) -> str:
     """A name that there is; ValueError for another, with those that there are."""
     names = tuple(known)

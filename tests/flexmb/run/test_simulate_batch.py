@@ -165,6 +165,8 @@ def test_closed_chains_run_one_by_one():
     found = simulate_batch(system, 0.2, "rk4", **states, step=STEP, samples=5)
     run = fm.simulate(system, 0.2, "rk4", step=STEP, samples=5)
     np.testing.assert_array_equal(found.q[1], run.q)
+    with pytest.raises(NotImplementedError, match="closures"):
+        simulate_batch(system, 0.2, "radau5", **states)
 
 
 def test_what_makes_no_sense_is_refused(system):
@@ -173,6 +175,10 @@ def test_what_makes_no_sense_is_refused(system):
         simulate_batch(system, T_END, q=q[:, :1], u=u)
     with pytest.raises(ValueError, match="rtol"):
         simulate_batch(system, T_END, q=q, u=u, rtol=1.0)
+    with pytest.raises(TypeError, match="simulate_batch has no argument 'stabilise'"):
+        simulate_batch(system, T_END, q=q, u=u, stabilise=1.0)
+    with pytest.raises(ValueError, match="threads"):
+        simulate_batch(system, T_END, q=q[:0], u=u[:0], threads=0)
     with pytest.raises(fm.SceneError):
         simulate_batch(system, -1.0, q=q, u=u)
     with pytest.raises(ValueError, match="fewer samples"):

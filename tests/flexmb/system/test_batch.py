@@ -108,6 +108,14 @@ def test_a_copy_that_is_not_finite_fails_alone(chain, bad):
     assert np.isnan(found.accelerations[13]).all()
 
 
+def test_a_copy_at_no_time_fails_alone():
+    """Of a scene that does not depend on time, too."""
+    system = fm.compile(gimbal())
+    q, u, t = states(system, 9)
+    t[4] = np.nan
+    assert system.accelerations_batch(q, u, t).failed.tolist() == [4]
+
+
 def gimbal() -> fm.Scene:
     """A body without inertia about the axis that is lost where the middle angle is a right one."""
     scene = SceneBuilder("gimbal")
@@ -192,6 +200,11 @@ def test_copies_of_another_structure_are_refused():
         compile_batch([scene, scene, trees.random_scene(0, trees.RIGID)])
     with pytest.raises(ValueError, match="at least one"):
         compile_batch([])
+    assert len(compile_batch(each for each in [scene, scene]).systems) == 2
+    with pytest.raises(TypeError, match="list"):
+        compile_batch(scene)
+    with pytest.raises(ValueError, match="scene 1 has another structure"):
+        Batch([fm.compile(scene), fm.compile(other)])
 
 
 def replace_hinge(scene: fm.Scene) -> fm.Scene:
@@ -209,6 +222,8 @@ def test_states_that_do_not_fit_are_refused(chain):
         chain.accelerations_batch(q, u, t[1:])
     with pytest.raises(ValueError, match="threads"):
         chain.accelerations_batch(q, u, t, threads=0)
+    with pytest.raises(ValueError, match="t is nan"):
+        chain.accelerations_batch(q, u, np.nan)
     batch = Batch([chain, chain])
     with pytest.raises(ValueError, match="2 copies"):
         batch.accelerations(q, u, t)

@@ -4,10 +4,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from tests.flexmb.system import public_calls
-from tests.flexmb.system.public_calls import Call, Variant, W, faults, rows
+from tests.flexmb.system.argument_kinds import Call, Variant, W, rows
+from tests.flexmb.system.batch_calls import judge
+from tests.flexmb.system.public_calls import faults
 
 
 def test_every_public_call_refuses_what_is_wrong_and_casts_what_is_right():
@@ -41,6 +44,23 @@ def test_faults_are_seen(function, variant, fault):
     quiet = Call(lambda q: 1.0 if isinstance(q, str) else function(q), {"q": "sound"}, {"q": lambda _: [variant]})
     found = list(faults("call", quiet))
     assert len(found) == 1 and fault in found[0]
+
+
+@pytest.mark.parametrize(
+    ("failed", "rows"),
+    [
+        ([], [[np.nan], [1.0]]),  # nobody noticed
+        ([0], [[2.0], [1.0]]),  # of a copy that failed there are numbers
+        ([0, 1], [[np.nan], [np.nan]]),  # it failed another one
+        ([], [[2.0], [1.0]]),  # what is not finite has a result
+    ],
+)
+def test_faults_of_copies_are_seen(failed, rows):
+    """Negative controls: of two copies the first is given NaN."""
+    with pytest.raises(AssertionError):
+        judge(np.array(failed, int), np.array(rows), [[np.nan], [0.0]])
+    with pytest.raises(ArithmeticError):
+        judge(np.array([0]), np.array([[np.nan], [1.0]]), [[np.nan], [0.0]])
 
 
 def test_a_state_made_by_hand_shares_nothing_with_its_arrays():
