@@ -39,7 +39,7 @@ _WIDE = {kind.width: kind for kind in (LANE, DUAL)}
 @cache
 def _short(dtype: types.Type) -> str:
     """A name for symbols, of a record the digest of its own, which is pages long."""
-    return f"r{sha256(str(dtype).encode()).hexdigest()[:6]}" if isinstance(dtype, types.Record) else str(dtype)
+    return f"r{sha256(str(dtype).encode()).hexdigest()[:12]}" if isinstance(dtype, types.Record) else str(dtype)
 
 
 class TableType(types.Type):
