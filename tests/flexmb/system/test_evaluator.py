@@ -15,7 +15,7 @@ from flexmb.run.warm_up import looped
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.evaluator import Evaluator
 from tests.benchmarks.rivals import rigid_chain
-from tests.flexmb.system.public_calls import World
+from tests.flexmb.system.argument_kinds import World
 from tests.trees import random_scene
 
 
