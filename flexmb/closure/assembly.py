@@ -76,30 +76,57 @@ def _moving(closures: Closures, t: float, y: Real) -> Real:
     return y
 
 
+class Group(NamedTuple):
+    """Singular values of B' of a group in its own columns, U s V', and U' times the columns that its cluster shares."""
+
+    of: GroupResponse
+    U: Real
+    s: Real
+    Vt: Real
+    shared: Real
+
+
 class Decomposed(NamedTuple):
-    """Singular values of the responses B' of all rows, group by group: B' = U s V'."""
+    """The responses of all rows, by cluster and group."""
 
     speeds: int
-    groups: list[tuple[GroupResponse, Real, Real, Real]]
+    clusters: list[list[Group]]
 
     @property
     def largest(self) -> float:
-        """The largest of all."""
-        return max((float(s[0]) for _, _, s, _ in self.groups if len(s)), default=0.0)
+        """The largest singular value of all."""
+        return max((float(group.s[0]) for groups in self.clusters for group in groups if len(group.s)), default=0.0)
 
     def damped(self, values: Real, floor: float) -> Real:
-        """x (nu,) = V s / (s^2 + floor) U' of values (G,) of the rows; without a floor the least squares' solution."""
+        """x (nu,) = B (B'B + floor)^-1 values (G,) of the rows; without a floor the least squares' solution.
+
+        What groups share comes in by Woodbury's formula, as in `flexmb.closure.clusters`.
+        """
         x = np.zeros(self.speeds)
-        for group, U, s, Vt in self.groups:
-            kept = s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
-            x[group.columns] += Vt[kept].T @ (s[kept] / (s[kept] ** 2 + floor) * (U[:, kept].T @ values[group.rows]))
+        for groups in self.clusters:
+            kept = [group.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest) for group in groups]
+            root = [np.sqrt(group.s[k] ** 2 + floor) for group, k in zip(groups, kept, strict=True)]
+            T = [group.shared[k] / r[:, None] for group, k, r in zip(groups, kept, root, strict=True)]
+            z = [group.U[:, k].T @ values[group.of.rows] / r for group, k, r in zip(groups, kept, root, strict=True)]
+            C = np.eye(T[0].shape[1]) + sum(each.T @ each for each in T)
+            y = np.linalg.solve(C, sum(each.T @ part for each, part in zip(T, z, strict=True)))
+            for group, k, r, t, part in zip(groups, kept, root, T, z, strict=True):
+                f = (part - t @ y) / r
+                x[group.of.columns[: group.of.own]] += group.Vt[k].T @ (group.s[k] * f)
+                x[group.of.columns[group.of.own :]] += group.shared[k].T @ f
         return x
 
 
 def decomposed(closures: Closures) -> Decomposed:
     """At the state that was linearised last."""
-    found = [(group, *np.linalg.svd(group.half, full_matrices=False)) for group in closures.responses()]
-    return Decomposed(len(closures.constants[0].speed), found)
+    return Decomposed(
+        len(closures.constants[0].speed), [[_decomposed(of) for of in groups] for groups in closures.responses()]
+    )
+
+
+def _decomposed(of: GroupResponse) -> Group:
+    U, s, Vt = np.linalg.svd(of.half[:, : of.own], full_matrices=False)
+    return Group(of, U, s, Vt, U.T @ of.half[:, of.own :])
 
 
 def _refuse_half_a_turn(closures: Closures) -> None:

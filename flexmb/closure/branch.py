@@ -57,10 +57,10 @@ def at_crossing(t, cc, cw):
 def turned_over(cc, cw):
     """The first chosen row that points another way than when the step started, or -1. Needs the same."""
     for g in range(cc.group.shape[0]):
-        width = cc.group[g].column_stop - cc.group[g].column_start
+        start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
         for a in range(cw.rank[g]):
-            total, at = 0.0, cc.group[g].half + a * width
-            for j in range(at, at + width):
+            total, at = 0.0, cc.group[g].half + a * (stop - start)
+            for j in range(at, at + own - start):
                 total += cw.basis[j] * cw.former[j]
             if not total >= TURNED:
                 return cw.chosen[cc.group[g].row_start + a]

@@ -40,11 +40,12 @@ class ClosedMotion(NamedTuple):
 
 
 class GroupResponse(NamedTuple):
-    """Of one group: its rows; its columns, numbers of speeds; B' (rows,columns)."""
+    """Of one group: its rows; its columns, numbers of speeds, the first `own` of them its own; B' (rows,columns)."""
 
     rows: slice
     columns: Index
     half: Real
+    own: int
 
 
 class Closures:
@@ -156,15 +157,16 @@ class Closures:
         pair["mff"] += (STIFF / self._slowest) ** 2 * pair["stiffness"]
         return replace(c, pair=pair)
 
-    def responses(self) -> list[GroupResponse]:
-        """By group, B' of the rows in the size of their closures, those that suppress nothing zero: Lambda^-1 = B'B."""
+    def responses(self) -> list[list[GroupResponse]]:
+        """By cluster and group, B' of the rows in the size of their closures, those that suppress nothing zero."""
         cc, own = self.constants[1], self._own
         scale = self._scale("size")
         found = []
-        for rows, columns, half in blocks(cc, own):
-            felt = cc.weight[rows] * np.linalg.norm(half, axis=1) > DEPENDENT * own.size[rows]
-            found.append(GroupResponse(rows, columns, (scale[rows] * felt)[:, None] * half))
-        return found
+        for group in blocks(cc, own):
+            left = np.linalg.norm(group.half[:, : group.own], axis=1)
+            felt = cc.weight[group.rows] * left > DEPENDENT * own.size[group.rows]
+            found.append(group._replace(half=(scale[group.rows] * felt)[:, None] * group.half))
+        return [found[cluster["group_start"] : cluster["group_stop"]] for cluster in cc.cluster]
 
     def errors(self) -> Real:
         """Values of the rows in the size of their closures (G,)."""
@@ -268,13 +270,14 @@ def blocks(cc: ClosureConstants, cw: ClosureWorkspace) -> Iterator[GroupResponse
         columns = cc.column[group["column_start"] : group["column_stop"]]
         shape = rows.stop - rows.start, len(columns)
         half = cw.half[group["half"] : group["half"] + shape[0] * shape[1]].reshape(shape)
-        yield GroupResponse(rows, columns, half)
+        yield GroupResponse(rows, columns, half, int(group["own_stop"] - group["column_start"]))
 
 
 def null_loads(cc: ClosureConstants, cw: ClosureWorkspace) -> list[tuple[slice, Real]]:
     """Orthonormal loads (rows,k) of the rows of a group that move nothing, of all groups that have such loads."""
     found = []
-    for (rows, _, half), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
+    for (rows, _, whole, own), rank in zip(blocks(cc, cw), cw.rank.tolist(), strict=True):
+        half = whole[:, :own]
         if rank < len(half):
             order = cw.chosen[rows] - rows.start
             chosen, rest = order[:rank], order[rank:]

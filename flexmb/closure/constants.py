@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Sequence
 
 import numpy as np
 
 from flexmb.building.links import BodyLink, closure_sides
 from flexmb.closure import tables as t
-from flexmb.closure.groups import group_tables, groups
+from flexmb.closure.groups import clusters, group_tables, path
 from flexmb.scene import schema as s
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.tables.arrays import Constants
@@ -38,26 +39,27 @@ def closure_constants(
                 sides[i, j]["position"] = side.offset
                 sides[i, j]["rotation"] = (rotation_matrix(side.quaternion) @ side.turn).ravel()
     parent = constants.body["parent"].tolist()
-    paths = [sorted(_ancestors(parent, bodies), reverse=True) for bodies in sides["body"].tolist()]
-    closures["path_stop"] = np.cumsum([len(path) for path in paths])
-    closures["path_start"] = closures["path_stop"] - [len(path) for path in paths]
+    paths = [path(constants, parent, bodies) for bodies in sides["body"].tolist()]
+    closures["path_stop"] = np.cumsum([len(each.bodies) for each in paths])
+    closures["path_start"] = closures["path_stop"] - [len(each.bodies) for each in paths]
     own = [_rows(i, closure) for i, closure in enumerate(scene.closures)]
-    members = groups(constants, paths)
+    members = clusters(constants, paths)
     rows: list[tuple[int, int, int]] = []
-    for group, i in ((number, i) for number, each in enumerate(members) for i in each):
+    for group, i in ((number, i) for number, each in enumerate(itertools.chain(*members)) for i in each):
         closures["group"][i], closures["row_start"][i] = group, len(rows)
         rows += own[i]
         closures["row_stop"][i] = len(rows)
     row_table = np.array(rows, t.ROW)
-    group_table, columns = group_tables(constants, members, paths, list(map(len, own)))
+    tables = group_tables(constants, members, paths, list(map(len, own)))
     length = _length(constants, sides)
     return t.ClosureConstants(
         side=sides,
         closure=closures,
         row=row_table,
-        path=np.array([k for path in paths for k in path], np.int64),
-        group=group_table,
-        column=columns,
+        path=np.array([k for each in paths for k in each.bodies], np.int64),
+        group=tables.groups,
+        column=tables.columns,
+        cluster=tables.clusters,
         weight=np.where(row_table["type"] == t.ROTATION, length, 1.0),
         length=np.array([length]),
     )
@@ -68,16 +70,6 @@ def _rows(i: int, closure: s.Closure) -> list[tuple[int, int, int]]:
     rotations, translations = SUPPRESSED[closure.type]
     turning = [(i, t.ROTATION, "xyz".index(axis)) for axis in rotations]
     return turning + [(i, t.TRANSLATION, "xyz".index(axis)) for axis in translations]
-
-
-def _ancestors(parent: Sequence[int], bodies: Sequence[int]) -> set[int]:
-    """The bodies and all that carry them."""
-    found: set[int] = set()
-    for k in bodies:
-        while k >= 0 and k not in found:
-            found.add(k)
-            k = parent[k]
-    return found
 
 
 def _length(constants: Constants, sides: np.ndarray) -> float:

@@ -1,6 +1,7 @@
 """Rank-revealing factorisation of Lambda^-1 = B'B: B P = Q R with column pivoting, never B'B itself.
 
-Lambda^-1 has a block for each group of closures, and each is factorised by itself (`flexmb.closure.groups`).
+Each group of closures is factorised by itself, in the columns that are its own (`flexmb.closure.groups`); what groups
+feel of each other through shared columns comes in when loads are solved for (`flexmb.closure.clusters`).
 Modified Gram-Schmidt; its R is as good as Householder's, and only R is used to solve (the semi-normal equations). A row
 is counted as dependent on those chosen before it when what is left of it is below `DEPENDENT` times how far the ports
 of its closure move by themselves, cw.size of `flexmb.closure.sizes`, rotations weighed with a length of the scene. On a
@@ -9,6 +10,7 @@ closed configuration what is left of a redundant row is round-off and the residu
 
 from math import sqrt
 
+from flexmb.closure.clusters import factorise_shared, subtract_shared
 from flexmb.jit.kernel import helper
 
 DEPENDENT = 1e-9
@@ -33,6 +35,12 @@ def rows(cc, g):
 def columns(cc, g):
     """How many speeds loads of group g may change."""
     return cc.group[g].column_stop - cc.group[g].column_start
+
+
+@helper
+def own_columns(cc, g):
+    """How many of them are its own: the first ones."""
+    return cc.group[g].own_stop - cc.group[g].column_start
 
 
 @helper
@@ -67,10 +75,10 @@ def choose_rows(cc, cw):
 @helper
 def _choose(cc, cw, g, wanted):
     """Order the rows of group g; returns how many independent ones were found, `wanted` at most."""
-    first, stop, width = cc.group[g].row_start, cc.group[g].row_stop, columns(cc, g)
+    first, stop, own = cc.group[g].row_start, cc.group[g].row_stop, own_columns(cc, g)
     for r in range(first, stop):
         cw.chosen[r] = r
-    for j in range(cc.group[g].half, cc.group[g].half + (stop - first) * width):
+    for j in range(cc.group[g].half, cc.group[g].half + (stop - first) * columns(cc, g)):
         cw.basis[j] = cw.half[j]  # until they are in order, rows stand in it as in `half`
     found = 0
     while first + found < stop and found != wanted:
@@ -78,25 +86,29 @@ def _choose(cc, cw, g, wanted):
         for place in range(first + found, stop):
             r = cw.chosen[place]
             if cw.size[r] > 0.0:  # ports that nothing moves have rows of zeros
-                left = cc.weight[r] * norm(cw.basis, row_place(cc, g, r), width) / cw.size[r]
+                left = cc.weight[r] * norm(cw.basis, row_place(cc, g, r), own) / cw.size[r]
                 if left > best:
                     best, at = left, place
         if at < 0:
             break
         cw.chosen[first + found], cw.chosen[at] = cw.chosen[at], cw.chosen[first + found]
         along = row_place(cc, g, cw.chosen[first + found])
-        length = norm(cw.basis, along, width)
+        length = norm(cw.basis, along, own)
         for place in range(first + found + 1, stop):
-            _orthogonalise(cw.basis, row_place(cc, g, cw.chosen[place]), along, width, length * length)
+            _orthogonalise(cw.basis, row_place(cc, g, cw.chosen[place]), along, (own, own), length * length)
         found += 1
     return found
 
 
 @helper
-def _orthogonalise(basis, x, along, width, squared):
-    """x -= along (along . x) / squared, both `width` numbers of the basis from there on; returns the coefficient."""
+def _orthogonalise(basis, x, along, extent, squared):
+    """x -= along (along . x) / squared, both numbers of the basis from there on; returns the coefficient.
+
+    extent: (how many enter the product, how many are changed).
+    """
+    own, width = extent
     total = 0.0
-    for j in range(width):
+    for j in range(own):
         total += basis[along + j] * basis[x + j]
     total /= squared
     for j in range(width):
@@ -113,19 +125,20 @@ def factorise(cc, cw):
             length = _orthonormalise(cc, cw, g, a, row)
             if not cc.weight[row] * length > DEPENDENT * cw.size[row]:
                 return row
+    factorise_shared(cc, cw)
     return -1
 
 
 @helper
 def _orthonormalise(cc, cw, g, a, row):
     """Make a row the one numbered a of the basis of its group, after those before it: column a of R; its pivot."""
-    first, width = cc.group[g].row_start, columns(cc, g)
+    first, own, width = cc.group[g].row_start, own_columns(cc, g), columns(cc, g)
     x, half = row_place(cc, g, first + a), row_place(cc, g, row)
     for j in range(width):
         cw.basis[x + j] = cw.half[half + j]
     for b in range(a):
-        cw.factor[entry(cc, g, b, a)] = _orthogonalise(cw.basis, x, row_place(cc, g, first + b), width, 1.0)
-    length = norm(cw.basis, x, width)
+        cw.factor[entry(cc, g, b, a)] = _orthogonalise(cw.basis, x, row_place(cc, g, first + b), (own, width), 1.0)
+    length = norm(cw.basis, x, own)
     cw.factor[entry(cc, g, a, a)] = length
     for j in range(x, x + width):
         cw.basis[j] /= length
@@ -134,7 +147,7 @@ def _orthonormalise(cc, cw, g, a, row):
 
 @helper
 def solve(cc, cw):
-    """Loads of the chosen rows from R'R f = cw.scratch (by place in cw.chosen), into cw.row.load; others are 0."""
+    """Loads f of the chosen rows, Lambda^-1 f = cw.scratch (by place in cw.chosen), into cw.row.load; others are 0."""
     for r in range(cw.row.shape[0]):
         cw.row[r].load = 0.0
     R, b = cw.factor, cw.scratch
@@ -144,6 +157,10 @@ def solve(cc, cw):
             for m in range(a):
                 b[first + a] -= R[entry(cc, g, m, a)] * b[first + m]
             b[first + a] /= R[entry(cc, g, a, a)]
+    for k in range(cc.cluster.shape[0]):
+        subtract_shared(cc, cw, k, b)
+    for g in range(cc.group.shape[0]):
+        first, rank = cc.group[g].row_start, cw.rank[g]
         for a in range(rank - 1, -1, -1):
             for m in range(a + 1, rank):
                 b[first + a] -= R[entry(cc, g, a, m)] * b[first + m]

@@ -1,14 +1,22 @@
-"""Which closures feel each other's loads, and which speeds these may change.
+"""Which closures feel each other's loads, which speeds these may change, and which bodies carry several loops at once.
 
 Loads act on a tree by the accelerations that they cause. With M = F F', those of a closure are F'^-1 x of an x that is
 zero but for the speeds of bodies between its ports and the ground, so that J M^-1 J' of two closures vanishes unless a
 body on both paths has a speed that is free. Hence loops that hang from the ground side by side, or from a base that is
 welded or driven, cost as much as each by itself: their sum, not the cube of their number.
+
+A base that moves feels them all, yet a loop does not know that its base moves: both its ports hang from one rigid body,
+the junction, and no motion of this body or of those that carry it opens or closes the loop. J has columns for what is
+below the junction only, so rows are independent, singular or turned over by these columns alone. Closures are one group
+where they share such a body; groups that share nothing but what carries them are a cluster, and feel each other through
+these few speeds (`flexmb.closure.clusters`). A body that bends between the ports of a loop does open it: then its own
+speeds are the loop's too, and the junction is what carries it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,42 +25,105 @@ from flexmb.tables.arrays import Constants
 from flexmb.typing import Index, Record
 
 
-def groups(c: Constants, paths: Sequence[Sequence[int]]) -> list[list[int]]:
-    """Closures by group, from the bodies that loads on each pass; groups in the order of their first closure."""
-    first = {}  # closure that passed a body first
-    leader = list(range(len(paths)))
+class Path(NamedTuple):
+    """Bodies that loads on one closure pass on their way to the ground: below its junction, and what carries these."""
+
+    own: frozenset[int]
+    carriers: frozenset[int]
+
+    @property
+    def bodies(self) -> list[int]:
+        """All of them, tips first."""
+        return sorted(self.own | self.carriers, reverse=True)
+
+
+def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> Path:
+    """Of a closure between two bodies, -1 for the ground."""
+    one, other = (_ancestors(parent, k) for k in bodies)
+    carriers = one & other
+    if carriers and c.body["modes"][max(carriers)] > 0:
+        carriers = carriers - {max(carriers)}
+    return Path(frozenset((one | other) - carriers), frozenset(carriers))
+
+
+def _ancestors(parent: Sequence[int], k: int) -> set[int]:
+    """A body and all that carry it; bodies are numbered from the ground outwards."""
+    found = set()
+    while k >= 0:
+        found.add(k)
+        k = parent[k]
+    return found
+
+
+def clusters(c: Constants, paths: Sequence[Path]) -> list[list[list[int]]]:
+    """Closures by group, groups by cluster; clusters, and groups in each, in the order of their first closure."""
+    moves = _moves(c)
+    mine = [{k for k in each.own if moves[k]} for each in paths]
+    owned = set().union(*mine)
+    felt = [own | (each.carriers & owned) for own, each in zip(mine, paths, strict=True)]
+    grouped = _joined(felt)
+    carriers = [{k for i in group for k in paths[i].carriers if moves[k]} - owned for group in grouped]
+    return [[grouped[g] for g in cluster] for cluster in _joined(carriers)]
+
+
+def _joined(bodies: Sequence[Iterable[int]]) -> list[list[int]]:
+    """Places in a list of sets of bodies, those together that have one in common, directly or by way of others."""
+    first: dict[int, int] = {}  # place that had a body first
+    leader = list(range(len(bodies)))
 
     def leader_of(i: int) -> int:
         while leader[i] != i:
             leader[i] = i = leader[leader[i]]
         return i
 
-    moves = _moves(c)
-    for i, path in enumerate(paths):
-        for k in path:
-            if moves[k]:
-                one, other = sorted((leader_of(first.setdefault(k, i)), leader_of(i)))
-                leader[other] = one
+    for i, own in enumerate(bodies):
+        for k in own:
+            one, other = sorted((leader_of(first.setdefault(k, i)), leader_of(i)))
+            leader[other] = one
     found: dict[int, list[int]] = {}
-    for i in range(len(paths)):
+    for i in range(len(bodies)):
         found.setdefault(leader_of(i), []).append(i)
     return list(found.values())
 
 
+class GroupTables(NamedTuple):
+    """GROUP and CLUSTER records, and the columns of all groups."""
+
+    groups: Record
+    clusters: Record
+    columns: Index
+
+
 def group_tables(
-    c: Constants, members: Sequence[Sequence[int]], paths: Sequence[Sequence[int]], rows: Sequence[int]
-) -> tuple[Record, Index]:
-    """GROUP records of closures by group, and the columns of all; `rows`: how many each closure has."""
-    out, columns = np.zeros(len(members), t.GROUP), list[int]()
-    row = half = factor = 0
-    for group, closures in zip(out, members, strict=True):
-        own = _speeds(c, sorted({k for i in closures for k in paths[i]}))
-        count = sum(rows[i] for i in closures)
-        group["row_start"], group["column_start"], group["half"], group["factor"] = row, len(columns), half, factor
-        columns += own
-        row, half, factor = row + count, half + count * len(own), factor + count * count
-        group["row_stop"], group["column_stop"] = row, len(columns)
-    return out, np.array(columns, np.int64)
+    c: Constants, members: Sequence[Sequence[Sequence[int]]], paths: Sequence[Path], rows: Sequence[int]
+) -> GroupTables:
+    """Of closures by group and cluster; `rows`: how many each closure has."""
+    moves = _moves(c)
+    groups, columns = np.zeros(sum(map(len, members)), t.GROUP), list[int]()
+    clusters = np.zeros(len(members), t.CLUSTER)
+    row = half = factor = place = shared_factor = 0
+    for cluster, its_groups in zip(clusters, members, strict=True):
+        own = [_union(paths[i].own for i in group) for group in its_groups]
+        carriers = _union(paths[i].carriers for group in its_groups for i in group) - _union(own)
+        if len(its_groups) == 1:  # nobody to share them with
+            own, carriers = [own[0] | carriers], set()
+        shared = _speeds(c, sorted(k for k in carriers if moves[k]))
+        cluster["group_start"], cluster["group_stop"] = place, place + len(its_groups)
+        cluster["shared"], cluster["factor"] = len(shared), shared_factor
+        shared_factor += len(shared) ** 2
+        for group, closures, bodies in zip(groups[place:], its_groups, own, strict=False):
+            mine = _speeds(c, sorted(bodies))
+            count, width = sum(rows[i] for i in closures), len(mine) + len(shared)
+            group["row_start"], group["column_start"], group["half"], group["factor"] = row, len(columns), half, factor
+            columns += mine + shared
+            row, half, factor = row + count, half + count * width, factor + count * count
+            group["row_stop"], group["own_stop"], group["column_stop"] = row, len(columns) - len(shared), len(columns)
+        place += len(its_groups)
+    return GroupTables(groups, clusters, np.array(columns, np.int64))
+
+
+def _union(sets: Iterable[Iterable[int]]) -> set[int]:
+    return set().union(*sets)
 
 
 def _moves(c: Constants) -> list[bool]:

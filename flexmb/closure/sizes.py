@@ -17,7 +17,7 @@ independent (`flexmb.closure.factor.DEPENDENT`): they are measured where rows ar
 
 from math import sqrt
 
-from flexmb.closure.factor import columns, norm
+from flexmb.closure.factor import norm, own_columns
 from flexmb.closure.forces import pass_load
 from flexmb.closure.unit_loads import at_port, clear_path
 from flexmb.jain.ports import mode_motion
@@ -65,6 +65,6 @@ def _reaction(s, i, k, F):
 
 @helper
 def _passed(s, i):
-    """|x| of the forces in cw.response, which are on the path of closure i."""
+    """|x|, in the columns that rows are judged by, of the forces in cw.response, which are on the path of closure i."""
     pass_load(s.route, s, i, s.cw.coefficient, 0)
-    return norm(s.cw.coefficient, 0, columns(s.cc, s.cc.closure[i].group))
+    return norm(s.cw.coefficient, 0, own_columns(s.cc, s.cc.closure[i].group))

@@ -3,9 +3,10 @@
 C closures with G suppressed motions ("rows") in all, on N bodies with at most m modes and nu speeds. Frame A is on
 body_a (the inboard side), frame B on body_b, both turned so that an axis is z; rows are in A axes.
 
-Closures whose loads pass a common body that can move are one of K groups; groups do not feel each other's loads, so
-that Lambda^-1 has a block for each and zeros elsewhere. Rows are numbered group by group. A group has matrices of its
-own, (rows, columns) row by row in one array: a row's columns are the speeds that loads of its group may change.
+Closures are in one of K groups by the bodies that their loads move, and groups in one of L clusters by the bodies that
+carry them (`flexmb.closure.groups`); Lambda^-1 has a block for each cluster and zeros elsewhere. Rows are numbered
+group by group, groups cluster by cluster. A group has matrices of its own, (rows, columns) row by row in one array: a
+row's columns are the speeds that loads of its group may change, first its own, then those that its cluster shares.
 """
 
 from __future__ import annotations
@@ -45,9 +46,16 @@ GROUP = _record(
     ("row_start", _I),  # its rows, and their places in the order of pivots
     ("row_stop", _I),
     ("column_start", _I),  # its part of `column`
+    ("own_stop", _I),  # where in it shared columns begin
     ("column_stop", _I),
     ("half", _I),  # where its matrices begin in `half`, `basis` and `former`
     ("factor", _I),  # and in `factor`, (rows, rows)
+)
+CLUSTER = _record(
+    ("group_start", _I),  # its groups
+    ("group_stop", _I),
+    ("shared", _I),  # speeds that all of them share
+    ("factor", _I),  # where its matrix begins in `shared_factor`, (shared, shared)
 )
 ROW = _record(
     ("closure", _I),
@@ -66,6 +74,7 @@ class ClosureConstants:
     path: Index  # bodies that a load on a closure passes on its way to the ground, tips first
     group: Record  # (K,) GROUP
     column: Index  # by group, the speeds of the bodies on its paths
+    cluster: Record  # (L,) CLUSTER
     weight: Real  # (G,) what makes rows comparable: 1 for translations, `length` for rotations
     length: Real  # (1,) m, a length of the scene
 
@@ -94,8 +103,10 @@ class ClosureWorkspace:
     closure: Record  # (C,) CLOSURE_STATE
     row: Record  # (G,) ROW_STATE
     half: Real  # by group (rows, columns) B': D^-1/2 (1 - H Psi K) J' of every row; Lambda^-1 = B' B
-    basis: Real  # likewise, orthonormal basis of the chosen rows of `half`
-    factor: Real  # by group (rows, rows) R, upper: B P = Q R
+    basis: Real  # likewise, chosen rows: orthonormal in a group's own columns, beside R'^-1 times the shared ones
+    factor: Real  # by group (rows, rows) R, upper: B P = Q R in a group's own columns
+    shared_factor: Real  # by cluster (shared, shared) C, upper, of `flexmb.closure.clusters`
+    shared: Real  # as many numbers as a cluster has shared speeds at most
     chosen: Index  # (G,) by group, rows by pivot; the first `rank` of each are independent
     rank: Index  # (K,) independent rows; -1 until they are counted
     scratch: Real  # (G,) right sides by place in `chosen`
@@ -150,6 +161,8 @@ def workspace(c: ClosureConstants, tree: Constants) -> ClosureWorkspace:
         half=np.zeros(size),
         basis=np.zeros(size),
         factor=np.zeros(int(heights @ heights)),
+        shared_factor=np.zeros(int(c.cluster["shared"] @ c.cluster["shared"])),
+        shared=np.zeros(int(np.max(c.cluster["shared"], initial=0))),
         chosen=np.arange(rows),
         rank=np.full(len(c.group), -1),
         scratch=np.zeros(rows),

@@ -64,7 +64,7 @@ class Integration:
         self._enter: Any = None
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. Arrays of floats, and of whole numbers, in C order."""
+        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. All arrays in C order."""
         self.compile(y, clock, accuracy, out, counts)
         return self._enter(self._problem, y, clock, accuracy, out, counts)
 

@@ -102,7 +102,7 @@ def test_what_has_turned_over(row, turned):
 
     def found(basis: np.ndarray) -> int:
         groups = np.zeros(2, GROUP).view(np.recarray)
-        groups.row_start, groups.column_stop, groups.half = (0, 2), 3, (0, 6)
+        groups.row_start, groups.own_stop, groups.column_stop, groups.half = (0, 2), 3, 3, (0, 6)
         ahead, former = np.eye(2, 3), np.eye(2, 3)  # the group before it has not turned
         cw = SimpleNamespace(
             basis=np.append(ahead, basis), former=np.append(ahead, former), rank=[2, 2], chosen=[1, 3, 4, 7]
