@@ -15,6 +15,7 @@ from tests.benchmarks.must_hold.charts import dominated
 from tests.benchmarks.must_hold.kept import Kept, Results, read, write
 from tests.benchmarks.must_hold.measure import measured_row
 from tests.benchmarks.must_hold.page import PAGE, page, verdict
+from tests.benchmarks.must_hold.reasons import REASONS
 from tests.benchmarks.must_hold.row import Call, Measured, RivalsDiffer, Row, how_many_times
 from tests.benchmarks.must_hold.scaling import FOLDER, PICTURES
 
@@ -33,6 +34,22 @@ def test_every_kept_row_exists_and_the_page_has_all_rows() -> None:
     for name in all_rows():
         (line,) = (line for line in text.splitlines() if line.endswith(f"| `{name}` |"))
         assert name in read().rows or "**not measured**" in line
+
+
+def test_every_missed_row_has_its_reason() -> None:
+    reasons = [name for reason in REASONS for name in reason.rows]
+    assert sorted(set(reasons)) == sorted(reasons)
+    assert set(reasons) <= set(all_rows())
+    assert "no profile says why" not in page(read())
+
+
+def test_a_reason_is_shown_only_where_a_row_is_missed() -> None:
+    name = "kernel_10"
+    kept = read().rows[name]
+    missed = structs.replace(kept, measured=structs.replace(kept.measured, value=0.1))
+    assert f"Missed, `{name}`: no profile says why" in page(structs.replace(read(), rows={name: missed}))
+    met = structs.replace(kept, measured=structs.replace(kept.measured, value=100.0))
+    assert "Missed, " not in page(structs.replace(read(), rows={name: met}))
 
 
 def test_every_picture_is_kept_and_drawn() -> None:

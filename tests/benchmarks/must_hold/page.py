@@ -6,6 +6,7 @@ from itertools import groupby
 
 from tests.benchmarks.must_hold.catalogue import all_rows
 from tests.benchmarks.must_hold.kept import Kept, Results
+from tests.benchmarks.must_hold.reasons import REASONS
 from tests.benchmarks.must_hold.row import Row
 from tests.benchmarks.must_hold.scaling import PICTURES
 from tests.repo.project import ROOT
@@ -101,7 +102,22 @@ def _table(group: str, rows: list[Row], results: Results) -> str:
         shown = word if word == "met" else f"**{word}**"
         cells = (row.what, value, spread, goal(row), shown, detail.replace("|", "/"), f"`{row.name}`")
         lines.append(f"| {' | '.join(cells)} |")
-    return "\n".join(lines) + "\n"
+    return "\n".join([*lines, *_reasons(rows, results)]) + "\n"
+
+
+def _reasons(rows: list[Row], results: Results) -> list[str]:
+    """Of those that are missed: where the time goes."""
+    missed = {row.name for row in rows if verdict(row, results.rows.get(row.name)) == "missed"}
+    reasons = [reason for reason in REASONS if missed & set(reason.rows)]
+    unexplained = sorted(missed - {name for reason in reasons for name in reason.rows})
+    lines = [f"Missed, {_names(sorted(missed & set(reason.rows)))}: {reason.text}" for reason in reasons]
+    if unexplained:
+        lines.append(f"Missed, {_names(unexplained)}: no profile says why yet.")
+    return [part for line in lines for part in ("", line)]
+
+
+def _names(names: list[str]) -> str:
+    return ", ".join(f"`{name}`" for name in names)
 
 
 def _machines(results: Results) -> str:
@@ -109,6 +125,6 @@ def _machines(results: Results) -> str:
     kept = sorted(results.rows.values(), key=lambda each: (each.machine, each.date, each.commit, each.name))
     lines = ["## Where and when", ""]
     for (machine, date, commit), rows in groupby(kept, key=lambda each: (each.machine, each.date, each.commit)):
-        names = ", ".join(f"`{each.name}`" for each in rows)
+        names = _names([each.name for each in rows])
         lines += [f"- {date}, commit {commit}, {machine}: {names}."]
     return "\n".join(lines) + "\n"
