@@ -165,7 +165,7 @@ def retreat(status):
 @helper
 def reason(status):
     """What a step that gets too short reports: the failure that shortened it, or that steps do."""
-    return STEP_TOO_SMALL if status == OK or status == NOT_CONVERGED else status
+    return STEP_TOO_SMALL if status in (OK, NOT_CONVERGED) else status
 
 
 @helper
