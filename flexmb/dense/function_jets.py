@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.polynomial import Polynomial
-from scipy.interpolate import make_interp_spline
 
 from flexmb.dense.jets import Jet, chain, constant, polynomial
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
@@ -38,5 +37,7 @@ def profile(function: Function, t: float) -> Jet:
         case Pulse(value=value, start_s=start, duration_s=duration):
             return constant(value if start <= t < start + duration else 0.0)
         case Table(times_s=times, values=values):
+            from scipy.interpolate import make_interp_spline  # slow to import, and few scenes have tables
+
             spline = make_interp_spline(times, values, k=5)
             return Jet(spline(t), spline(t, 1), spline(t, 2))

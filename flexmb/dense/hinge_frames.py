@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
 from flexmb.dense.jets import Jet, MovingFrame, constant, product, rotation_about, skew
 from flexmb.scene import schema as s
@@ -77,10 +76,16 @@ def _floating(c: Jet) -> MovingFrame:
 
 def _attitude(quaternion: Real, w: Real, w_rate: Real) -> Jet:
     """R of a scalar-first quaternion with angular velocity w in turning axes: R' = R w~, R'' = R (w~ w~ + dw/dt~)."""
-    q0, qv = quaternion[0, 0, 0], quaternion[0, 0, 1:]
-    R = (q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)
-    R = R[None, None] / np.sum(quaternion**2)
+    R = rotation_of(quaternion[0, 0])[None, None]
     return Jet(R, R @ skew(w), R @ (skew(w) @ skew(w) + skew(w_rate)))
+
+
+def rotation_of(quaternion: ArrayLike) -> Real:
+    """R (3,3) of a scalar-first quaternion (4,) of any length but zero."""
+    x = np.asarray(quaternion)
+    q0, qv = x[0], x[1:]
+    R = (q0 * q0 - qv @ qv) * np.eye(3) + 2.0 * np.outer(qv, qv) + 2.0 * q0 * skew(qv)
+    return np.asarray(R / np.sum(x**2))
 
 
 def coordinate_rates(hinge: Item, q: Real, u: Real) -> Real:
@@ -112,6 +117,8 @@ def ball_energy(hinge: Item, q: Real) -> float:
 
 def _rotation_vector(quaternion: Real) -> Real:
     """Rotation vector (3,) of a scalar-first quaternion, of length at most pi."""
+    from scipy.spatial.transform import Rotation  # slow to import, and only springs of balls need it
+
     return Rotation.from_quat(quaternion, scalar_first=True).as_rotvec()
 
 

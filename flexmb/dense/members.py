@@ -11,9 +11,8 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.spatial.transform import Rotation
 
-from flexmb.dense.hinge_frames import hinge_sizes
+from flexmb.dense.hinge_frames import hinge_sizes, rotation_of
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
@@ -160,11 +159,7 @@ def _scalar(owner: str, q: int, u: int, c: Coordinate) -> ScalarSpeed:
 
 
 def _seat(model: FlexibleModel, node: str, offset: ArrayLike = ZERO, quaternion: ArrayLike = IDENTITY) -> Seat:
-    return Seat(model.nodes[node], np.array(offset, dtype=float), _matrix(quaternion))
-
-
-def _matrix(quaternion: ArrayLike) -> Real:
-    return Rotation.from_quat(np.asarray(quaternion, dtype=float), scalar_first=True).as_matrix()
+    return Seat(model.nodes[node], np.array(offset, dtype=float), rotation_of(quaternion))
 
 
 def _model(body: s.Body, folder: Path | None) -> FlexibleModel:
@@ -183,7 +178,7 @@ def rigid_model(
     """A body without modes: one point at its centre of mass."""
     none = np.zeros((3, 0))
     nodes = {
-        name: FlexibleNode(np.array(position, dtype=float), _matrix(quaternion), none, none)
+        name: FlexibleNode(np.array(position, dtype=float), rotation_of(quaternion), none, none)
         for name, (position, quaternion) in frames.items()
     }
     return FlexibleModel(

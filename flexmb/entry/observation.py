@@ -15,9 +15,8 @@ from flexmb.entry.articulated import world_loads
 from flexmb.jain.accelerations import acceleration_sweep
 from flexmb.jain.balance import energy_and_momentum
 from flexmb.jain.kinematics import pose_sweep, velocity_sweep
-from flexmb.jain.loads import drive_loads, hinge_loads, wheel_load
+from flexmb.jain.loads import hinge_loads, wheel_load
 from flexmb.jain.ports import port_acceleration, port_velocity
-from flexmb.jain.sweeps import forward_dynamics
 from flexmb.jit.bundle import bundle
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
@@ -26,7 +25,6 @@ from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import store6, times6
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
 from flexmb.tables.features import WHEELS
-from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 Places = dict[str, tuple[slice, tuple[int, ...]]]
@@ -81,13 +79,11 @@ def outputs(of: Mapping[str, tuple[int, ...]], marker_body: Index, marker_port: 
 
 
 @kernel
-def observe(t, y, c, w, out):
-    """Everything observable at one state by the recursion; w.speed is filled as well. Returns a status code."""
-    load_state(t, y, c, w)
-    status = forward_dynamics(c, w)
-    if status != OK:
-        return status
-    drive_loads(c, w)
+def observe(c, w, out):
+    """Everything observable where the right-hand side of the recursion was just evaluated, with status OK.
+
+    Not by itself at a state: a run needs the right-hand side compiled anyway, and the recursion in it is most of both.
+    """
     pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, out.loads)
@@ -95,23 +91,14 @@ def observe(t, y, c, w, out):
         out.rates[j] = w.speed[j].acceleration
         out.drives[j] = w.speed[j].drive
     _observe_motion(c, w, out)
-    return OK
 
 
 @kernel
-def free_loads(t, y, c, w, loads):
-    """Loads (N,6) across all hinges in the free motion by the recursion, World axes; returns a status code.
-
-    A part of what `observe` finds, for who asks for no more: half of that is left to compile.
-    """
-    load_state(t, y, c, w)
-    status = forward_dynamics(c, w)
-    if status != OK:
-        return status
+def transmitted(c, w, loads):
+    """Loads (N,6) across all hinges, World axes: the part of what `observe` finds for who asks for no more."""
     pose_sweep(c, w)
     hinge_loads(c, w)
     world_loads(c, w, loads)
-    return OK
 
 
 @kernel

@@ -90,8 +90,10 @@ def error_norm(y, y_new, h, k, accuracy):
     sum5, sum3 = 0.0, 0.0
     for i in range(accuracy.controlled):
         scale = accuracy.atol + accuracy.rtol * max(abs(y[i]), abs(y_new[i]))
-        sum5 += (weighted_sum(E5, E5.shape[0], k, i) / scale) ** 2
-        sum3 += (weighted_sum(E3, E3.shape[0], k, i) / scale) ** 2
+        error5 = weighted_sum(E5, E5.shape[0], k, i) / scale
+        error3 = weighted_sum(E3, E3.shape[0], k, i) / scale
+        sum5 += error5 * error5
+        sum3 += error3 * error3
     if sum5 == 0.0 and sum3 == 0.0:
         return 0.0
     return h * sum5 / math.sqrt((sum5 + 0.01 * sum3) * accuracy.controlled)

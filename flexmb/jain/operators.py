@@ -18,7 +18,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag, cho_factor, cho_solve
 
 from flexmb.dense.dense_system import DenseSystem, Instant
 from flexmb.dense.function_jets import profile
@@ -108,6 +107,8 @@ class Operators:
     @cached_property
     def _articulated(self) -> tuple[Real, Real, Real]:
         """P (nbar,nbar), D^-1 (n,n) and G (nbar,n) by the recursion (51), tips to base."""
+        from scipy.linalg import cho_factor, cho_solve  # slow to import, and those who ask for H or M_m wait for none
+
         P, G, D_inverse = self.M_m.copy(), np.zeros_like(self.H.T), np.zeros((len(self.H), len(self.H)))
         for k in reversed(range(len(self.parent))):
             rows, columns = self.rows[k], self.columns[k]
@@ -256,8 +257,9 @@ class SpatialOperators:
         )  # fmt: skip
         V_m = kinematics.Phi.T @ (kinematics.H.T @ now.u)
         M_m, b_m = self._inertia(now, columns, V_m)
-        deformation, damping = none.copy(), none.copy()
+        deformation, damping, K_m = none.copy(), none.copy(), nbar.copy()
         for m, member, at in zip(modes, members, columns, strict=True):
+            K_m[at, at][:m, :m] = member.model.stiffness
             deformation[at][:m] = q[member.q_modes]
             damping[at][:m] = member.model.damping @ u[member.u_modes]
         return replace(
@@ -265,7 +267,7 @@ class SpatialOperators:
             M_m=M_m,
             a_m=rate(E_Phi).T @ V_m + rate(H).T @ now.u,
             b_m=b_m + damping - self._external(now, t, columns, M_m),
-            K_m=block_diag(*(block_diag(member.model.stiffness, np.zeros((6, 6))) for member in members)),
+            K_m=K_m,
             deformation=deformation,
             V_m=V_m,
         )
@@ -277,7 +279,8 @@ class SpatialOperators:
         linear = Instant(tree, now.q, now.u, np.zeros(tree.nu)).first_order if tree.linear else {}
         for k, at in enumerate(columns):
             if k in linear:
-                to_world = block_diag(np.eye(at.stop - at.start - 6), linear[k].rotation, linear[k].rotation)
+                to_world = np.eye(at.stop - at.start)
+                to_world[-6:-3, -6:-3] = to_world[-3:, -3:] = linear[k].rotation
                 M_m[at, at], b_m[at] = to_world @ linear[k].M @ to_world.T, to_world @ linear[k].bias
             else:
                 body = now.nodal_body(k)

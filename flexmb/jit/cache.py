@@ -30,6 +30,7 @@ from numba.core.runtime.nrt import rtsys
 from numba.core.serialize import dumps
 from numba.core.sigutils import normalize_signature
 
+from flexmb.jit.collector import no_searches
 from flexmb.jit.fingerprint import fingerprint
 from flexmb.jit.folder import delete_unused, mark_used, warn_once
 from flexmb.jit.once import compiled_once
@@ -84,7 +85,7 @@ class KernelCache(NullCache):
             file = self._file(signature, kernel.targetctx.codegen())
             if file.is_file():
                 return plain(signature)
-            with global_compiler_lock, announced(self._function, self._folder), compiled_once(file):
+            with global_compiler_lock, announced(self._function, self._folder), compiled_once(file), no_searches():
                 return plain(signature)
 
         return compile_once

@@ -32,7 +32,7 @@ import numpy as np
 
 _BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
 _ROOM = Path(__file__).parent
-_COMPILE_NOTHING = {"__init__", "counting", "once", "progress"}  # files of this room
+_COMPILE_NOTHING = {"__init__", "collector", "counting", "once", "progress"}  # files of this room
 _PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
 _KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
 _CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]

@@ -59,7 +59,7 @@ class Integration:
         else:
             self._problem = problem(*motion)
         batched = algorithm.observing is not None and not system.scene.closures
-        self.batch = batch(system, algorithm.observing, constants, self._workspace) if batched else None
+        self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
         """Observes many samples at once."""
         self._enter: Any = None
 

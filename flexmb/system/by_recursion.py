@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from flexmb.entry import articulated
 from flexmb.entry.observation import observe
 from flexmb.motion import coordinates
@@ -26,9 +28,10 @@ def _fresh(system: Mechanics) -> tuple[Any, Any]:
 
 def _observe(system: Mechanics, t: float, y: Real) -> None:
     w = system._recursion_w
-    status = system._observe_recursion(t, y)
+    status = system._recur(t, y, np.empty_like(y))
     if status != OK:
         system._check(status, int(w.fault[0]))
+    system._observe_recursion()
     system._trust(t, y, w)
 
 

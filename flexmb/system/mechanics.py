@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flexmb.entry import articulated, composite, unsplit
 from flexmb.entry.consistent import consistent_accelerations, held_hinges
-from flexmb.entry.observation import Outputs, observe, observe_motion
+from flexmb.entry.observation import Outputs, observe, observe_motion, transmitted
 from flexmb.jain.places import Matrices, matrices
 from flexmb.jain.unsplit import Joint
 from flexmb.jit.direct import Direct, direct
@@ -210,9 +210,19 @@ class Mechanics:
     # Kernels with the tables that they are called with, found when first asked for: that compiles them
 
     @cached_property
+    def _recur(self) -> Direct:
+        """(t, y, dy): the right-hand side by the recursion; a status code."""
+        return direct(articulated.rhs, STATUS, REAL, VECTOR, VECTOR, self.recursion_constants, self._recursion_w)
+
+    @cached_property
     def _observe_recursion(self) -> Direct:
-        """(t, y): everything observable by the recursion; a status code."""
-        return direct(observe, STATUS, REAL, VECTOR, self.recursion_constants, self._recursion_w, self._out)
+        """(): everything observable where `_recur` was just evaluated."""
+        return direct(observe, NOTHING, self.recursion_constants, self._recursion_w, self._out)
+
+    @cached_property
+    def _transmit(self) -> Direct:
+        """(loads): those of all hinges where `_recur` was just evaluated."""
+        return direct(transmitted, NOTHING, self.recursion_constants, self._recursion_w, MATRIX)
 
     @cached_property
     def _observe_motion(self) -> Direct:

@@ -21,7 +21,6 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
-from flexmb.entry.observation import free_loads
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
@@ -214,7 +213,7 @@ class System(Mechanics):
         """
         initial, w = self.initial_state, self._recursion_w
         t, y = self.layout.entering(initial)
-        status = articulated.rhs(t, y, np.empty_like(y), self.recursion_constants, w)
+        status = self._recur(t, y, np.empty_like(y))
         return None if status == OK and not w.doubt[0] else self.precision(initial)
 
     @cached_property
@@ -247,8 +246,9 @@ class System(Mechanics):
     def _free_loads(self, t: float, y: Real) -> Real:
         """(N,6) of the free motion, World axes."""
         loads, w = np.zeros((len(self._links), 6)), self._recursion_w
-        self._check(free_loads(t, y, self.recursion_constants, w, loads), int(w.fault[0]))
+        self._check(self._recur(t, y, np.empty_like(y)), int(w.fault[0]))
         self._trust(t, y, w)
+        self._transmit(loads)
         return loads
 
     def _by_hinge(self, loads: Real) -> dict[str, Real]:

@@ -16,7 +16,8 @@ def soundness(values, quaternions):
             return NOT_FINITE
     for k in range(quaternions.shape[0]):
         i = quaternions[k]
-        norm2 = values[i] ** 2 + values[i + 1] ** 2 + values[i + 2] ** 2 + values[i + 3] ** 2
+        q0, q1, q2, q3 = values[i], values[i + 1], values[i + 2], values[i + 3]
+        norm2 = q0 * q0 + q1 * q1 + q2 * q2 + q3 * q3  # a power would be a function of numba's to compile first
         if not SHORTEST < norm2 < LONGEST:
             return NO_ORIENTATION
     return SOUND

@@ -72,11 +72,14 @@ def crosscheck(out: Path, *options: str) -> Sequence[str]:
 def run(command: Sequence[str], kernels: Path | None = None) -> Spent:
     """A process in the root of the repository, with its own folder of kernels, unless it is to use that of the user.
 
+    It keeps the bytecode of what it imports, as Python does by itself, whatever the environment of the benchmarks says:
+    a process that parses all sources anew is no second one.
     Raises CalledProcessError where it fails; what it printed is part of it.
     """
     from resource import RUSAGE_CHILDREN, getrusage  # Unix only, as most peers are
 
     environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    environment.pop("PYTHONDONTWRITEBYTECODE", None)
     if kernels is not None:
         environment["NUMBA_CACHE_DIR"] = str(kernels)
     before, start = getrusage(RUSAGE_CHILDREN), perf_counter()

@@ -43,6 +43,11 @@ def test_the_first_results_of_a_flexible_scene_load_nothing_slow():
     assert loaded(FLEXIBLE) == []
 
 
+def test_operators_load_their_equations_and_no_slow_library():
+    asked = FLEXIBLE + "\nsystem.operators(state).inverse_dynamics(system.accelerations(state))\n"
+    assert loaded(asked) == ["flexmb.dense.dense_system", "flexmb.jain.operators"]
+
+
 def test_the_count_sees_what_is_loaded():
-    asked = FLEXIBLE + "\nsystem.operators(state)\n"
+    asked = FLEXIBLE + "\nsystem.operators(state).P\n"
     assert {"scipy.linalg", "flexmb.dense.dense_system", "flexmb.jain.operators"} <= set(loaded(asked))
