@@ -228,7 +228,8 @@ def _sine_cosine(context, builder, sig, args):
     both = context.get_function(sincos, signature(types.UniTuple(types.float64, 2), types.float64))(builder, [x])
     s, c = cgutils.unpack_tuple(builder, both)
     sine = _dual(builder, s, _scaled(builder, c, dx))
-    return context.make_tuple(builder, sig.return_type, (sine, _dual(builder, c, _scaled(builder, builder.fneg(s), dx))))
+    cosine = _dual(builder, c, _scaled(builder, builder.fneg(s), dx))
+    return context.make_tuple(builder, sig.return_type, (sine, cosine))
 
 
 @infer_global(seeded)

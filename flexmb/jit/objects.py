@@ -80,7 +80,7 @@ _FAST, _WITH_NAMES = 0x0080, 0x0002
 _methods: dict[int, _Method] = {}  # held as long as the process, as the kernels are
 
 
-class Place(np.ndarray):
+class Anchor(np.ndarray):
     """The table of a bundle as the `self` of a builtin; it holds all that is reached from there."""
 
     held: tuple[Any, ...]
@@ -89,11 +89,11 @@ class Place(np.ndarray):
 def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
     """The kernel at an address as a function of Python.
 
-    Four whole numbers enter it: address of a Place, address of the arguments, how many they are by position, and the
+    Four whole numbers enter it: address of an Anchor, address of the arguments, how many they are by position, and the
     address of the names of those that come by name, or 0. It returns the address of an object, as a new reference, or 0
     after an error.
     """
-    place = bundle._table.view(Place)
+    place = bundle._table.view(Anchor)
     place.held = bundle, held
     if address not in _methods:
         _methods[address] = _Method(b"evaluator", address, _FAST | _WITH_NAMES, None)
@@ -105,7 +105,7 @@ def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
 
 @helper
 def bundle_of(place):
-    """Address of the bundle that a Place is the table of."""
+    """Address of the bundle that an Anchor is the table of."""
     return word_at(place, _DATA)
 
 

@@ -117,7 +117,7 @@ def _plus_cross_sym(b, p, c):
 def shift_inertia(p, d):
     """phi P phi': inertia about Q of a body known about O, with d from Q to O (same axes).
 
-    C_Q = C, B_Q = B + skew(d) C, A_Q = A - B_Q skew(d) - (B skew(d))' = A - B skew(d) - (B skew(d))' - skew(d) C skew(d).
+    C_Q = C, B_Q = B + skew(d) C, A_Q = A - B_Q skew(d) - (B skew(d))'.
     """
     a, b, c = p
     x, y, z = d
@@ -161,9 +161,9 @@ def outer_inertia(x, y, s):
 
 
 @helper
-def less_outer(p, g, f):
-    """P - g f' for spatial vectors g and f of one direction: what an axis takes with it."""
-    (a, b, c), (u, v), (x, y) = p, g, f
+def less_outer(p, gain, force):
+    """P - gain force', for spatial vectors of one direction: what an axis takes with it."""
+    (a, b, c), (u, v), (x, y) = p, gain, force
     angular = (
         a[0] - u[0] * x[0], a[1] - u[1] * x[1], a[2] - u[2] * x[2],
         a[3] - u[0] * x[1], a[4] - u[0] * x[2], a[5] - u[1] * x[2],

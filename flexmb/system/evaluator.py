@@ -47,7 +47,7 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
 
 
 class _Careful:
-    """The same evaluation step by step, for arguments in another form, and for all that there is something to say of."""
+    """The same step by step, for arguments in another form, and for all that there is something to say of."""
 
     def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
         self._system, self._w = system, tables[1]

@@ -1,7 +1,5 @@
 """Lanes: eight copies of a number, against numpy on the arrays that they come from."""
 
-import math
-
 import numpy as np
 import pytest
 from numba.core.errors import TypingError
