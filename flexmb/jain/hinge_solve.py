@@ -27,7 +27,7 @@ from flexmb.jain.variants import to_parent
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import kept, some
-from flexmb.spatial.inertia import inertia_column, inertia_times, load_inertia, outer_inertia, sum_inertia
+from flexmb.spatial.inertia import inertia_column, inertia_times, less_outer, load_inertia, outer_inertia, sum_inertia
 from flexmb.spatial.pivots import is_inertia, is_small
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, scale6, store6, sum6, vec6
@@ -88,10 +88,10 @@ def eliminate(c, w, k):
     w.body[k].free_count = SINGLE
     w.body[k].inertia_along = D
     w.body[k].rate_at_rest = epsilon * s
-    store6(w.body[k].gain, 0, scale6(s, PH))
+    G = scale6(s, PH)
+    store6(w.body[k].gain, 0, G)
     if c.body[k].parent >= 0:
-        z = axpy6(epsilon * s, PH, z)
-        to_parent(c, w, k, sum_inertia(P, outer_inertia(PH[0], PH[1], -s)), z, row)
+        to_parent(c, w, k, less_outer(P, G, PH), axpy6(epsilon, G, z), row)
     return True
 
 

@@ -45,6 +45,7 @@ def velocity_sweep(c, w, shape, rates):
     `shape` and `rates` say whether a ruthless body shows its true eta and etadot or zero: neither in the equations of
     motion, the rates in kinetic energy and momentum (T = 1/2 u' M u), both for markers. What is at rest stays so.
     """
+    axis.turn(c, w)
     displaced = shape or rates or w.displaced[0] != 0
     for k in range(c.body.shape[0]):
         move_body(c, w, k, shape, rates, displaced)

@@ -7,6 +7,7 @@ enters as acceleration -g of the ground.
 
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
+from flexmb.jain.axis import turn
 from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import move_body, pose_body
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
@@ -35,6 +36,7 @@ def forward_dynamics(c, w):
 def bodies(c, w):
     """Motion, inertia and forces of all bodies by themselves, before any is eliminated; returns a status code."""
     hinge_forces(c, w)
+    turn(c, w)
     displaced = w.displaced[0] != 0
     for k in range(c.body.shape[0]):  # all of a body at once, while its rows are at hand
         move_body(c, w, k, False, False, displaced)

@@ -7,10 +7,12 @@ bundle.py       many arrays as one argument
 tables.py       arrays of bundles inside kernels
 lanes.py        eight copies of a number as one value, and masks: how kernels run eight scenes at once
 lane_functions.py  their elementary functions
+sine_cosine.py  sine and cosine of floats and lanes, without a call
 duals.py        a number and its derivatives along eight directions: eight columns of a Jacobian at once
 wide_arrays.py  arrays of lanes and duals
 pointer.py      kernels as arguments of kernels
 direct.py       kernels called by address, from Python and from kernels
+objects.py      kernels as functions of the interpreter: what they read of Python's objects
 parts.py        helpers are compiled into their callers only
 cache.py        compiled kernels on disk
 fingerprint.py  the key of a compiled kernel: the code that it reaches

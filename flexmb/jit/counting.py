@@ -21,6 +21,8 @@ import numpy as np
 _OF_THE_PACKAGE = f"{__name__.partition('.')[0]}."  # how names of its modules begin
 _CHOOSERS = {f"{__package__}.kernel", f"{__package__}.numbered"}  # where functions are made that choose
 
+_LANES = f"{__package__}.lanes"  # where functions are Python beside what they are compiled to
+
 
 @dataclass(frozen=True)
 class Operations:
@@ -155,6 +157,8 @@ class _Interpreter:
         if isinstance(function, FunctionType):
             return self._function(function)
         if isinstance(thing, FunctionType) and thing.__closure__ and thing.__module__ in _CHOOSERS:
+            return self._function(thing)
+        if isinstance(thing, FunctionType) and thing.__module__ == _LANES:
             return self._function(thing)
         if isinstance(thing, tuple):
             return tuple(map(self, thing)) if all(callable(each) for each in thing) else thing

@@ -15,11 +15,12 @@ from typing import Any
 
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.typeconv import Conversion
 from numba.core.typing.templates import AbstractTemplate, AttributeTemplate, infer_global, signature
 from numba.extending import infer_getattr, lower_builtin, lower_cast, lower_getattr, models, register_model
 
-from flexmb.jit.lanes import LANE, LANES, repeated
+from flexmb.jit.lanes import LANE, LANES, repeated, sincos
 
 
 class DualType(types.Type):
@@ -212,6 +213,23 @@ def _arc_tangent(context, builder, sig, args):
     inverse = builder.fdiv(_NUMBER(1.0), builder.fadd(builder.fmul(x, x), builder.fmul(y, y)))
     rates = _scaled(builder, inverse, builder.fsub(_scaled(builder, x, dy), _scaled(builder, y, dx)))
     return _dual(builder, _caller(context, builder)(math.atan2, y, x), rates)
+
+
+@infer_global(sincos)
+class _SineCosine(AbstractTemplate):
+    def generic(self, args, kws):
+        if args == (DUAL,):
+            return signature(types.UniTuple(DUAL, 2), DUAL)
+
+
+@lower_builtin(sincos, DualType)
+def _sine_cosine(context, builder, sig, args):
+    x, dx = _parts(builder, args[0])
+    both = context.get_function(sincos, signature(types.UniTuple(types.float64, 2), types.float64))(builder, [x])
+    s, c = cgutils.unpack_tuple(builder, both)
+    sine = _dual(builder, s, _scaled(builder, c, dx))
+    cosine = _dual(builder, c, _scaled(builder, builder.fneg(s), dx))
+    return context.make_tuple(builder, sig.return_type, (sine, cosine))
 
 
 @infer_global(seeded)

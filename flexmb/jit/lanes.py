@@ -17,6 +17,7 @@ from __future__ import annotations
 
 import math
 import operator
+from math import cos, sin
 from typing import Any
 
 from llvmlite import ir
@@ -101,7 +102,13 @@ def kept(truth: Any, a: Any) -> Any:
 
 def sincos(x: Any) -> Any:
     """(sin x, cos x)."""
-    return math.sin(x), math.cos(x)
+    return sin(x), cos(x)
+
+
+def sines(x: Any, sine: Any, cosine: Any, count: int) -> None:
+    """Sine and cosine of the first `count` numbers of a table (n,), floats by LANES: n is a multiple of it for them."""
+    for i in range(count):
+        sine[i], cosine[i] = sincos(x[i])
 
 
 def repeated(builder: Any, value: Any) -> Any:

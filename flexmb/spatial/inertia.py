@@ -97,36 +97,19 @@ def rotate_without(r, p, row):
 
 
 @helper
-def _cross_sym(p, c):
-    """skew(p) C for a symmetric 6-tuple C, as a 9-tuple."""
+def _plus_cross_sym(b, p, c):
+    """B + skew(p) C for a symmetric 6-tuple C."""
     x, y, z = p
     return (
-        y * c[4] - z * c[3],
-        y * c[5] - z * c[1],
-        y * c[2] - z * c[5],
-        z * c[0] - x * c[4],
-        z * c[3] - x * c[5],
-        z * c[4] - x * c[2],
-        x * c[3] - y * c[0],
-        x * c[1] - y * c[3],
-        x * c[5] - y * c[4],
-    )
-
-
-@helper
-def _times_cross(m, p):
-    """M skew(p)."""
-    x, y, z = p
-    return (
-        m[1] * z - m[2] * y,
-        m[2] * x - m[0] * z,
-        m[0] * y - m[1] * x,
-        m[4] * z - m[5] * y,
-        m[5] * x - m[3] * z,
-        m[3] * y - m[4] * x,
-        m[7] * z - m[8] * y,
-        m[8] * x - m[6] * z,
-        m[6] * y - m[7] * x,
+        b[0] + y * c[4] - z * c[3],
+        b[1] + y * c[5] - z * c[1],
+        b[2] + y * c[2] - z * c[5],
+        b[3] + z * c[0] - x * c[4],
+        b[4] + z * c[3] - x * c[5],
+        b[5] + z * c[4] - x * c[2],
+        b[6] + x * c[3] - y * c[0],
+        b[7] + x * c[1] - y * c[3],
+        b[8] + x * c[5] - y * c[4],
     )
 
 
@@ -134,33 +117,20 @@ def _times_cross(m, p):
 def shift_inertia(p, d):
     """phi P phi': inertia about Q of a body known about O, with d from Q to O (same axes).
 
-    C_Q = C, B_Q = B + skew(d) C, A_Q = A - B skew(d) - (B skew(d))' - skew(d) C skew(d).
+    C_Q = C, B_Q = B + skew(d) C, A_Q = A - B_Q skew(d) - (B skew(d))'.
     """
     a, b, c = p
-    dc = _cross_sym(d, c)
-    bq = (
-        b[0] + dc[0],
-        b[1] + dc[1],
-        b[2] + dc[2],
-        b[3] + dc[3],
-        b[4] + dc[4],
-        b[5] + dc[5],
-        b[6] + dc[6],
-        b[7] + dc[7],
-        b[8] + dc[8],
+    x, y, z = d
+    q = _plus_cross_sym(b, d, c)
+    about = (
+        a[0] - (b[1] + q[1]) * z + (b[2] + q[2]) * y,
+        a[1] - (b[5] + q[5]) * x + (b[3] + q[3]) * z,
+        a[2] - (b[6] + q[6]) * y + (b[7] + q[7]) * x,
+        a[3] - b[4] * z + b[5] * y - q[2] * x + q[0] * z,
+        a[4] - b[7] * z + b[8] * y - q[0] * y + q[1] * x,
+        a[5] - b[8] * x + b[6] * z - q[3] * y + q[4] * x,
     )
-    # A_Q = A - B_Q skew(d) - (B skew(d))'
-    m = _times_cross(bq, d)
-    n = _times_cross(b, d)
-    aq = (
-        a[0] - m[0] - n[0],
-        a[1] - m[4] - n[4],
-        a[2] - m[8] - n[8],
-        a[3] - m[1] - n[3],
-        a[4] - m[2] - n[6],
-        a[5] - m[5] - n[7],
-    )
-    return aq, bq, c
+    return about, q, c
 
 
 @helper
@@ -188,6 +158,26 @@ def outer_inertia(x, y, s):
         ),
         (s * y[0] * y[0], s * y[1] * y[1], s * y[2] * y[2], s * y[0] * y[1], s * y[0] * y[2], s * y[1] * y[2]),
     )
+
+
+@helper
+def less_outer(p, gain, force):
+    """P - gain force', for spatial vectors of one direction: what an axis takes with it."""
+    (a, b, c), (u, v), (x, y) = p, gain, force
+    angular = (
+        a[0] - u[0] * x[0], a[1] - u[1] * x[1], a[2] - u[2] * x[2],
+        a[3] - u[0] * x[1], a[4] - u[0] * x[2], a[5] - u[1] * x[2],
+    )  # fmt: skip
+    coupling = (
+        b[0] - u[0] * y[0], b[1] - u[0] * y[1], b[2] - u[0] * y[2],
+        b[3] - u[1] * y[0], b[4] - u[1] * y[1], b[5] - u[1] * y[2],
+        b[6] - u[2] * y[0], b[7] - u[2] * y[1], b[8] - u[2] * y[2],
+    )  # fmt: skip
+    linear = (
+        c[0] - v[0] * y[0], c[1] - v[1] * y[1], c[2] - v[2] * y[2],
+        c[3] - v[0] * y[1], c[4] - v[0] * y[2], c[5] - v[1] * y[2],
+    )  # fmt: skip
+    return angular, coupling, linear
 
 
 @helper

@@ -7,15 +7,7 @@ derivatives.
 
 from math import atan2, cos, sin, sqrt
 
-from flexmb.jit import lane_functions
-from flexmb.jit.kernel import by_number, helper
+from flexmb.jit import lane_functions  # noqa: F401  (what they are of lanes, and how `sincos` is compiled)
+from flexmb.jit.lanes import sincos, sines
 
-__all__ = ["atan2", "cos", "sin", "sincos", "sqrt"]
-
-
-@helper
-def _sincos(x):
-    return sin(x), cos(x)
-
-
-sincos = by_number(_sincos, lane_functions.sincos)  # both, which lanes find together
+__all__ = ["atan2", "cos", "sin", "sincos", "sines", "sqrt"]

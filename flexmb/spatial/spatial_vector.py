@@ -6,7 +6,7 @@ for three components. phi is Jain and Rodriguez' shift operator (4) of a point O
 """
 
 from flexmb.jit.kernel import helper
-from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, sub, times, times_t, vec3
+from flexmb.spatial.vector import add, add3, axpy, cross, dot, plus_cross, scale, store3, sub, times, times_t, vec3
 
 ZERO6 = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
@@ -80,19 +80,19 @@ def times6_t(R, V):
 @helper
 def shift_motion(V, d):
     """phi' V: the motion of O as a point of a body whose motion is known about Q."""
-    return V[0], add(V[1], cross(V[0], d))
+    return V[0], plus_cross(V[1], V[0], d)
 
 
 @helper
 def shift_acceleration(A, V, d):
     """Acceleration of O as a point of a body that moves by V, A about Q: phi' A and the centripetal w x (w x d)."""
-    return A[0], add(A[1], add(cross(A[0], d), cross(V[0], cross(V[0], d))))
+    return A[0], plus_cross(plus_cross(A[1], A[0], d), V[0], cross(V[0], d))
 
 
 @helper
 def shift_force(F, d):
     """phi F: the force about Q of one that is known about O."""
-    return add(F[0], cross(d, F[1])), F[1]
+    return plus_cross(F[0], d, F[1]), F[1]
 
 
 @helper

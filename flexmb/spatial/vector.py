@@ -45,6 +45,12 @@ def cross(a, b):
 
 
 @helper
+def plus_cross(a, b, c):
+    """a + b x c; in this order two fused operations a component."""
+    return a[0] + b[1] * c[2] - b[2] * c[1], a[1] + b[2] * c[0] - b[0] * c[2], a[2] + b[0] * c[1] - b[1] * c[0]
+
+
+@helper
 def mat3(a, i):
     """Elements i .. i+8 of a 1-D array as a matrix."""
     return a[i], a[i + 1], a[i + 2], a[i + 3], a[i + 4], a[i + 5], a[i + 6], a[i + 7], a[i + 8]

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
-from flexmb.entry.gate import DOUBTED, OVERFLOWN, REFUSED, accelerations, gate
-from flexmb.jit.direct import ADDRESS, addresses, bound, settled
+import numpy as np
+
+from flexmb.entry.gate import gate
+from flexmb.jit.direct import addresses, direct
+from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.system.mechanics import Mechanics
@@ -14,47 +18,50 @@ from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 
-class Evaluator:
+class Evaluator(partial):  # a partial, so that a call takes no way through Python
     """`evaluator(t, q, u)`: udot (nu,) at time t (s), q (nq,) and u (nu,), in an array that every call writes anew.
 
     `System.evaluator` makes one. The array, `accelerations`, is for reading; copy what is to be kept. Arrays of floats
     in C order go in as they are; what else `System.evaluate` takes is converted. An evaluator writes into its own
-    workspace: one per thread.
+    workspace: one per thread. Raises ValueError, TypeError and DynamicsError as `System.evaluate` does.
     """
 
-    def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
-        """tables: what the algorithm's kernel takes after t and y, the workspace second."""
-        self._system, self._algorithm, self._w = system, algorithm, tables[1]
-        behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
-        passed = gate(system.layout.quaternions, system.nq, self._w.speed, self._w.doubt, behind)
-        entry = settled(accelerations, ADDRESS, REAL, VECTOR, VECTOR)
-        self._enter = bound(entry, (passed._address,), passed, tables)  # type: ignore[attr-defined]
-        self.accelerations: Real = passed.rates.view()
-        self.accelerations.flags.writeable = False
+    accelerations: Real
+    _system: Mechanics
+    _algorithm: DynamicsAlgorithm
 
-    def __call__(self, t: float, q: Real, u: Real) -> Real:
-        """Raises ValueError, TypeError and DynamicsError as `System.evaluate` does."""
-        try:
-            status = self._enter(t, q, u) if type(t) is float else REFUSED
-        except TypeError:  # arrays of another type
-            status = REFUSED
-        if status != OK:
-            self._look_into(status, t, q, u)
-        return self.accelerations
+    def __new__(cls, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> Evaluator:
+        """tables: what the algorithm's kernel takes after t and y, the workspace second."""
+        careful, w = _Careful(system, algorithm, tables), tables[1]
+        call: Any = careful
+        if readable():
+            behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
+            call = gate(system.layout.quaternions, careful.shown, system.nq, w.speed, w.doubt, behind, careful)
+        self = super().__new__(cls, call)
+        self.accelerations, self._system, self._algorithm = careful.shown, system, algorithm
+        return self
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is made by the copied system."""
         return self._system.evaluator, (self._algorithm.name,)
 
-    def _look_into(self, status: int, t: Any, q: Any, u: Any) -> None:
-        """Raise the error of a status code, or have what was refused in the form that is needed."""
-        system = self._system
-        t, y = system.layout.packed(t, q, u)
-        if status == REFUSED:
-            status = self._enter(t, y[: system.nq], y[system.nq : -1])
-        if status == OVERFLOWN:
-            finite_result(self.accelerations, t)
-        elif status == DOUBTED:
-            system._trust(t, y, self._w)
-        elif status != OK:
-            system._check(status, int(self._w.fault[0]))
+
+class _Careful:
+    """The same step by step, for arguments in another form, and for all that there is something to say of."""
+
+    def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
+        self._system, self._w = system, tables[1]
+        self._evaluate = direct(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
+        self._rates = np.zeros(system.nu)
+        self.shown = self._rates.view()
+        self.shown.flags.writeable = False
+
+    def __call__(self, t: Any, q: Any, u: Any) -> Real:
+        t, y = self._system.layout.packed(t, q, u)
+        status = self._evaluate(t, y)
+        if status != OK:
+            self._system._check(status, int(self._w.fault[0]))
+        self._rates[:] = self._w.speed["acceleration"]
+        finite_result(self._rates, t)
+        self._system._trust(t, y, self._w)
+        return self.shown

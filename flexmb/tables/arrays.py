@@ -238,6 +238,9 @@ class Workspace:
     raw: Real  # (nq,) coordinates as the integrator has them
     rate: Real  # (nq,) qdot
     ground: Real  # (3,) acceleration of the ground, World axes: -gravity
+    angle: Real  # (N,) of hinges with a single axis of rotation, found again for all of them at once; their number is
+    sine: Real  # (N,) rounded up to a multiple of LANES
+    cosine: Real  # (N,)
     body: Record  # (N,) BODY_STATE
     hinge: Record  # (N,) HINGE_STATE; not touched where every hinge has a single axis
     mode: Record  # (N,m) MODE_STATE

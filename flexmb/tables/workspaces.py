@@ -6,18 +6,23 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.jit.lanes import LANES
 from flexmb.tables import arrays as a
 
 
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
     """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
     n, m = c.mode.shape
+    together = -(-n // LANES) * LANES
     fields: dict[str, Any] = {
         "q": np.zeros(nq),
         "u": np.zeros(nu),
         "raw": np.zeros(nq),
         "rate": np.zeros(nq),
         "ground": -c.gravity,
+        "angle": np.zeros(together),
+        "sine": np.zeros(together),
+        "cosine": np.zeros(together),
         "body": np.zeros(n, a.BODY_STATE),
         "hinge": np.zeros(n, a.HINGE_STATE),
         "mode": np.zeros((n, m), a.MODE_STATE),

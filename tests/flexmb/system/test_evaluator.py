@@ -3,15 +3,20 @@
 import copy
 import gc
 import pickle
+import sys
 import threading
 import tracemalloc
 import warnings
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
 
 import numpy as np
 import pytest
 
 import flexmb as fm
 from flexmb.run.warm_up import looped
+from flexmb.system import evaluator as evaluator_module
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.evaluator import Evaluator
 from tests.benchmarks.rivals import rigid_chain
@@ -88,6 +93,147 @@ def test_numbers_of_any_real_type_are_taken(system):
         assert np.array_equal(evaluator(0.25, given, u), expected)
     assert np.array_equal(evaluator(np.float64(0.25), q, u), expected)
     assert np.array_equal(evaluator(0, q, u), evaluator(0.0, q, u))
+
+
+@pytest.fixture
+def roads(system, monkeypatch) -> list[str]:
+    """What evaluations were done step by step by, from now on: the gate lets the others pass."""
+    taken = list[str]()
+    careful = evaluator_module._Careful.__call__
+
+    def noted(self, *args, **kwargs):
+        taken.append("careful")
+        return careful(self, *args, **kwargs)
+
+    monkeypatch.setattr(evaluator_module._Careful, "__call__", noted)
+    return taken
+
+
+class OwnFloat(float):
+    pass
+
+
+def unaligned(x: np.ndarray) -> np.ndarray:
+    room = np.zeros(8 * len(x) + 1, np.uint8)[1:]
+    found = room.view(np.float64)
+    found[:] = x
+    return found
+
+
+PLAIN = {
+    "as it is": lambda x: x,
+    "only read": lambda x: np.require(x, requirements=["C"]).copy().view(),
+    "part of a larger one": lambda x: np.concatenate([x, x])[len(x) :],
+    "column-wise as well": np.asfortranarray,
+}
+OTHERS = {
+    "a list": list,
+    "float32": np.float32,
+    "complex": lambda x: x + 0j,
+    "whole": lambda x: np.zeros(len(x), int),
+    "swapped": lambda x: x.astype(">f8"),
+    "strided": lambda x: np.repeat(x, 2)[::2],
+    "backward": lambda x: x[::-1],
+    "unaligned": unaligned,
+    "a matrix": lambda x: x[None],
+    "a number": lambda x: np.array(1.0),
+    "a subclass": lambda x: x.view(np.recarray),
+    "masked": np.ma.masked_invalid,
+    "objects": lambda x: x.astype(object),
+    "records": lambda x: x.view([("x", float)]),
+    "too short": lambda x: x[1:],
+    "None": lambda x: None,
+}
+
+
+@pytest.mark.parametrize("form", PLAIN)
+def test_plain_arrays_take_the_short_road(system, roads, form):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    expected = system.accelerations(state)
+    q, u = PLAIN[form](state.q), PLAIN[form](state.u)
+    u.flags.writeable = q.flags.writeable = False
+    assert np.array_equal(evaluator(state.t, q, u), expected)
+    assert not roads
+
+
+@pytest.mark.parametrize("form", OTHERS)
+def test_all_other_arguments_take_the_long_road(system, roads, form):
+    """What is read where an array has its words must be an array, of these words."""
+    evaluator, state = system.evaluator(), moving(system, 0)
+    for q, u in ((OTHERS[form](state.q), state.u), (state.q, OTHERS[form](state.u))):
+        before = len(roads)
+        with suppress(ValueError, TypeError, fm.DynamicsError), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            evaluator(state.t, q, u)
+        assert len(roads) == before + 1
+    for t in (0, True, np.float64(0.25), OwnFloat(0.25), np.array(0.25), "0", None):
+        before = len(roads)
+        with suppress(ValueError, TypeError):
+            evaluator(t, state.q, state.u)
+        assert len(roads) == before + 1
+
+
+def test_arguments_by_name_and_in_wrong_numbers(system, roads):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    expected = system.accelerations(state)
+    assert np.array_equal(evaluator(t=state.t, q=state.q, u=state.u), expected)
+    assert np.array_equal(evaluator(state.t, u=state.u, q=state.q), expected)
+    assert len(roads) == 2
+    for args in ((), (0.0,), (0.0, state.q), (0.0, state.q, state.u, 1)):
+        with pytest.raises(TypeError, match="argument"):
+            evaluator(*args)
+    with pytest.raises(TypeError, match="unexpected keyword"):
+        evaluator(0.0, state.q, state.u, algorithm="composite")
+
+
+def test_it_works_where_objects_cannot_be_read(system, roads, monkeypatch):
+    monkeypatch.setattr(evaluator_module, "readable", lambda: False)
+    evaluator, state = system.evaluator(), moving(system, 0)
+    found = evaluator(state.t, state.q, state.u)
+    assert np.array_equal(found, system.accelerations(state)) and found is evaluator.accelerations
+    assert roads
+
+
+def test_calls_leave_no_references(system):
+    evaluator, state = system.evaluator(), moving(system, 0)
+    t, q, u = 0.123, state.q.copy(), state.u.copy()
+    held = [t, q, u, evaluator.accelerations]
+    before = [sys.getrefcount(each) for each in held]
+    for _ in range(100):
+        evaluator(t, q, u)
+        with pytest.raises(ValueError, match="finite"):
+            evaluator(np.nan, q, u)
+    assert [sys.getrefcount(each) for each in held] == before
+
+
+def test_what_is_let_go_goes():
+    system = fm.compile(rigid_chain(2))
+    evaluator = system.evaluator()
+    evaluator(0.0, np.zeros(2), np.zeros(2))
+    gone = [weakref.ref(evaluator), weakref.ref(system)]
+    call = evaluator.func
+    del evaluator, system
+    gc.collect()
+    assert gone[0]() is None
+    assert np.all(np.isfinite(call(0.0, np.zeros(2), np.zeros(2))))  # it holds what it needs
+    del call
+    gc.collect()
+    assert gone[1]() is None
+
+
+def test_long_ones_let_other_threads_run():
+    """With so many speeds the interpreter is free meanwhile: threads, each with its own, agree."""
+    system = fm.compile(rigid_chain(60))
+    states = [moving(system, seed) for seed in range(4)]
+    expected = [system.accelerations(state) for state in states]
+    with ThreadPoolExecutor(4) as pool:
+        evaluators = [system.evaluator() for _ in states]
+
+        def work(i: int) -> bool:
+            call, state = evaluators[i], states[i]
+            return all(np.array_equal(call(state.t, state.q, state.u), expected[i]) for _ in range(500))
+
+        assert all(pool.map(work, range(4)))
 
 
 WRONG = {

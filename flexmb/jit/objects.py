@@ -1,0 +1,181 @@
+"""Compiled functions that Python calls without a dispatcher: their arguments are read where the interpreter has them.
+
+Numba's dispatcher finds the types of three arguments in 0.3 us, and takes 0.1 us for each array. Here a kernel is a
+function of the interpreter itself (`builtin`), as one that is written in C: it is handed the addresses of the objects
+that it is called with, and reads what it needs if, and only if, they are of the exact types that it knows. For all
+other objects it calls a function of Python, with the same arguments (`called`).
+
+Where objects have their words is part of Python's and of numpy's binary interface. `readable` holds it against
+objects of this process; where it does not hold, nothing here may be used.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable
+from functools import cache
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import types
+from numba.extending import lower_builtin, type_callable
+
+from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.kernel import helper
+from flexmb.jit.tables import BYTE, TableType, table
+from flexmb.typing import Index
+
+_TYPE, _VALUE = 1, 2  # words of an object: its type, and the number of a float
+_DATA, _DIMENSIONS, _SHAPE, _ELEMENTS, _FLAGS = 2, 3, 4, 7, 8  # of an array: dtype is _ELEMENTS; two are 32 bits wide
+_ORDERED = 0x0001 | 0x0100  # flags of an array: C order, aligned
+_LOW = 0xFFFFFFFF
+
+FLOAT, ARRAY, REALS, VECTORCALL, INCREF, SAVE, RESTORE = range(7)  # rows of `interpreter`
+
+
+@cache
+def interpreter() -> Index:
+    """(7,) Addresses in this process: types float and array, dtype float64, and functions of the interpreter."""
+    api = ctypes.pythonapi
+    functions = api.PyObject_Vectorcall, api.Py_IncRef, api.PyEval_SaveThread, api.PyEval_RestoreThread
+    where = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
+    return np.array([id(float), id(np.ndarray), id(np.dtype(np.float64)), *where], np.int64)
+
+
+@cache
+def readable() -> bool:
+    """Whether objects have their words where the kernels look for them."""
+    return all(map(_reads, (1.5, np.arange(3.0), np.zeros((2, 3)), np.arange(8.0)[1::2], np.zeros(2, np.int64))))
+
+
+def _reads(example: Any) -> bool:
+    """What kernels would read of a float or an array is what Python says of it."""
+    word = (ctypes.c_int64 * (1 + _FLAGS)).from_address(id(example))
+    if isinstance(example, float):
+        return word[_TYPE] == id(float) and ctypes.c_double.from_buffer(word, 8 * _VALUE).value == example
+    return (
+        word[_TYPE] == id(np.ndarray)
+        and word[_DATA] == example.ctypes.data
+        and word[_DIMENSIONS] & _LOW == example.ndim
+        and word[_ELEMENTS] == id(example.dtype)
+        and word[_FLAGS] & _LOW == example.flags.num
+        and word[_SHAPE] + 8 * example.ndim == word[_SHAPE + 1]  # strides stand behind the shape: now it may be read
+        and tuple((ctypes.c_int64 * example.ndim).from_address(word[_SHAPE])) == example.shape
+    )
+
+
+class _Method(ctypes.Structure):
+    """PyMethodDef."""
+
+    _fields_ = (
+        ("name", ctypes.c_char_p),
+        ("function", ctypes.c_void_p),
+        ("flags", ctypes.c_int),
+        ("doc", ctypes.c_char_p),
+    )
+
+
+_FAST, _WITH_NAMES = 0x0080, 0x0002
+_methods: dict[int, _Method] = {}  # held as long as the process, as the kernels are
+
+
+class Anchor(np.ndarray):
+    """The table of a bundle as the `self` of a builtin; it holds all that is reached from there."""
+
+    held: tuple[Any, ...]
+
+
+def builtin(address: int, bundle: Any, *held: Any) -> Callable[..., Any]:
+    """The kernel at an address as a function of Python.
+
+    Four whole numbers enter it: address of an Anchor, address of the arguments, how many they are by position, and the
+    address of the names of those that come by name, or 0. It returns the address of an object, as a new reference, or 0
+    after an error.
+    """
+    place = bundle._table.view(Anchor)
+    place.held = bundle, held
+    if address not in _methods:
+        _methods[address] = _Method(b"evaluator", address, _FAST | _WITH_NAMES, None)
+    make = ctypes.pythonapi.PyCFunction_NewEx
+    make.restype, make.argtypes = ctypes.py_object, (ctypes.c_void_p, ctypes.py_object, ctypes.c_void_p)
+    function: Callable[..., Any] = make(ctypes.byref(_methods[address]), place, None)
+    return function
+
+
+@helper
+def bundle_of(place):
+    """Address of the bundle that an Anchor is the table of."""
+    return word_at(place, _DATA)
+
+
+@helper
+def is_float(python, x):
+    """Whether an object is a float, and no subclass of it."""
+    return word_at(x, _TYPE) == python[FLOAT]
+
+
+@helper
+def value(x):
+    """Of a float."""
+    return reals_at(x, _VALUE + 1)[_VALUE]
+
+
+@helper
+def is_vector(python, x):
+    """Whether an object is an array (n,) of float64 in C order, and no subclass of it."""
+    return (
+        word_at(x, _TYPE) == python[ARRAY]
+        and word_at(x, _ELEMENTS) == python[REALS]
+        and (word_at(x, _DIMENSIONS) & _LOW) == 1
+        and (word_at(x, _FLAGS) & _ORDERED) == _ORDERED
+    )
+
+
+@helper
+def vector(x):
+    """The numbers of such an array."""
+    return reals_at(word_at(x, _DATA), word_at(word_at(x, _SHAPE), 0))
+
+
+@helper
+def called(python, function, arguments, count, names):
+    """What a function of Python returns for the arguments of a builtin."""
+    return status_at(python[VECTORCALL], (function, arguments, count, names))
+
+
+@helper
+def taken(python, x):
+    """A new reference to an object."""
+    nothing_at(python[INCREF], (x,))
+    return x
+
+
+def word_at(address: Any, i: Any) -> Any:
+    """For kernels: whole number i at an address."""
+
+
+def reals_at(address: Any, count: Any) -> Any:
+    """For kernels: the table of so many floats at an address."""
+
+
+@type_callable(word_at)
+def _type_of_word(context):
+    return lambda address, i: types.int64
+
+
+@type_callable(reals_at)
+def _type_of_reals(context):
+    return lambda address, count: TableType(types.float64, 1)
+
+
+@lower_builtin(word_at, types.Integer, types.Integer)
+def _word(context, builder, sig, args):
+    i = context.cast(builder, args[1], sig.args[1], types.int64)
+    return builder.load(builder.gep(builder.inttoptr(args[0], ir.IntType(64).as_pointer()), [i]))
+
+
+@lower_builtin(reals_at, types.Integer, types.Integer)
+def _reals(context, builder, sig, args):
+    count = context.cast(builder, args[1], sig.args[1], types.int64)
+    return table(context, builder, sig.return_type, builder.inttoptr(args[0], BYTE.as_pointer()), [count])
