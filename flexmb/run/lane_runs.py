@@ -80,7 +80,7 @@ class BatchRun:
 
     def _block(self, first: int, tables: LaneTables) -> None:
         """Run LANES copies; those whose end the lanes do not decide are left for later."""
-        w, s, entries = tables
+        w, s, entries, _ = tables
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))

@@ -184,11 +184,11 @@ class System(Mechanics):
     @property
     def batch(self) -> Batch:
         """Any number of copies of this system."""
-        from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+        found: Batch | None = self.kept.get("batch")
+        if found is None:
+            from flexmb.system.batch import Batch  # lanes are for those who ask for many states
 
-        if Batch not in self.kept:
-            self.kept[Batch] = Batch([self])
-        found: Batch = self.kept[Batch]
+            found = self.kept["batch"] = Batch([self])
         return found
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
