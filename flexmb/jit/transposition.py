@@ -44,7 +44,8 @@ class _Square(AbstractTemplate):
 @lower_builtin(square_to_lanes, types.Array, types.Integer, types.Integer, TableType)
 def _to_lanes(context, builder, sig, args):
     rows, lanes = _places(context, builder, sig, args)
-    for value, place in zip(_transposed(builder, [builder.load(row, align=_FLOAT) for row in rows]), lanes, strict=True):
+    values = _transposed(builder, [builder.load(row, align=_FLOAT) for row in rows])
+    for value, place in zip(values, lanes, strict=True):
         builder.store(value, place, align=BYTES)
     return context.get_dummy_value()
 
@@ -52,7 +53,8 @@ def _to_lanes(context, builder, sig, args):
 @lower_builtin(square_to_rows, types.Array, types.Integer, types.Integer, TableType)
 def _to_rows(context, builder, sig, args):
     rows, lanes = _places(context, builder, sig, args)
-    for value, row in zip(_transposed(builder, [builder.load(at, align=BYTES) for at in lanes]), rows, strict=True):
+    values = _transposed(builder, [builder.load(place, align=BYTES) for place in lanes])
+    for value, row in zip(values, rows, strict=True):
         builder.store(value, row, align=_FLOAT)
     return context.get_dummy_value()
 

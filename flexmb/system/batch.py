@@ -116,8 +116,8 @@ class Batch:
         entries = lane_entries(s, w.doubt)
         rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)
         begin = 0 if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)[0]
-        calls = rhs, begin, stages, workspace
-        return LaneTables(w, s, entries, lanes.lane_gate(s, entries, calls, [address(each) for each in self._constants]))
+        blocks = [address(each) for each in self._constants]
+        return LaneTables(w, s, entries, lanes.lane_gate(s, entries, (rhs, begin, stages, workspace), blocks))
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
         """Of the copies LANES * block and on; makes a workspace ready for them."""
