@@ -9,6 +9,7 @@ instead of 160 us. The arrays are borrowed: whoever calls the kernel holds the b
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, TypeVar, dataclass_transform
@@ -72,6 +73,14 @@ def _describe(self: Any) -> None:
 def _array_type(dtype: np.dtype, dimensions: int, numbers: types.Type) -> TableType:
     """Kept, because numba takes a tenth of a millisecond to describe a record."""
     return TableType(numbers if dtype == np.float64 else from_dtype(dtype), dimensions)
+
+
+def broaden(bundles: Sequence[Any]) -> None:
+    """Give bundles of one class the features that any of them has: one kernel fits all, and they share workspaces."""
+    features = frozenset[str]().union(*(each._numba_type_.features for each in bundles))
+    for each in bundles:
+        kind = each._numba_type_
+        object.__setattr__(each, "_numba_type_", BundleType(kind.of, kind.kinds, features))
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:

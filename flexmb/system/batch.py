@@ -21,6 +21,7 @@ import numpy as np
 
 from flexmb.entry import lanes
 from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
+from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
@@ -92,6 +93,7 @@ class Batch:
             self._constants = [
                 lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
             ]
+            broaden(self._constants)
 
     def system(self, copy: int) -> System:
         """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
