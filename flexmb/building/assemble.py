@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
 
-from flexmb.building.carried import moved_inertia
+from flexmb.building.carried import CarriedTables, moved_inertia
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
 from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.models import ORIGIN
@@ -147,13 +147,16 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, [ports.number(at) for at in load_ports], functions)
     function, table = pack(functions.all())
+    port = _ports(ports, port_rows)
+    wheel = _wheels(wheels, [ports.number(at) for at in wheel_ports], numbering)
+    speed["doubtful"] = DOUBTFUL * moved_inertia(CarriedTables(body, port, inertia["pair"], wheel), len(speed))
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
-        port=_ports(ports, port_rows),
+        port=port,
         port_mode=shape_records([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
         second_shape=np.concatenate([of_ports, second_shape]),
-        wheel=_wheels(wheels, [ports.number(at) for at in wheel_ports], numbering),
+        wheel=wheel,
         load=load,
         speed=speed,
         function=function,
@@ -161,9 +164,6 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         **inertia,
         **points,
     )
-    speed = speed.copy()  # those in the constants are read-only
-    speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
-    constants = replace(constants, speed=speed)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
 

@@ -91,7 +91,7 @@ class Batch:
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
             self._constants = [
-                lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
+                lane_constants([system.constants for system in block]) for block in blocks_of(self.systems)
             ]
             broaden(self._constants)
 
