@@ -17,6 +17,9 @@ from flexmb.tables.status import INTERRUPTED, MAX_STEPS, NONFINITE, NOT_CONVERGE
 SAFETY = 0.9
 SHRINK = 0.2  # strongest change of step after a rejection ...
 GROW = 10.0  # ... and after an acceptance
+# Share of the error before in the choice of a step, beta of Hairer, Norsett, Wanner II, IV.2.
+DAMPING = 0.04
+CALM = 1e-4  # the least error before that counts, and what stands for it where no step went before
 RETREAT = 0.1  # change of step where the right-hand side could not be evaluated at all
 HALVED = 0.5  # change of step where an iteration did not converge
 # A fixed step may exceed the one asked for by this fraction: 0.1 s in steps of 0.01 s are 10, whatever 0.1/0.01 rounds
@@ -76,17 +79,24 @@ def scaled_norm(values, y, accuracy):
 
 
 @helper
-def step_factor(error, exponent, rejected_before):
-    """New step over old for an error norm (1 is the tolerance) of a method whose error is O(h^exponent).
+def shorter(error, exponent):
+    """New step over old for an error norm of at least 1, the tolerance, of a method whose error is O(h^exponent)."""
+    return max(SHRINK, SAFETY * error ** (-1.0 / exponent)) if math.isfinite(error) else SHRINK
 
-    A step that follows a rejection does not grow: Hairer, Norsett, Wanner I, II.4.
+
+@helper
+def step_factor(error, error_before, exponent, rejected_before):
+    """New step over old after a step that was accepted, from its error norm and that of the one accepted before.
+
+    Hairer, Norsett, Wanner II, IV.2: where stability bounds the step, a choice by the last error alone swings between
+    steps that let the fastest modes grow and rejections; what they grow to is seen in loads. A step that follows a
+    rejection does not grow (I, II.4).
     """
-    if not math.isfinite(error):
-        return SHRINK
-    if error >= 1.0:
-        return max(SHRINK, SAFETY * error ** (-1.0 / exponent))
-    factor = GROW if error == 0.0 else min(GROW, SAFETY * error ** (-1.0 / exponent))
-    return min(1.0, factor) if rejected_before else factor
+    if error == 0.0:
+        factor = GROW
+    else:
+        factor = SAFETY * error ** (0.2 * DAMPING - 1.0 / exponent) * max(error_before, CALM) ** DAMPING
+    return min(1.0 if rejected_before else GROW, factor)
 
 
 @helper

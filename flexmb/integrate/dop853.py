@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     REJECTED,
     SAMPLES,
     Interval,
@@ -25,6 +26,7 @@ from flexmb.integrate.control import (
     next_step,
     reason,
     retreat,
+    shorter,
     step_end,
     step_factor,
 )
@@ -172,7 +174,7 @@ def dop853(problem, y, clock, accuracy, out, counts):
     times, segment_ends = clock
     n = y.shape[0]
     s = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty(n), np.empty((7, n)))
-    t, h = times[0], 0.0
+    t, h, error_before = times[0], 0.0, CALM
     begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
@@ -193,13 +195,14 @@ def dop853(problem, y, clock, accuracy, out, counts):
                 status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:
                     return status, t
-                h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
-                t = t_new
+                factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
+                h = next_step(h, length, factor, t_new == end)
+                t, error_before = t_new, error
                 copy(s.y_new, y)
                 copy(s.k[_END], s.k[0])
                 counts[ACCEPTED] += 1
             else:
-                h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
+                h = length * (shorter(error, _ERROR_EXPONENT) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t

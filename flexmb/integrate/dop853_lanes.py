@@ -13,10 +13,12 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     REJECTED,
     SAMPLES,
     next_step,
     retreat,
+    shorter,
     step_end,
     step_factor,
 )
@@ -37,8 +39,8 @@ from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
 class LaneControl(NamedTuple):
     """What each lane (LANES,) knows of its own run: time, proposed step, end and length of the step it tries (s), last
-    time of a stage, error norm, whether the step before was rejected, segment, number of its segments, and its status,
-    RUNNING until it ends.
+    time of a stage, error norms of this step and of the one accepted before, whether the last was rejected, segment,
+    number of its segments, and its status, RUNNING until it ends.
     """
 
     t: np.ndarray
@@ -47,6 +49,7 @@ class LaneControl(NamedTuple):
     length: np.ndarray
     last: np.ndarray
     error: np.ndarray
+    error_before: np.ndarray
     rejected: np.ndarray
     segment: np.ndarray
     ends: np.ndarray
@@ -58,7 +61,7 @@ RUNNING = -1
 
 def lane_control(ends: np.ndarray) -> LaneControl:
     """For runs with so many (LANES,) segments."""
-    floats, integers = np.zeros((6, LANES)), np.zeros((2, LANES), np.int64)
+    floats, integers = np.zeros((7, LANES)), np.zeros((2, LANES), np.int64)
     return LaneControl(*floats, *integers, ends, np.full(LANES, RUNNING))
 
 
@@ -281,7 +284,7 @@ def _begin(problem, s, entries, control, clock, out, counts):
     for lane in range(LANES):
         store_lane(entries.y, lane, out[lane, 0])
         counts[lane, SAMPLES] = 1
-        control.t[lane] = times[0]
+        control.t[lane], control.error_before[lane] = times[0], CALM
         control.status[lane] = RUNNING
         _enter(control, segment_ends, lane)
 
@@ -326,8 +329,9 @@ def _go_on(entries, control, segment_ends, counts):
         if entries.chosen[0, lane] == 1.0:
             end = control.end[lane]
             cut = end == segment_ends[lane, control.segment[lane]]
-            control.h[lane] = next_step(control.h[lane], length, step_factor(error, _ERROR_EXPONENT, rejected), cut)
-            control.t[lane] = end
+            factor = step_factor(error, control.error_before[lane], _ERROR_EXPONENT, rejected)
+            control.h[lane] = next_step(control.h[lane], length, factor, cut)
+            control.t[lane], control.error_before[lane] = end, error
             control.rejected[lane] = 0
             counts[lane, ACCEPTED] += 1
             if cut:
@@ -335,7 +339,7 @@ def _go_on(entries, control, segment_ends, counts):
                 _enter(control, segment_ends, lane)
                 entered = entered or control.status[lane] == RUNNING
         else:
-            factor = step_factor(error, _ERROR_EXPONENT, rejected) if math.isfinite(error) else retreat(NONFINITE)
+            factor = shorter(error, _ERROR_EXPONENT) if math.isfinite(error) else retreat(NONFINITE)
             control.h[lane] = length * factor
             control.rejected[lane] = 1
             counts[lane, REJECTED] += 1

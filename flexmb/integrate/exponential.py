@@ -20,6 +20,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     FACTORISATIONS,
     REJECTED,
     SAMPLES,
@@ -32,6 +33,7 @@ from flexmb.integrate.control import (
     reason,
     retreat,
     scaled_norm,
+    shorter,
     step_end,
     step_factor,
 )
@@ -224,7 +226,7 @@ def exponential(problem, y, clock, accuracy, out, counts):
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
-    t, h = times[0], 0.0
+    t, h, error_before = times[0], 0.0, CALM
     begin(problem, t, y, out, counts)
     for end in segment_ends:
         last = np.nextafter(end, t)
@@ -249,13 +251,14 @@ def exponential(problem, y, clock, accuracy, out, counts):
             accepted = status == OK and error < 1.0
             if accepted:
                 store_samples(problem, step, y, s, times, out, counts)
-                h = next_step(h, length, step_factor(error, _ERROR_EXPONENT, rejected), t_new == end)
-                t = t_new
+                factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
+                h = next_step(h, length, factor, t_new == end)
+                t, error_before = t_new, error
                 copy(s.y_new, y)
                 copy(s.f_new, s.f)
                 counts[ACCEPTED] += 1
             else:
-                h = length * (step_factor(error, _ERROR_EXPONENT, rejected) if status == OK else retreat(status))
+                h = length * (shorter(error, _ERROR_EXPONENT) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t

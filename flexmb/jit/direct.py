@@ -13,7 +13,7 @@ from functools import cache, partial
 from typing import Any
 
 from llvmlite import ir
-from numba import types
+from numba import typeof, types
 from numba.core import cgutils
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
@@ -73,6 +73,14 @@ def settled(compiled: Any, *kinds: Any) -> Any:
         compiled.compile(kinds)
         compiled.disable_compile()
     return compiled
+
+
+def undispatched(compiled: Any, *like: Any) -> Any:
+    """A kernel, compiled for arguments of the types of these, that looks at no type again: for those alone.
+
+    To find the type of a tuple of bundles and addresses takes a dispatcher thirty microseconds at every call.
+    """
+    return compiled.compile(tuple(map(typeof, like)))
 
 
 @cache

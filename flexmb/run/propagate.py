@@ -14,6 +14,7 @@ from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
+from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import batch
@@ -60,11 +61,17 @@ class Integration:
         batched = algorithm.observing is not None and not system.scene.closures
         self.batch = batch(system, algorithm.observing, constants, self._workspace) if batched else None
         """Observes many samples at once."""
-        self.is_compiled = False
+        self._enter: Any = None
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`."""
-        return self._integrator.run(self._problem, y, clock, accuracy, out, counts)
+        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. Arrays of floats, and of whole numbers, in C order."""
+        self.compile(y, clock, accuracy, out, counts)
+        return self._enter(self._problem, y, clock, accuracy, out, counts)
+
+    def compile(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> None:
+        """For a call with these, unless that is done."""
+        if self._enter is None:
+            self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
 
     @property
     def fault(self) -> int:
@@ -92,17 +99,14 @@ def integration(
 
 
 def integrate(system: System, solve: Integration, times: Real, settings: Settings) -> Raw:
-    """Run over the whole time, and the first time before that over no time at all, which compiles the integrator."""
+    """Run over the whole time, after what has to be compiled for it."""
     initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
     ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
-    start = perf_counter()
-    if not solve.is_compiled:
-        nothing = np.empty((1, len(initial.y))), np.zeros(COUNTS, np.int64)
-        solve(initial.y.copy(), Clock(times[:1], ends[:0]), accuracy, *nothing)
-        solve.is_compiled = True
     out, counts = np.empty((len(times), len(initial.y))), np.zeros(COUNTS, np.int64)
-    begun = perf_counter()
     given = initial.y, Clock(times, ends), accuracy, out, counts
+    start = perf_counter()
+    solve.compile(*given)
+    begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
     return Raw(
