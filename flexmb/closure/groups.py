@@ -25,7 +25,7 @@ from flexmb.tables.arrays import Constants
 from flexmb.typing import Index, Record
 
 
-class Path(NamedTuple):
+class LoadPath(NamedTuple):
     """Bodies that loads on one closure pass on their way to the ground: below its junction, and what carries these."""
 
     own: frozenset[int]
@@ -37,13 +37,13 @@ class Path(NamedTuple):
         return sorted(self.own | self.carriers, reverse=True)
 
 
-def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> Path:
+def path(c: Constants, parent: Sequence[int], bodies: Sequence[int]) -> LoadPath:
     """Of a closure between two bodies, -1 for the ground."""
     one, other = (_ancestors(parent, k) for k in bodies)
     carriers = one & other
     if carriers and c.body["modes"][max(carriers)] > 0:
         carriers = carriers - {max(carriers)}
-    return Path(frozenset((one | other) - carriers), frozenset(carriers))
+    return LoadPath(frozenset((one | other) - carriers), frozenset(carriers))
 
 
 def _ancestors(parent: Sequence[int], k: int) -> set[int]:
@@ -55,7 +55,7 @@ def _ancestors(parent: Sequence[int], k: int) -> set[int]:
     return found
 
 
-def clusters(c: Constants, paths: Sequence[Path]) -> list[list[list[int]]]:
+def clusters(c: Constants, paths: Sequence[LoadPath]) -> list[list[list[int]]]:
     """Closures by group, groups by cluster; clusters, and groups in each, in the order of their first closure."""
     moves = _moves(c)
     mine = [{k for k in each.own if moves[k]} for each in paths]
@@ -95,7 +95,7 @@ class GroupTables(NamedTuple):
 
 
 def group_tables(
-    c: Constants, members: Sequence[Sequence[Sequence[int]]], paths: Sequence[Path], rows: Sequence[int]
+    c: Constants, members: Sequence[Sequence[Sequence[int]]], paths: Sequence[LoadPath], rows: Sequence[int]
 ) -> GroupTables:
     """Of closures by group and cluster; `rows`: how many each closure has."""
     moves = _moves(c)
