@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from itertools import accumulate
 from typing import TypeVar
 
 import numpy as np
 
-from flexmb.building.carried import moved_inertia
+from flexmb.building.carried import CarriedTables, moved_inertia
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
 from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.models import ORIGIN
@@ -17,6 +17,7 @@ from flexmb.building.numbering import Numbering
 from flexmb.building.rigid_arrays import Frames, inboard_frames, outboard_frames
 from flexmb.hinges.catalogue import KINDS
 from flexmb.levels.body import LEVELS
+from flexmb.levels.rigid import LEVEL as RIGID
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.tree import GROUND
@@ -142,16 +143,20 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     group(body, "port", [len(each) for each in ports.by_body])
     for name, items in (("wheel", wheels), ("load", loads)):
         group(body, name, np.bincount(np.array([index[item.body] for item in items], int), minlength=len(chain)))
+    _who_starts(body)
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, [ports.number(at) for at in load_ports], functions)
     function, table = pack(functions.all())
+    port = _ports(ports, port_rows)
+    wheel = _wheels(wheels, [ports.number(at) for at in wheel_ports], numbering)
+    speed["doubtful"] = DOUBTFUL * moved_inertia(CarriedTables(body, port, inertia["pair"], wheel), len(speed))
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
-        port=_ports(ports, port_rows),
+        port=port,
         port_mode=shape_records([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
         second_shape=np.concatenate([of_ports, second_shape]),
-        wheel=_wheels(wheels, [ports.number(at) for at in wheel_ports], numbering),
+        wheel=wheel,
         load=load,
         speed=speed,
         function=function,
@@ -159,11 +164,18 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         **inertia,
         **points,
     )
-    speed = speed.copy()  # those in the constants are read-only
-    speed["doubtful"] = DOUBTFUL * moved_inertia(constants)
-    constants = replace(constants, speed=speed)
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
     return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
+
+
+def _who_starts(body: a.Record) -> None:
+    """Whose inertia the first body to reach it in the inward sweep starts: that is the last one hinged to it."""
+    steady = (body["level"] == LEVELS.index(RIGID)) & (body["wheel_start"] == body["wheel_stop"])
+    last = np.full(len(body), -1)
+    on = np.flatnonzero(body["parent"] >= 0)
+    np.maximum.at(last, body["parent"][on], on)
+    started = steady & (last >= 0) & (body["inboard_port"][last] < 0)
+    body["started"], body["starts"][last[started]] = started, 1
 
 
 def _by_body(items: tuple[Item, ...], index: dict[str, int]) -> list[Item]:

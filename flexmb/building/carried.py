@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 from math import sqrt
+from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.hinges.catalogue import KINDS
-from flexmb.tables.arrays import Constants
-from flexmb.typing import Real
+from flexmb.typing import Real, Record
 
 
-def moved_inertia(c: Constants) -> Real:
-    """(nu,) mass (kg) or moment of inertia (kg m^2) of all that a hinge's speed moves, modal mass of a mode at rest.
+class CarriedTables(NamedTuple):
+    """The tables of `flexmb.tables.arrays.Constants` that say what is moved."""
+
+    body: Record
+    port: Record
+    pair: Record
+    wheel: Record
+
+
+def moved_inertia(c: CarriedTables, speeds: int) -> Real:
+    """(speeds,) mass (kg) or moment of inertia (kg m^2) of all that a hinge's speed moves; modal masses at rest.
 
     Moments are about hinges, of chains stretched out, hinges that slide at their zeros: sqrt(J) of what is carried at a
     distance l is sqrt(J) + sqrt(m) l at most.
@@ -23,7 +32,7 @@ def moved_inertia(c: Constants) -> Real:
     to_hinge = port[c.body["outboard_port"]].tolist()
     placed = np.linalg.norm(c.body["placement_position"], axis=1)
     arm = np.where(c.body["inboard_port"] >= 0, port[c.body["inboard_port"]], placed).tolist()
-    moved = np.zeros(len(c.speed))
+    moved = np.zeros(speeds)
     for k in range(len(parent) - 1, -1, -1):
         about_hinge = _about(inertia[k], mass[k], to_hinge[k])
         linear = KINDS[kind[k]].displacements

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexmb.building.links import BodyLink
 from flexmb.building.rigid_arrays import outboard_frames, rigid_inertia_rows
-from flexmb.levels.level import six
-from flexmb.modal.flexible_model import SecondOrder
+from flexmb.levels.level import FidelityLevel, InertiaTables, six
+from flexmb.modal.flexible_model import FlexibleModel, SecondOrder
 from flexmb.tables import arrays as a
 
 
@@ -27,10 +28,9 @@ def inertia_arrays(
     alone = [chain[k] for k in rigid]
     body["rigid"][rigid] = rigid_inertia_rows(alone, outboard_frames(alone))
     summed = sorted(set(range(len(chain))).difference(rigid))
-    bodies = {k: chain[k].level.tables(chain[k].model, chain[k].wheels) for k in summed}
+    bodies = {k: _tables(chain[k].level, chain[k].model, chain[k].wheels) for k in summed}
     for k, each in bodies.items():
         n = len(each.mode)
-        _drop_rounding(each.pair["mff"], len(chain[k].model.mass))
         body["rigid"][k], mode[k, :n], pair[k, :n, :n] = each.rigid, each.mode, each.pair
         body["orthogonal"][k] = _is_diagonal(each.pair["mff"])
         body["uncoupled"][k] = _is_diagonal(each.pair["stiffness"]) and _is_diagonal(each.pair["damping"])
@@ -56,6 +56,14 @@ def inertia_arrays(
     }  # fmt: skip
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
     return tables, {"point": point, "point_mode": shapes}, seconds
+
+
+@lru_cache(maxsize=64)
+def _tables(level: FidelityLevel, model: FlexibleModel, wheels: int) -> InertiaTables:
+    """Those of a level. Equal bodies, of one scene or of copies of it, share one: its arrays must not be written to."""
+    found = level.tables(model, wheels)
+    _drop_rounding(found.pair["mff"], len(model.mass))
+    return found
 
 
 def _drop_rounding(masses: a.Real, points: int) -> None:

@@ -7,7 +7,7 @@ node that deforms does the link keep the modal frame of its body.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -130,19 +130,24 @@ class BodyLink:
             m = one_point(*self.mass_properties, {"origin": ORIGIN})
         else:
             m = self.models[self.name]
-        if self.outboard.deforms:
-            return m
-        back, origin = self.outboard.frame.T, self.outboard.origin
-        return replace(
-            m,
-            position=(m.position - origin) @ back.T,
-            com_offset=m.com_offset @ back.T,
-            inertia=back @ m.inertia @ back.T,
-            translation=back @ m.translation,
-            rotation=back @ m.rotation,
-            second=None if m.second is None else m.second.turned(back),
-            nodes={name: node.seen_from(origin, back) for name, node in m.nodes.items()},
-        )
+        at = self.outboard
+        return m if at.deforms else _seen_from(m, tuple(at.origin.tolist()), tuple(at.frame.ravel().tolist()))
+
+
+@lru_cache(maxsize=64)
+def _seen_from(m: FlexibleModel, origin: tuple[float, ...], frame: tuple[float, ...]) -> FlexibleModel:
+    """The model in the frame (3,3) at an origin (3,). Equal beams on equal hinges share one: see `flexible_model`."""
+    back, at = np.reshape(frame, (3, 3)).T, np.array(origin)
+    return replace(
+        m,
+        position=(m.position - at) @ back.T,
+        com_offset=m.com_offset @ back.T,
+        inertia=back @ m.inertia @ back.T,
+        translation=back @ m.translation,
+        rotation=back @ m.rotation,
+        second=None if m.second is None else m.second.turned(back),
+        nodes={name: node.seen_from(at, back) for name, node in m.nodes.items()},
+    )
 
 
 def links(scene: s.Scene) -> list[BodyLink]:

@@ -1,6 +1,6 @@
 """Groups that feel each other through what carries them: their loads, at the cost of each and a few speeds in common.
 
-The rows of a cluster are B' = [Q R | S'] in the order of speeds that are a group's own and those that all share:
+The rows of a cluster are B' = [R'Q', S], speeds that are a group's own before those that all share, so that
 
     Lambda^-1 = R'R + S S',   R'R in a block for each group.
 

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import math
+from collections.abc import Sequence
+
 import numpy as np
 
 from flexmb.entry import articulated
-from flexmb.integrate.lane_problem import lane_entries, lane_stages
+from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages, mark_finite, set_all
+from flexmb.jit.bundle import bundle
 from flexmb.jit.direct import at_address, nothing_at, status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
+from flexmb.jit.transposition import square_to_lanes, square_to_rows
 from flexmb.motion import coordinates
 from flexmb.spatial.vector import mat3, store3, store9, vec3
 from flexmb.tables.status import NONFINITE, OK
+from flexmb.typing import Index
 
 DOUBTFUL = -1  # a status: among the copies of a block one met a pivot that may be rounding
 
@@ -22,58 +28,93 @@ def rhs(s, c, w):
     return articulated.rhs(s.time[0], s.trial, s.k[s.stage[0]], c, w)
 
 
-entries_at = at_address(lane_entries(lane_stages(1), np.zeros(1, np.int64)))
+@bundle
+class LaneGate:
+    """What a thread passes when it asks for accelerations: who is called, on what, and what it reads and writes.
+
+    `blocks`: addresses of the constants of each LANES copies, or of those that all share.
+    """
+
+    stages: LaneStages
+    entries: LaneEntries  # the same numbers
+    calls: Index  # (4,) addresses: `rhs`, `begin` or 0 where all copies share their constants; stages, workspace
+    blocks: Index  # (blocks of copies,) or (1,)
+
+
+def lane_gate(stages: LaneStages, entries: LaneEntries, calls: Sequence[int], blocks: Sequence[int]) -> LaneGate:
+    """Of what the caller holds."""
+    return LaneGate(stages, entries, np.array(calls, np.int64), np.array(blocks, np.int64))
+
+
+def _an_example() -> LaneGate:
+    stages = lane_stages(1)
+    return lane_gate(stages, lane_entries(stages, np.zeros(1, np.int64)), (), ())
+
+
+gate_at = at_address(_an_example())
 
 
 @kernel
-def accelerations(where, blocks, span, q, u, t, found, status):
-    """udot (n,nu) of copies span[0] to span[1] - 1 at q (n,nq), u (n,nu), t (n,), and a status (n,) for each.
+def accelerations(gate, start, stop, q, u, t, found, status):
+    """udot (n,nu) of copies `start` to stop - 1 at q (n,nq), u (n,nu), t (n,) or (1,), and a status (n,) for each.
 
-    `where`: addresses of `rhs` and `begin`, of stages, workspace and entries; `blocks`: of the constants of each LANES
-    copies, or of those that all share. Where fewer copies are left, the last one is in the empty lanes too. By the
-    right-hand side of runs: there is one kernel for both.
+    Returns how many of them have none, by the gate at an address. Where fewer copies are left, the last one is in the
+    empty lanes too. By the right-hand side of runs: there is one kernel for both.
     """
-    function, beginning, s, w, e = where
-    start, stop = span
-    c = blocks[0]
-    entries = entries_at(e)
-    nq, nu = q.shape[1], u.shape[1]
+    g = gate_at(gate)
+    rhs, begin, stages, w = g.calls[0], g.calls[1], g.calls[2], g.calls[3]
+    s, entries, c = g.stages, g.entries, g.blocks[0]
+    nq, nu, missing = q.shape[1], u.shape[1], 0
+    s.stage[0] = 0
+    if t.shape[0] == 1:
+        set_all(entries.time, t[0])
     for first in range(start, stop, LANES):
-        _gather(first, stop, q, entries.trial)
-        _gather(first, stop, u, entries.trial[nq:])
-        for lane in range(LANES):
-            entries.time[0, lane] = t[min(first + lane, stop - 1)]
-        if blocks.shape[0] > 1:
-            c = blocks[first // LANES]
-            nothing_at(beginning, (c, w))
-        whole = status_at(function, (s, c, w))
-        slope, trouble = entries.k[0, nq : nq + nu], entries.norm[0]
-        for lane in range(LANES):
-            trouble[lane] = 0.0
-        for j in range(nu):
+        copies = min(LANES, stop - first)
+        _gather(first, copies, q, entries.trial)
+        _gather(first, copies, u, entries.trial[nq:])
+        if t.shape[0] > 1:
             for lane in range(LANES):
-                trouble[lane] += slope[j, lane] - slope[j, lane]  # NaN unless it is finite
-        for lane in range(min(LANES, stop - first)):
-            for j in range(nu):
-                found[first + lane, j] = slope[j, lane]
-            if whole != OK:
-                status[first + lane] = whole
-            elif trouble[lane] != 0.0:
-                status[first + lane] = NONFINITE
-            else:
-                status[first + lane] = DOUBTFUL if entries.doubt[0] != 0 else OK
+                entries.time[0, lane] = t[first + min(lane, copies - 1)]
+        if begin != 0:
+            c = g.blocks[first // LANES]
+            nothing_at(begin, (c, w))
+        whole = status_at(rhs, (stages, c, w))
+        if whole == OK and entries.doubt[0] != 0:
+            whole = DOUBTFUL
+        mark_finite(s.k[0, nq : nq + nu], s.chosen)
+        _scatter(first, copies, entries.k[0, nq : nq + nu], found)
+        for lane in range(copies):
+            sound = entries.chosen[0, lane] == 1.0 and math.isfinite(entries.time[0, lane])
+            status[first + lane] = whole if whole > OK or sound else NONFINITE
+            if status[first + lane] != OK:
+                missing += 1
+    return missing
 
 
 @helper
-def _gather(first, stop, rows, lanes):
-    """lanes (n,LANES) = the rows (copies,n) from `first` on; where there are no more, the last one before `stop`."""
-    for i in range(rows.shape[1]):
-        if first + LANES <= stop:
+def _gather(first, copies, rows, lanes):
+    """lanes (n,LANES) = so many rows (n,) from `first` on; where there are fewer than LANES, the last one again."""
+    n = rows.shape[1]
+    if copies == LANES and n >= LANES:
+        for i in range(0, n, LANES):
+            square_to_lanes(rows, first, min(i, n - LANES), lanes)  # the last square overlaps the one before
+    else:
+        for i in range(n):
             for lane in range(LANES):
-                lanes[i, lane] = rows[first + lane, i]
-        else:
-            for lane in range(LANES):
-                lanes[i, lane] = rows[min(first + lane, stop - 1), i]
+                lanes[i, lane] = rows[first + min(lane, copies - 1), i]
+
+
+@helper
+def _scatter(first, copies, lanes, rows):
+    """The rows of so many copies = lanes (n,LANES)."""
+    n = rows.shape[1]
+    if copies == LANES and n >= LANES:
+        for i in range(0, n, LANES):
+            square_to_rows(rows, first, min(i, n - LANES), lanes)
+    else:
+        for i in range(n):
+            for lane in range(copies):
+                rows[first + lane, i] = lanes[i, lane]
 
 
 @kernel

@@ -35,8 +35,8 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
-_END = STAGES  # row of A with the weights of the result; k[_END] is the derivative there
-_ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)
+END = STAGES  # row of A with the weights of the result; k[END] is the derivative there
+ERROR_EXPONENT = 8.0  # the error estimate is O(h^8)
 
 
 class ExplicitStages(NamedTuple):
@@ -76,7 +76,7 @@ def stages(problem, t, last, y, h, k, trial, counts):
     """Stages 1 to 11 (stage 0 is given), then trial = y(t + h). No stage is evaluated later than `last`."""
     for s in range(1, STAGES + 1):
         combine(y, h, s, k, trial)
-        if s == _END:
+        if s == END:
             break
         status = derivative(problem, min(t + C[s] * h, last), trial, k[s], counts)
         if status != OK:
@@ -112,7 +112,7 @@ def interpolant(problem, step, y, s, trial, counts):
         change = s.y_new[i] - y[i]
         f[0, i] = change
         f[1, i] = h * k[0, i] - change
-        f[2, i] = 2.0 * change - h * (k[_END, i] + k[0, i])
+        f[2, i] = 2.0 * change - h * (k[END, i] + k[0, i])
         for row in range(4):
             f[3 + row, i] = h * weighted_sum(D[row], D.shape[1], k, i)
     return OK
@@ -154,7 +154,7 @@ def store_samples(problem, step, y, s, times, out, counts):
 
 @helper
 def attempt(problem, step, y, s, accuracy, counts):
-    """One trial step: s.y_new, projected, and its slope s.k[_END]. Returns (status, error norm)."""
+    """One trial step: s.y_new, projected, and its slope s.k[END]. Returns (status, error norm)."""
     h = step.end - step.start
     status = stages(problem, step.start, step.last, y, h, s.k, s.y_new, counts)
     if status != OK:
@@ -162,7 +162,7 @@ def attempt(problem, step, y, s, accuracy, counts):
     error = error_norm(y, s.y_new, h, s.k, accuracy)
     if error < 1.0:
         problem.project(step.end, s.y_new, problem.constants)
-        status = derivative(problem, min(step.end, step.last), s.y_new, s.k[_END], counts)
+        status = derivative(problem, min(step.end, step.last), s.y_new, s.k[END], counts)
     return status, error
 
 
@@ -181,7 +181,7 @@ def dop853(problem, y, clock, accuracy, out, counts):
     for end in segment_ends:
         last = np.nextafter(end, t)
         segment = Interval(t, end, last)
-        status, h = enter_segment(problem, segment, y, s.k[0], h, accuracy, _ERROR_EXPONENT, counts)
+        status, h = enter_segment(problem, segment, y, s.k[0], h, accuracy, ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
         rejected, trouble = False, STEP_TOO_SMALL
@@ -197,14 +197,14 @@ def dop853(problem, y, clock, accuracy, out, counts):
                 status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:
                     return status, t
-                factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
+                factor = step_factor(error, error_before, ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)
                 t, error_before = t_new, error
                 copy(s.y_new, y)
-                copy(s.k[_END], s.k[0])
+                copy(s.k[END], s.k[0])
                 counts[ACCEPTED] += 1
             else:
-                h = length * (shorter(error, _ERROR_EXPONENT) if status == OK else retreat(status))
+                h = length * (shorter(error, ERROR_EXPONENT) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
     return OK, t

@@ -9,8 +9,10 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import kept, some
+from flexmb.levels.body import RIGID
 from flexmb.spatial.inertia import (
     add_inertia,
+    add_rigid,
     inertia_times,
     load_inertia,
     outer_inertia,
@@ -34,7 +36,7 @@ from flexmb.spatial.spatial_vector import (
     times6,
     vec6,
 )
-from flexmb.spatial.vector import cross, mat3, scale, sub, vec3
+from flexmb.spatial.vector import cross, mat3, scale, sub, sym6, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 
@@ -161,8 +163,18 @@ def to_parent(c, w, k, P, F, row):
     rotated = rotate_inertia(R, P) if row < 0 else rotate_without(R, P, row)
     gamma = shift_inertia(rotated, arm)
     F_parent = shift_force(times6(R, F), arm)
-    _add_inertia(c, w, k, gamma)
+    if has(c, RIGID) and c.body[k].starts:
+        _start_inertia(c, w, c.body[k].parent, gamma)
+    else:
+        _add_inertia(c, w, k, gamma)
     _add_force(c, w, w, k, F_parent)
+
+
+@helper
+def _start_inertia(c, w, k, gamma):
+    """P = gamma and the body's own, which is constant: stored once, where it would be written, read and written."""
+    own = c.body[k].rigid
+    store_inertia(w.body[k].inertia, 0, add_rigid(gamma, own[0], vec3(own, 1), sym6(own, 4)))
 
 
 @helper

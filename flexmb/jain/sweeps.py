@@ -14,6 +14,8 @@ from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
+from flexmb.levels import rigid
+from flexmb.levels.body import RIGID
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
 from flexmb.tables.features import LOADS, MODES, WHEELS
@@ -43,7 +45,10 @@ def bodies(c, w):
         if has(c, MODES) and is_out_of_range(c, w, k):
             w.fault[0] = k
             return OUT_OF_RANGE
-        inertia(c, w, k)
+        if has(c, RIGID) and c.body[k].started:
+            rigid.bias(c, w, k)
+        else:
+            inertia(c, w, k)
         if has(c, MODES):
             elastic_forces(c, w, k)
         if has(c, LOADS):

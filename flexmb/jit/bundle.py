@@ -9,6 +9,7 @@ instead of 160 us. The arrays are borrowed: whoever calls the kernel holds the b
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from dataclasses import dataclass, fields
 from functools import cache
 from typing import Any, TypeVar, dataclass_transform
@@ -46,32 +47,44 @@ def _describe(self: Any) -> None:
     Where the type says which features the arrays have, they are made read-only: what is not there must not come later.
     """
     features = self.features() if hasattr(self, "features") else frozenset()
-    names = [field.name for field in fields(self)]
-    table, kinds = np.zeros((len(names), _ROW), np.int64), list[tuple[str, types.Type]]()
-    for name, row in zip(names, table, strict=True):
+    numbers = getattr(type(self), "numbers", types.float64)
+    rows, kinds = list[tuple[int, ...]](), list[tuple[str, types.Type]]()
+    for name in _names(type(self)):
         array = getattr(self, name)
-        if isinstance(getattr(array, "_numba_type_", None), BundleType):
-            row[0] = array._address
+        if not isinstance(array, np.ndarray):
+            rows.append((array._address, *[0] * _DIMENSIONS))
             kinds.append((name, array._numba_type_))
             continue
-        numbers = getattr(type(self), "numbers", types.float64)
         shape = array.shape[:-1] if numbers != types.float64 and array.dtype == np.float64 else array.shape
         if not array.flags.c_contiguous or len(shape) > _DIMENSIONS:
             raise ValueError(f"{name}: a bundle holds C-contiguous arrays of at most {_DIMENSIONS} dimensions")
-        row[0] = array.ctypes.data
-        row[1 : 1 + len(shape)] = shape
+        rows.append((array.ctypes.data, *shape, *[0] * (_DIMENSIONS - len(shape))))
         kinds.append((name, _array_type(array.dtype, len(shape), numbers)))
         if features:
             array.setflags(write=False)
+    table = np.array(rows, np.int64)
     object.__setattr__(self, "_table", table)
     object.__setattr__(self, "_address", table.ctypes.data)
-    object.__setattr__(self, "_numba_type_", BundleType(type(self), tuple(kinds), features))
+    object.__setattr__(self, "_numba_type_", _bundle_type(type(self), tuple(kinds), features))
+
+
+@cache
+def _names(cls: type) -> tuple[str, ...]:
+    return tuple(field.name for field in fields(cls))
 
 
 @cache
 def _array_type(dtype: np.dtype, dimensions: int, numbers: types.Type) -> TableType:
     """Kept, because numba takes a tenth of a millisecond to describe a record."""
     return TableType(numbers if dtype == np.float64 else from_dtype(dtype), dimensions)
+
+
+def broaden(bundles: Sequence[Any]) -> None:
+    """Give bundles of one class the features that any of them has: one kernel fits all, and they share workspaces."""
+    features = frozenset[str]().union(*(each._numba_type_.features for each in bundles))
+    for each in bundles:
+        kind = each._numba_type_
+        object.__setattr__(each, "_numba_type_", _bundle_type(kind.of, kind.kinds, features))
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
@@ -95,6 +108,12 @@ class BundleType(types.Type):
     def place(self, name: str) -> int:
         """Row of a member in the table."""
         return [key for key, _ in self.kinds].index(name)
+
+
+@cache
+def _bundle_type(of: type, kinds: tuple[tuple[str, types.Type], ...], features: frozenset[str]) -> BundleType:
+    """Kept, because the name of a type is the digest of a page."""
+    return BundleType(of, kinds, features)
 
 
 class AnyBundleType(types.Type):

@@ -19,6 +19,9 @@ _without_masses = numbered("without_masses", LEVEL, [level.without_masses for le
 AT_REST = f"{LEVEL} {[level.at_rest for level in LEVELS].index(True)}"
 """The feature of scenes with bodies whose kinematics are those of their rest shape."""
 
+RIGID = f"{LEVEL} {LEVELS.index(rigid.LEVEL)}"
+"""The feature of scenes with bodies of level rigid."""
+
 _AT_REST = np.array([level.at_rest for level in LEVELS])
 
 

@@ -60,9 +60,9 @@ def undeforming_node(modes: int) -> FlexibleNode:
     return FlexibleNode(np.zeros(3), np.eye(3), none, none)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class FlexibleModel:
-    """Inertia points and modes of one flexible body in its body frame.
+    """Inertia points and modes of one flexible body in its body frame. Equal is what is one object.
 
     mass (n,) kg; position (n,3) m; com_offset (n,3) m, in point axes, turning with the point; inertia (n,3,3) kg m^2
     about the point's mass centre, turning with the point; translation and rotation mode shapes (n,3,m); stiffness and

@@ -10,8 +10,9 @@ import numpy as np
 
 from flexmb.entry import lanes
 from flexmb.integrate.control import COUNTS, STOP
-from flexmb.integrate.dop853_lanes import LaneControl, dop853_lanes, lane_control
+from flexmb.integrate.dop853_lanes import dop853_lanes
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.lane_control import LaneControl, lane_control
 from flexmb.integrate.lane_problem import first_derivative, lane_problem
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.rk4_lanes import rk4_lanes
@@ -80,7 +81,7 @@ class BatchRun:
 
     def _block(self, first: int, tables: LaneTables) -> None:
         """Run LANES copies; those whose end the lanes do not decide are left for later."""
-        w, s, entries = tables
+        w, s, entries, _ = tables
         place = slice(first, first + LANES)
         found = Runs(*(part[place] for part in self._found))
         ends = self._copies_ends(range(first, first + LANES))

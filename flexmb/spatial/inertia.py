@@ -79,6 +79,15 @@ def rigid_inertia(m, s, j):
 
 
 @helper
+def add_rigid(p, m, s, j):
+    """P + rigid_inertia(m, s, j), without its zeros."""
+    a, b, c = p
+    x, y, z = s
+    middle = (b[0], b[1] - z, b[2] + y, b[3] + z, b[4], b[5] - x, b[6] - y, b[7] + x, b[8])
+    return sym_add(a, j), middle, (c[0] + m, c[1] + m, c[2] + m, c[3], c[4], c[5])
+
+
+@helper
 def rotate_inertia(r, p):
     """Components in axes A from components in axes B with r = R_AB."""
     return rotate_sym(r, p[0]), rotate_mat(r, p[1]), rotate_sym(r, p[2])

@@ -14,15 +14,17 @@ import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.entry import lanes
 from flexmb.integrate.lane_problem import LaneEntries, LaneStages, lane_entries, lane_stages
-from flexmb.jit.direct import address, addresses
+from flexmb.jit.bundle import broaden
+from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
-from flexmb.jit.pointer import NOTHING, STATUS
+from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
@@ -42,17 +44,18 @@ class Copies(NamedTuple):
 
     q: Real  # (n,nq)
     u: Real  # (n,nu)
-    t: Real  # (n,) s
+    t: Real  # (n,) s, or (1,) for all
     accelerations: Real  # (n,nu)
     status: Index  # (n,)
 
 
 class LaneTables(NamedTuple):
-    """What one thread writes: workspace and stages, and these as floats."""
+    """What one thread writes: workspace and stages, and these as floats; and with what it asks for accelerations."""
 
     workspace: LaneWorkspace
     stages: LaneStages
     entries: LaneEntries
+    gate: lanes.LaneGate
 
 
 class BatchAccelerations(NamedTuple):
@@ -88,8 +91,9 @@ class Batch:
         self._spare: list[LaneTables] = []
         if self.in_lanes and not self.shares_constants:
             self._constants = [
-                lane_constants([(s.constants, s.workspace()) for s in block]) for block in blocks_of(self.systems)
+                lane_constants([system.constants for system in block]) for block in blocks_of(self.systems)
             ]
+            broaden(self._constants)
 
     def system(self, copy: int) -> System:
         """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
@@ -99,13 +103,23 @@ class Batch:
     @contextmanager
     def tables(self) -> Iterator[LaneTables]:
         """For LANES copies, nobody else's meanwhile. To make them takes longer than to evaluate a thousand copies."""
-        try:
-            found = self._spare.pop()
-        except IndexError:
-            w, s = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1)
-            found = LaneTables(w, s, lane_entries(s, w.doubt))
+        found = self._free_tables()
         yield found
         self._spare.append(found)
+
+    def _free_tables(self) -> LaneTables:
+        try:
+            return self._spare.pop()
+        except IndexError:
+            return self._fresh_tables()
+
+    def _fresh_tables(self) -> LaneTables:
+        w, s, c = lane_workspace(self.systems[0].workspace()), lane_stages(self.nq + self.nu + 1), self._constants[0]
+        entries = lane_entries(s, w.doubt)
+        rhs, stages, _, workspace = addresses(lanes.rhs, STATUS, s, c, w)
+        begin = 0 if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)[0]
+        blocks = [address(each) for each in self._constants]
+        return LaneTables(w, s, entries, lanes.lane_gate(s, entries, (rhs, begin, stages, workspace), blocks))
 
     def constants(self, block: int, w: LaneWorkspace) -> Constants:
         """Of the copies LANES * block and on; makes a workspace ready for them."""
@@ -149,39 +163,44 @@ class Batch:
         """
         q, u = self.states(q, u)
         n = len(q)
-        times = arguments.vector("t", t, n) if hasattr(t, "__len__") else np.full(n, arguments.number("t", t))
+        times = arguments.vector("t", t, n) if hasattr(t, "__len__") else np.array([arguments.number("t", t)])
         threads = number_of_threads(threads, n // _WORTH_A_THREAD)
-        copies = Copies(q, u, times, np.empty((n, self.nu)), np.full(n, NONFINITE))
+        copies = Copies(q, u, times, np.empty((n, self.nu)), np.empty(n, np.int64))
         if self.in_lanes:
-            self._in_lanes(copies, threads)
-        copies.status[~np.isfinite(times)] = NONFINITE  # systems without functions of time do not notice
-        if copies.status.any():
+            missing = self._in_lanes(copies, threads)
+        else:
+            copies.status[:], missing = NONFINITE, n
+        if missing:
             for copy in np.flatnonzero(copies.status != OK):
                 self._alone(copies, int(copy))
         return BatchAccelerations(copies.accelerations, copies.status)
 
-    def _in_lanes(self, copies: Copies, threads: int) -> None:
+    def _in_lanes(self, copies: Copies, threads: int) -> int:
+        """Returns how many copies the lanes do not decide."""
         n = len(copies.q)
+        if threads == 1:
+            return self._on_one_thread(copies, 0, n)
+        step, missing = LANES * -(-n // (threads * LANES)), list[int]()
 
-        def work(ranges: Iterable[tuple[int, int]]) -> None:
-            with self.tables() as (w, s, entries):
-                s.stage[0] = 0
-                c = self.constants(0, w)
-                begin, *_ = (0,) if self.shares_constants else addresses(lanes.begin, NOTHING, c, w)
-                rhs, *_ = addresses(lanes.rhs, STATUS, s, c, w)
-                for span in ranges:
-                    lanes.accelerations((rhs, begin, address(s), address(w), address(entries)), blocks, span, *copies)
+        def work(starts: Iterable[int]) -> None:
+            for start in starts:
+                missing.append(self._on_one_thread(copies, start, min(start + step, n)))
 
-        blocks = np.array([address(c) for c in self._constants])
-        step = max(LANES, LANES * -(-n // (threads * LANES)))
-        ranges = [(start, min(start + step, n)) for start in range(0, n, step)]
-        in_threads(work, ranges, threads)
+        in_threads(work, range(0, n, max(step, LANES)), threads)
+        return sum(missing)
+
+    def _on_one_thread(self, copies: Copies, start: int, stop: int) -> int:
+        tables = self._free_tables()
+        missing = _entry()(address(tables.gate), start, stop, *copies)
+        self._spare.append(tables)
+        return int(missing)
 
     def _alone(self, copies: Copies, copy: int) -> None:
         """What the system itself says of a copy that the lanes did not decide."""
         system, found = self.system(copy), copies.accelerations[copy]
         try:
-            alone = system.accelerations(system.state(copies.q[copy], copies.u[copy], copies.t[copy]))
+            t = copies.t[min(copy, len(copies.t) - 1)]
+            alone = system.accelerations(system.state(copies.q[copy], copies.u[copy], t))
         except DynamicsError as error:
             copies.status[copy], found[:] = error.status, np.nan
             return
@@ -191,6 +210,12 @@ class Batch:
         copies.status[copy] = OK
         if not np.isfinite(found).all() or not self.in_lanes:
             found[:] = alone
+
+
+@cache
+def _entry() -> Any:
+    """`lanes.accelerations`, compiled once for all batches."""
+    return settled(lanes.accelerations, ADDRESS, WHOLE, WHOLE, MATRIX, MATRIX, VECTOR, MATRIX, INDEX)
 
 
 def compile_batch(scenes: Sequence[Scene]) -> Batch:

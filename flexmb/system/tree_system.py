@@ -21,6 +21,7 @@ from flexmb.building.assemble import assemble
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
+from flexmb.entry.observation import Outputs
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
@@ -31,6 +32,7 @@ from flexmb.system.evaluator import Evaluator
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
+from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
@@ -56,19 +58,31 @@ class System(Mechanics):
         self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
-        self._w = self.workspace()
-        self.recursion_constants = with_elimination(self.constants, elimination)
-        self._recursion_w = self.recursion_workspace()
-        hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
-        closures, driven = [closure.name for closure in scene.closures], self._driven([*hinges, *wheels])
-        self._observation = Observation(Names(markers, hinges, wheels, closures, driven), self.nu)
-        self._out = self._observation.out
+        self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)
         self.rhs, self.project = articulated.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
         self._evaluators: dict[str, Evaluator] = {}
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    @cached_property
+    def _w(self) -> Workspace:  # type: ignore[override]
+        return self.workspace()
+
+    @cached_property
+    def _recursion_w(self) -> Workspace:  # type: ignore[override]
+        return self.recursion_workspace()
+
+    @cached_property
+    def _observation(self) -> Observation:
+        hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
+        closures, driven = [closure.name for closure in self.scene.closures], self._driven([*hinges, *wheels])
+        return Observation(Names(self._markers, hinges, wheels, closures, driven), self.nu)
+
+    @cached_property
+    def _out(self) -> Outputs:  # type: ignore[override]
+        return self._observation.out
 
     def __getstate__(self) -> dict[str, Any]:
         """Without what holds addresses: a copy finds its own."""
@@ -183,11 +197,11 @@ class System(Mechanics):
     @property
     def batch(self) -> Batch:
         """Any number of copies of this system."""
-        from flexmb.system.batch import Batch  # lanes are for those who ask for many states
+        found: Batch | None = self.kept.get("batch")
+        if found is None:
+            from flexmb.system.batch import Batch  # lanes are for those who ask for many states
 
-        if Batch not in self.kept:
-            self.kept[Batch] = Batch([self])
-        found: Batch = self.kept[Batch]
+            found = self.kept["batch"] = Batch([self])
         return found
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:

@@ -36,6 +36,8 @@ BODY = _record(  # what rigid trees need comes first, so that it lies together
     # without the summed points
     ("rigid", _F, (10,)),
     ("parent", _I),  # -1 for ground
+    ("starts", _I),  # whether its parent's articulated inertia starts with what this body hands over, see `started`
+    ("started", _I),  # whether an outboard body starts its inertia: level rigid without wheels, its own is in `rigid`
     ("axis", _I),  # of a hinge with one speed, along z: its row of a motion, ANGULAR_Z or LINEAR_Z; NO_AXIS for others
     ("q_index", _I),  # first hinge coordinate in q
     ("u_index", _I),  # first hinge speed in u

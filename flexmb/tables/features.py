@@ -68,9 +68,9 @@ def features(c: Constants) -> frozenset[str]:
         DAMPERS: np.any(speed["damping"] != 0.0),
         MODAL_DAMPING: np.any(pair["damping"] != 0.0),
     }
-    numbered = {f"{HINGE} {n}" for n in np.unique(body["hinge_kind"])}
-    numbered |= {f"{AXIS} {n}" for n in np.unique(body["axis"])}
-    numbered |= {f"{LEVEL} {n}" for n in np.unique(body["level"])}
+    numbered = {f"{HINGE} {n}" for n in set(body["hinge_kind"].tolist())}
+    numbered |= {f"{AXIS} {n}" for n in set(body["axis"].tolist())}
+    numbered |= {f"{LEVEL} {n}" for n in set(body["level"].tolist())}
     return frozenset(name for name, there in found.items() if there) | numbered
 
 

@@ -15,6 +15,7 @@ from flexmb.jit.bundle import bundle
 from flexmb.jit.lanes import LANE, LANES
 from flexmb.jit.wide_arrays import in_lanes
 from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.workspaces import ports_at_rest
 from flexmb.typing import Real, Record
 
 
@@ -40,13 +41,12 @@ def lane_workspace(w: Workspace) -> LaneWorkspace:
     return LaneWorkspace(**{field.name: in_lanes([getattr(w, field.name)] * LANES) for field in fields(w)})
 
 
-def lane_constants(copies: Sequence[tuple[Constants, Workspace]]) -> LaneConstants:
-    """Of LANES systems of one structure, each with its constants and a fresh workspace."""
-    constants, workspaces = [c for c, _ in copies], [w for _, w in copies]
+def lane_constants(copies: Sequence[Constants]) -> LaneConstants:
+    """Of LANES systems of one structure."""
     return LaneConstants(
-        **{field.name: in_lanes([getattr(c, field.name) for c in constants]) for field in fields(constants[0])},
-        ground=in_lanes([w.ground for w in workspaces]),
-        rest=in_lanes([w.port for w in workspaces]),
+        **{field.name: in_lanes([getattr(c, field.name) for c in copies]) for field in fields(copies[0])},
+        ground=in_lanes([-c.gravity for c in copies]),
+        rest=in_lanes([ports_at_rest(c) for c in copies]),
     )
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.jit.lanes import LANES
 from flexmb.tables import arrays as a
+from flexmb.typing import Record
 
 
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
@@ -27,7 +28,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "hinge": np.zeros(n, a.HINGE_STATE),
         "mode": np.zeros((n, m), a.MODE_STATE),
         "pff": np.zeros((n, m, m)),
-        "port": np.zeros(len(c.port), a.PORT_STATE),
+        "port": ports_at_rest(c),
         "port_mode": np.zeros((len(c.port), m), a.COLUMN),
         "point_mode": np.zeros(m, a.COLUMN),
         "integral": np.zeros(12 * m),
@@ -37,10 +38,15 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "doubt": np.zeros(1, np.int64),
         "displaced": np.ones(1, np.int64),
     }
-    w = _reduced(c, fields) if isinstance(c, a.ReducedConstants) else a.Workspace(**fields)
-    w.port["r"] = c.port["position"] + c.port["offset"]
-    w.port["R"] = c.port["frame"]
-    return w
+    return _reduced(c, fields) if isinstance(c, a.ReducedConstants) else a.Workspace(**fields)
+
+
+def ports_at_rest(c: a.Constants) -> Record:
+    """(P,) PORT_STATE of the undeformed bodies."""
+    port = np.zeros(len(c.port), a.PORT_STATE)
+    port["r"] = c.port["position"] + c.port["offset"]
+    port["R"] = c.port["frame"]
+    return port
 
 
 def _reduced(c: a.ReducedConstants, fields: dict[str, Any]) -> a.ReducedWorkspace:

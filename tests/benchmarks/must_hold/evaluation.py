@@ -12,6 +12,7 @@ from tests.benchmarks.rivals import flexible_chain, rigid_chain
 from tests.benchmarks.test_batch import SAMPLES, batch
 
 PYTHON, KERNEL, BATCH = "Evaluation from Python", "Kernel", "Batch, per core"
+CHAINS = f"{SAMPLES} copies of 10 bodies"
 COPIES, STEPS = 128, 10  # of a rollout: long enough to hide what each copy costs at its start
 
 
@@ -35,8 +36,8 @@ def rows() -> list[Row]:
             Row(f"kernel_{n}", KERNEL, f"pin.abaInParallel on one thread, {n} bodies", 3.0, partial(_kernel, n))
             for n in (10, 50, 100)
         ),
-        Row("batch_aba", BATCH, "pin.aba, 10 bodies", 20.0, partial(_batch, "aba")),
-        Row("batch_parallel", BATCH, "pin.abaInParallel, 10 bodies", 14.0, partial(_batch, "parallel")),
+        Row("batch_aba", BATCH, f"pin.aba, {CHAINS}", 20.0, partial(_batch, "aba")),
+        Row("batch_parallel", BATCH, f"pin.abaInParallel, {CHAINS}", 14.0, partial(_batch, "parallel")),
         Row("batch_rollout", BATCH, "mujoco.rollout, Euler steps, 10 bodies", 10.0, partial(_batch, "rollout")),
         Row("batch_flexible", BATCH, "one copy at a time, 10 beams of 5 modes, ruthless", 3.5, _flexible_batch),
     ]

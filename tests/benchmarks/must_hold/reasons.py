@@ -15,7 +15,8 @@ class Reason(NamedTuple):
 REASONS = (
     Reason(
         ("growth_chain_1000_100000", "growth_star_1000_100000", "growth_binary_tree_1000_100000"),
-        "memory. A body takes 1.4 kB of constants and states, which three passes read and write: a thousand bodies lie in "
-        "the cache, a hundred thousand stream from memory at some 15 GB/s. The faster the kernel, the larger the ratio.",
+        "memory. A body takes 1.4 kB of constants and states, which three passes read and write: a thousand bodies lie "
+        "in the cache, a hundred thousand stream from memory at some 15 GB/s. The faster the kernel, the larger the "
+        "ratio.",
     ),
 )

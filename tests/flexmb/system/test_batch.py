@@ -191,6 +191,23 @@ def test_copies_with_numbers_of_their_own(recipe):
         assert error(system, system.state(q[i], u[i], 0.4), found.accelerations[i]) <= BOUND
 
 
+@pytest.mark.parametrize("damped", [range(8, 11), range(8)])
+def test_what_only_some_copies_have(damped, monkeypatch):
+    """Kernels without dampers are for blocks of copies that have none."""
+    monkeypatch.setenv("FLEXMB_KERNELS", "exact")
+    scenes = [pendulum(0.3 if i in damped else 0.0) for i in range(11)]
+    q, u = np.zeros((11, 1)), np.ones((11, 1))
+    found = compile_batch(scenes).accelerations(q, u, threads=1).accelerations[:, 0]
+    alone = [float(fm.compile(scene).accelerations(fm.compile(scene).state([0.0], [1.0]))[0]) for scene in scenes]
+    np.testing.assert_array_equal(found, alone)
+    assert len(set(alone)) == 2
+
+
+def pendulum(damping: float) -> fm.Scene:
+    scene = SceneBuilder("pendulum").rigid_body("rod", mass=1.0, com=(0.5, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+    return scene.revolute("pin", "ground", "rod", damping=damping).scene()
+
+
 def test_copies_of_another_structure_are_refused():
     scene = gimbal()
     other = replace_hinge(scene)

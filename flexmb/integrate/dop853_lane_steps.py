@@ -1,0 +1,194 @@
+"""One step of DOP853 for eight runs at once: stages, error norms, the first step, and the interpolant of a step."""
+
+from __future__ import annotations
+
+import math
+
+from flexmb.integrate.dop853 import END, ERROR_EXPONENT
+from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
+from flexmb.integrate.lane_control import RUNNING, set_times
+from flexmb.integrate.lane_problem import any_chosen, lane_copy, lane_derivative, mark_finite
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import LANES, select
+from flexmb.tables.status import OK
+
+
+@helper
+def _combine(s, weights, count):
+    """s.trial = y + h * sum over j < count of weights[j] k[j], past the many zeros of the weights."""
+    n, h = s.y.shape[0], s.h[0]
+    for i in range(n):
+        s.trial[i] = weights[0] * s.k[0, i]
+    for j in range(1, count):
+        a = weights[j]
+        if a != 0.0:
+            for i in range(n):
+                s.trial[i] += a * s.k[j, i]
+    for i in range(n):
+        s.trial[i] = s.y[i] + h * s.trial[i]
+
+
+@helper
+def _weighted_sum(weights, count, k, i):
+    total = weights[0] * k[0, i]
+    for j in range(1, count):
+        total += weights[j] * k[j, i]
+    return total
+
+
+@helper
+def _stages(problem, s, entries, control, counts):
+    """Stages 1 to 11 (stage 0 is given), then s.trial = y(t + h); returns a status code."""
+    for stage in range(1, STAGES + 1):
+        _combine(s, A[stage], stage)
+        if stage == END:
+            break
+        set_times(entries, control, C[stage])
+        status = lane_derivative(problem, s, stage, counts)
+        if status != OK:
+            return status
+    return OK
+
+
+@helper
+def _error_sums(s, accuracy):
+    """Sums of squares of the 5th and 3rd order error estimates over the tolerance, into s.norm[0] and s.norm[1]."""
+    sum5, sum3 = 0.0, 0.0
+    for i in range(accuracy.controlled):
+        old, new = abs(s.y[i]), abs(s.trial[i])
+        scale = accuracy.atol + accuracy.rtol * select(new > old, new, old)
+        five = _weighted_sum(E5, E5.shape[0], s.k, i) / scale
+        three = _weighted_sum(E3, E3.shape[0], s.k, i) / scale
+        sum5 += five * five
+        sum3 += three * three
+    s.norm[0], s.norm[1] = sum5, sum3
+
+
+@helper
+def _judge(s, entries, control, accuracy):
+    """The error norm of each lane, infinite where its state is not finite; marks those that may accept their steps."""
+    mark_finite(s.trial, s.chosen)
+    _error_sums(s, accuracy)
+    for lane in range(LANES):
+        sum5, sum3 = entries.norm[0, lane], entries.norm[1, lane]
+        error = 0.0
+        if sum5 != 0.0 or sum3 != 0.0:
+            error = control.length[lane] * sum5 / math.sqrt((sum5 + 0.01 * sum3) * accuracy.controlled)
+        finite = entries.chosen[0, lane] == 1.0
+        control.error[lane] = error if finite else math.inf
+        entries.chosen[0, lane] = 1.0 if control.status[lane] == RUNNING and finite and error < 1.0 else 0.0
+
+
+@helper
+def attempt(problem, s, entries, control, accuracy, counts):
+    """One trial step of all lanes: s.y_new, projected, and its slope; marks the lanes that accept it."""
+    status = _stages(problem, s, entries, control, counts)
+    if status != OK:
+        return status
+    _judge(s, entries, control, accuracy)
+    if not any_chosen(entries):
+        return OK
+    for lane in range(LANES):
+        entries.time[0, lane] = control.end[lane]
+    problem.project(problem.stages, problem.constants)
+    lane_copy(s.trial, s.y_new)
+    for lane in range(LANES):
+        entries.time[0, lane] = min(control.end[lane], control.last[lane])
+    status = lane_derivative(problem, s, END, counts)
+    if status != OK:
+        return status
+    accepted = s.chosen[0]
+    mark_finite(s.k[END], s.chosen)
+    s.chosen[0] = select(accepted > 0.0, s.chosen[0], 0.0)
+    for lane in range(LANES):
+        if control.error[lane] < 1.0 and entries.chosen[0, lane] == 0.0:
+            control.error[lane] = math.inf
+    return OK
+
+
+@helper
+def first_step(problem, s, entries, control, accuracy, counts):
+    """First step sizes: Hairer, Norsett, Wanner I, II.4, as `flexmb.integrate.control.initial_step`."""
+    _scaled_norms(s, accuracy)
+    for lane in range(LANES):
+        d0, d1 = _norm(entries.norm[0, lane], accuracy), _norm(entries.norm[1, lane], accuracy)
+        h0 = 1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1
+        control.length[lane] = min(h0, control.end[lane] - control.t[lane])
+        control.error[lane] = d1
+        entries.h[0, lane] = control.length[lane]
+    for i in range(s.y.shape[0]):
+        s.trial[i] = s.y[i] + s.h[0] * s.k[0, i]
+    set_times(entries, control, 1.0)
+    status = lane_derivative(problem, s, 1, counts)
+    if status != OK:
+        return status
+    for i in range(s.y.shape[0]):
+        s.k[2, i] = s.k[1, i] - s.k[0, i]
+    mark_finite(s.k[1], s.chosen)
+    _scaled_norm_of(s, s.k[2], accuracy)
+    for lane in range(LANES):
+        h0, d1 = control.length[lane], control.error[lane]
+        d2 = _norm(entries.norm[2, lane], accuracy) / h0
+        h1 = max(1e-6, h0 * 1e-3) if d1 <= 1e-15 and d2 <= 1e-15 else (0.01 / max(d1, d2)) ** (1.0 / ERROR_EXPONENT)
+        span = control.end[lane] - control.t[lane]
+        control.h[lane] = min(100.0 * h0, h1, span) if entries.chosen[0, lane] == 1.0 else h0
+    return OK
+
+
+@helper
+def _norm(total, accuracy):
+    """Root mean square from a sum of squares."""
+    return math.sqrt(total / accuracy.controlled) if accuracy.controlled > 0 else 0.0
+
+
+@helper
+def _scaled_norms(s, accuracy):
+    """Sums of squares of y and of its slope k[0] over atol + rtol |y|, into s.norm[0] and s.norm[1]."""
+    state, slope = 0.0, 0.0
+    for i in range(accuracy.controlled):
+        scale = accuracy.atol + accuracy.rtol * abs(s.y[i])
+        a, b = s.y[i] / scale, s.k[0, i] / scale
+        state += a * a
+        slope += b * b
+    s.norm[0], s.norm[1] = state, slope
+
+
+@helper
+def _scaled_norm_of(s, values, accuracy):
+    """The same of values (n,), into s.norm[2]."""
+    total = 0.0
+    for i in range(accuracy.controlled):
+        a = values[i] / (accuracy.atol + accuracy.rtol * abs(s.y[i]))
+        total += a * a
+    s.norm[2] = total
+
+
+@helper
+def interpolant(problem, s, entries, control, counts):
+    """Coefficients s.f (7,n) of the interpolant of order 7 on the step from y to y_new; three more stages."""
+    for stage in range(STAGES + 1, STAGES_DENSE):
+        _combine(s, A[stage], stage)
+        set_times(entries, control, C[stage])
+        status = lane_derivative(problem, s, stage, counts)
+        if status != OK:
+            return status
+    h = s.h[0]
+    for i in range(s.y.shape[0]):
+        change = s.y_new[i] - s.y[i]
+        s.f[0, i] = change
+        s.f[1, i] = h * s.k[0, i] - change
+        s.f[2, i] = 2.0 * change - h * (s.k[END, i] + s.k[0, i])
+        for row in range(4):
+            s.f[3 + row, i] = h * _weighted_sum(D[row], D.shape[1], s.k, i)
+    return OK
+
+
+@helper
+def interpolate(s):
+    """s.trial = y + x (f0 + (1-x) (f1 + x (f2 + (1-x) (f3 + ...)))) at the fractions x of the steps."""
+    x = s.fraction[0]
+    for i in range(s.y.shape[0]):
+        value = s.f[6, i] * x
+        for row in range(5, -1, -1):
+            value = (value + s.f[row, i]) * (x if row % 2 == 0 else 1.0 - x)
+        s.trial[i] = s.y[i] + value
