@@ -188,11 +188,15 @@ def test_what_ran_is_let_go():
     class Something:
         pass
 
-    thing = Something()
-    gone, stop = weakref.ref(thing), np.zeros(1, np.int64)
-    interruptible(lambda: (thing, None)[1], (), stop)
+    def made():
+        thing = Something()
+        return weakref.ref(thing), lambda: id(thing)
+
+    (gone, run), stop = made(), np.zeros(1, np.int64)
+    interruptible(run, (), stop)
+    assert gone() is not None
+    del run
     interruptible(lambda: None, (), stop)
-    del thing
     gc.collect()
     assert gone() is None
 
