@@ -25,7 +25,7 @@ class Interrupted(KeyboardInterrupt):
         return f"{self.trajectory.message}; what was reached is in the attribute `trajectory`"
 
 
-class _Worker:
+class _SpareThread:
     """A thread that does one thing after another: to start one costs as much as a short run."""
 
     def __init__(self) -> None:
@@ -45,16 +45,16 @@ class _Worker:
             self._work.pop()()
 
 
-_idle: list[_Worker] = []  # of the main thread, which alone has others work for it
+_idle: list[_SpareThread] = []  # of the main thread, which alone has others work for it
 
 
-def _idle_worker() -> _Worker:
+def _idle_worker() -> _SpareThread:
     """One that nobody waits for; a process that was forked off has none of its parent's threads."""
     while _idle:
         worker = _idle.pop()
         if worker.process == os.getpid():
             return worker
-    return _Worker()
+    return _SpareThread()
 
 
 def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index) -> tuple[Any, bool]:
