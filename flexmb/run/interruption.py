@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import _thread
+import os
 import threading
 from collections.abc import Callable
 from typing import Any
@@ -22,6 +23,38 @@ class Interrupted(KeyboardInterrupt):
 
     def __str__(self) -> str:
         return f"{self.trajectory.message}; what was reached is in the attribute `trajectory`"
+
+
+class _SpareThread:
+    """A thread that does one thing after another: to start one costs as much as a short run."""
+
+    def __init__(self) -> None:
+        self.process = os.getpid()
+        self._asked, self._work = _thread.allocate_lock(), list[Callable[[], None]]()
+        self._asked.acquire()
+        _thread.start_new_thread(self._serve, ())
+
+    def do(self, work: Callable[[], None]) -> None:
+        """Begin with what raises nothing, after all that came before is done."""
+        self._work.append(work)
+        self._asked.release()
+
+    def _serve(self) -> None:
+        while True:
+            self._asked.acquire()
+            self._work.pop()()
+
+
+_idle: list[_SpareThread] = []  # of the main thread, which alone has others work for it
+
+
+def _idle_worker() -> _SpareThread:
+    """One that nobody waits for; a process that was forked off has none of its parent's threads."""
+    while _idle:
+        worker = _idle.pop()
+        if worker.process == os.getpid():
+            return worker
+    return _SpareThread()
 
 
 def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Index) -> tuple[Any, bool]:
@@ -47,8 +80,8 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
             done.acquire(timeout=PATIENCE)
 
     done.acquire()
-    _thread.start_new_thread(work, ())
-    interrupted = False
+    worker, interrupted = _idle_worker(), False
+    worker.do(work)
     try:
         wait()
     except KeyboardInterrupt:
@@ -58,6 +91,9 @@ def interruptible(run: Callable[..., Any], arguments: tuple[Any, ...], stop: Ind
         stop[0] = 1
         wait()
         raise
+    finally:
+        if found:  # else a second Ctrl-C: it is still at work
+            _idle.append(worker)
     result, problem = found[0]
     if problem is not None:
         raise problem

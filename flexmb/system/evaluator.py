@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from flexmb.entry.gate import gate
-from flexmb.jit.direct import addresses, direct
+from flexmb.jit.direct import Direct, addresses, direct
 from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system.algorithm import DynamicsAlgorithm
@@ -50,11 +50,15 @@ class _Careful:
     """The same step by step, for arguments in another form, and for all that there is something to say of."""
 
     def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
-        self._system, self._w = system, tables[1]
-        self._evaluate = direct(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
+        self._system, self._algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
         self._rates = np.zeros(system.nu)
         self.shown = self._rates.view()
         self.shown.flags.writeable = False
+
+    @cached_property
+    def _evaluate(self) -> Direct:
+        """(t, y): the kernel by an entry of its own, compiled when first needed."""
+        return direct(self._algorithm.kernel(), STATUS, REAL, VECTOR, *self._tables)
 
     def __call__(self, t: Any, q: Any, u: Any) -> Real:
         t, y = self._system.layout.packed(t, q, u)

@@ -1,5 +1,6 @@
 """Ctrl-C ends compiled runs within a second and keeps what was reached: sent to processes of their own."""
 
+import gc
 import os
 import pickle
 import signal
@@ -7,6 +8,7 @@ import subprocess
 import sys
 import threading
 import time
+import weakref
 from pathlib import Path
 
 import numpy as np
@@ -162,6 +164,60 @@ def test_errors_of_a_run_and_of_other_signals_come_through():
     finally:
         signal.signal(signal.SIGALRM, before)
     assert stop[0] == 1
+
+
+def test_runs_share_a_thread_and_one_within_another_has_its_own():
+    """A handler of a signal may start a run of its own, while the main thread waits."""
+    stop, inner = np.zeros(1, np.int64), list[int]()
+    first, _ = interruptible(threading.get_ident, (), stop)
+    assert interruptible(threading.get_ident, (), stop)[0] == first != threading.get_ident()
+
+    def alarm(number, frame):
+        inner.append(interruptible(threading.get_ident, (), stop)[0])
+
+    before = signal.signal(signal.SIGALRM, alarm)
+    try:
+        signal.setitimer(signal.ITIMER_REAL, 0.05)
+        outer, _ = interruptible(lambda: (time.sleep(0.3), threading.get_ident())[1], (), stop)
+    finally:
+        signal.signal(signal.SIGALRM, before)
+    assert outer == first and len(inner) == 1 and inner[0] != first
+
+
+def test_what_ran_is_let_go():
+    class Something:
+        pass
+
+    def made():
+        thing = Something()
+        return weakref.ref(thing), lambda: id(thing)
+
+    (gone, run), stop = made(), np.zeros(1, np.int64)
+    interruptible(run, (), stop)
+    assert gone() is not None
+    del run
+    interruptible(lambda: None, (), stop)
+    gc.collect()
+    assert gone() is None
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+def test_a_process_that_was_forked_off_has_a_thread_of_its_own():
+    program = """
+import os, signal
+import numpy as np
+from flexmb.run.interruption import interruptible
+stop = np.zeros(1, np.int64)
+assert interruptible(lambda: 1, (), stop) == (1, False)
+child = os.fork()
+if child == 0:
+    signal.alarm(60)  # where it waits for a thread that is not there
+    os._exit(interruptible(lambda: 7, (), stop)[0])
+assert os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]) == 7
+assert interruptible(lambda: 2, (), stop) == (2, False)
+"""
+    done = subprocess.run([sys.executable, "-c", program], cwd=ROOT, capture_output=True, text=True, timeout=LIMIT_S)
+    assert done.returncode == 0, done.stderr
 
 
 def test_in_another_thread_a_run_is_called_there():
