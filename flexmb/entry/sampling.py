@@ -16,13 +16,14 @@ outputs_at = at_address(outputs(shapes(0, 0, 0, 0), _NONE, _NONE))
 
 
 @kernel
-def observe_samples(motion, c, w, observe, out, doubt, times, states, slope, rows):
+def observe_samples(where, doubt, times, states, slope, rows):
     """Rows (T,m) of out.every, out.drives and what is not written, at states (T,n) and times (T,); how many are sound.
 
-    The first five are addresses: of a right-hand side (t, y, dy, c, w) and its tables, of the kernel (c, w, out) that
-    observes where it was evaluated, and of the outputs; doubt (1,) is that of w, slope (n,) is written. The loop ends
-    where a status is not OK, a number is not finite, or a pivot may be rounding: for Python to look into.
+    where (5,): addresses of a right-hand side (t, y, dy, c, w) and its tables, of the kernel (c, w, out) that observes
+    where it was evaluated, and of the outputs; doubt (1,) is that of w, slope (n,) is written. The loop ends where a
+    status is not OK, a number is not finite, or a pivot may be rounding: for Python to look into.
     """
+    motion, c, w, observe, out = where[0], where[1], where[2], where[3], where[4]
     o = outputs_at(out)
     n, nu = o.every.shape[0], o.drives.shape[0]
     for sample in range(times.shape[0]):

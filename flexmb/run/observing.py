@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from flexmb.entry.sampling import observe_samples
-from flexmb.jit.direct import ADDRESS, addresses, bound, settled
+from flexmb.jit.direct import addresses, bound, settled
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
@@ -32,11 +32,12 @@ def batch(system: System, rhs: Any, observing: Any, constants: Any, workspace: A
     """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns how many, up to the first that
     is for Python to look into. It has outputs of its own."""
     out, slope = system._observation.outputs(), np.empty(system.nq + system.nu + 1)
-    entry = settled(observe_samples, *[ADDRESS] * 5, INDEX, VECTOR, MATRIX, VECTOR, MATRIX)
+    entry = settled(observe_samples, INDEX, INDEX, VECTOR, MATRIX, VECTOR, MATRIX)
     motion = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace)
     found, *_, outputs = addresses(observing, NOTHING, constants, workspace, out)
-    call = bound(entry, (*motion, found, outputs), constants, workspace, out)
-    return lambda times, states, rows: call(workspace.doubt, times, states, slope, rows)
+    where = np.array([*motion, found, outputs])
+    call = bound(entry, (), constants, workspace, out)
+    return lambda times, states, rows: call(where, workspace.doubt, times, states, slope, rows)
 
 
 def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:

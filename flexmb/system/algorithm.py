@@ -47,8 +47,8 @@ class DynamicsAlgorithm:
     route: Callable[[Mechanics], Route] | None = None
     """For runs of trees; None where it is for single states."""
     observing: Any = None
-    """The kernel that observes a tree where the right-hand side of `route` was just evaluated, of tables as `route`
-    makes them, and `Outputs`. None where Python stands between several."""
+    """The kernel that observes a tree where the right-hand side of `route` was just evaluated, of its tables and
+    `Outputs`. None where Python stands between several."""
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
     """For closed chains; None where it knows trees only."""
     jacobian: bool = False
