@@ -19,6 +19,7 @@ from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
+from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, dot6, plus6, scale6, store6, sub6, vec6
 from flexmb.spatial.vector import add_outer, vec3
 
@@ -37,7 +38,7 @@ def eliminate_modes(c, w, k):
     _to_orthonormal(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b] - w.zeta[r, b]
-    F = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 0)
+    F = _sum_of_modes(w.gain[r], w.zf[k], c.body[k].modes, 0)
     store6(w.body[k].hinge_force, 0, sub6(vec6(w.body[k].force, 0), F))
     if nodes == 0:
         return True
@@ -81,9 +82,9 @@ def _pass_nodes(w, k, r, nodes):
 def _tables(c, w, k):
     """L^-1 M_fr, L^-1 Pi', zeta, Theta and root of Omega at the present deformation; L is diagonal."""
     r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
-    rows, inverse, modes = w.gain[r], c.compliance[r], w.mode[k]
+    rows, inverse = w.gain[r], c.compliance[r]
     for n in range(nm):
-        store6(rows[n, 0], 0, scale6(inverse[n, n], vec6(modes[n].pfr, 0)))
+        store6(rows[n, 0], 0, scale6(inverse[n, n], column6(w.pfr[k], n)))
     store_inertia(w.zeta[r], 0, _squares(rows, nm, 0))
     omega = w.scratch[0]
     for j in range(nodes):
@@ -185,19 +186,19 @@ def _to_orthonormal(c, w, k):
     """L^-1 z_f in place."""
     rows = c.compliance[c.body[k].reduced]
     for i in range(c.body[k].modes - 1, -1, -1):
-        s = w.mode[k, i].zf
-        w.mode[k, i].zf = rows[i, i] * s
+        s = w.zf[k, i]
+        w.zf[k, i] = rows[i, i] * s
         if not c.body[k].orthogonal:
             for n in range(i + 1, c.body[k].modes):
-                w.mode[k, n].zf += rows[n, i] * s
+                w.zf[k, n] += rows[n, i] * s
 
 
 @helper
-def _sum_of_modes(rows, modes, nm, j):
+def _sum_of_modes(rows, zf, nm, j):
     """Psi' z_f for j = 0, Ups' z_f of node j - 1 beyond."""
     total = ZERO6
     for n in range(nm):
-        total = axpy6(modes[n].zf, vec6(rows[n, j], 0), total)
+        total = axpy6(zf[n], vec6(rows[n, j], 0), total)
     return total
 
 
@@ -207,7 +208,7 @@ def _responses(c, w, k):
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
-        store6(w.node[r, i].response, 0, _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 1 + i))
+        store6(w.node[r, i].response, 0, _sum_of_modes(w.gain[r], w.zf[k], c.body[k].modes, 1 + i))
     for a in range(w.rank[r]):
         s = 0.0
         for i in range(nodes):
@@ -227,17 +228,17 @@ def modal_accelerations(c, w, k, A):
         node = w.node[r, i]
         for b in range(6):
             node.response[b] = plus6(node.force[b], vec6(node.carried[b], 0), A)
-    rows, modes = w.gain[r], w.mode[k]
+    rows = w.gain[r]
     for n in range(c.body[k].modes):
-        s = plus6(modes[n].zf, vec6(rows[n, 0], 0), A)
+        s = plus6(w.zf[k, n], vec6(rows[n, 0], 0), A)
         for i in range(nodes):
             s += dot6(vec6(rows[n, 1 + i], 0), vec6(w.node[r, i].response, 0))
-        modes[n].etadd = -s
+        w.etadd[k, n] = -s
     for i in range(c.body[k].modes):
-        row, s = c.compliance[r, i], w.mode[k, i].etadd
-        w.mode[k, i].etadd = row[i] * s
+        row, s = c.compliance[r, i], w.etadd[k, i]
+        w.etadd[k, i] = row[i] * s
         if not c.body[k].orthogonal:
             for n in range(i):
-                w.mode[k, n].etadd += row[n] * s
+                w.etadd[k, n] += row[n] * s
     for n in range(c.body[k].modes):
-        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd
+        w.speed[c.body[k].etad_index + n].acceleration = w.etadd[k, n]

@@ -95,7 +95,7 @@ def _node_ports(c: a.Constants) -> dict[int, list[int]]:
 def _reduced_constants(
     c: a.Constants, reduced: list[int], nodes: dict[int, list[int]], variant: int
 ) -> a.ReducedConstants:
-    most, m = max(len(nodes[k]) for k in reduced), c.mode.shape[1]
+    most, m = max(len(nodes[k]) for k in reduced), c.mff.shape[2]
     size = 6 * max(most, 1)
     tables: dict[str, Any] = {
         "compliance": np.zeros((len(reduced), m, m)),
@@ -130,7 +130,7 @@ class _Rest:
     def of(cls, c: a.Constants, k: int, ports: list[int]) -> _Rest:
         """About O. Where O sits on a node d of the body: with V = X V_O - B etadot, the congruence of (13), (17)."""
         n, hinge = c.body["modes"][k], int(c.body["outboard_port"][k])
-        M_ff, M_fr, Pi_t = c.pair["mff"][k, :n, :n], c.mode["mfr"][k, :n], _shapes(c, ports, n)
+        M_ff, M_fr, Pi_t = c.mff[k, :n, :n], c.mfr[k, :, :n].T, _shapes(c, ports, n)
         phi_t = np.vstack([np.zeros((0, 6)), *(_shift(_place(c, port)) for port in ports)])
         if hinge < 0:
             return cls(M_ff, M_fr, Pi_t, phi_t)
@@ -179,7 +179,7 @@ def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
 
 def _shapes(c: a.Constants, ports: list[int], n: int) -> a.Real:
     """Pi' (n, 6C) of the nodes at rest: angular and linear velocity by modal speed."""
-    rotation, translation = c.port_mode["rotation"][ports, :n], c.port_mode["translation"][ports, :n]
+    rotation, translation = np.split(c.port_mode[ports, :, :n].swapaxes(1, 2), 2, axis=2)
     linear = translation + np.cross(rotation, c.port["offset"][ports][:, None])
     return np.concatenate([rotation, linear], axis=2).swapaxes(0, 1).reshape(n, 6 * len(ports))
 

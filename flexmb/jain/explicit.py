@@ -1,14 +1,16 @@
-"""Modes eliminated by an explicit Cholesky factor of D_f, (63), (64): for any body, at any level, with any hinge.
+"""Modes eliminated by the factors D_f = L D L', (63), (64): for any body, at any level, with any hinge.
 
-After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
+L has a unit diagonal, D is that of the pivots: no square root is taken. After the inward sweep the workspace holds D L'
+(w.pff, upper triangle; what is below means nothing), D^-1 (w.inverse_pivot), L^-1 P_fr (w.pfr) and L^-1 z_f (w.zf).
 """
 
-from flexmb.jain.doubt import note_modes
+from flexmb.jain.doubt import note_mode
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import by_width, helper
 from flexmb.jit.lanes import kept, some
+from flexmb.jit.strips import after, put, start, strip, width
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
@@ -21,8 +23,10 @@ from flexmb.spatial.inertia import (
     sum_inertia,
 )
 from flexmb.spatial.pivots import SINGULAR
+from flexmb.spatial.rows import add_column6, column6, put6, store_column6, strips6, total6, total_inertia
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import (
+    ZERO6,
     add6,
     axpy6,
     dot6,
@@ -31,6 +35,7 @@ from flexmb.spatial.spatial_vector import (
     scale6,
     shift_force,
     store6,
+    sum6,
     times6,
     vec6,
 )
@@ -40,29 +45,69 @@ from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
 @helper
 def eliminate_modes(c, w, k):
-    """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
+    """D_f = L D L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
     nm = c.body[k].modes
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    if nm > 0 and not cholesky(w.pff[k], nm):
-        return False
-    note_modes(c, w, k, w.pff[k])
-    P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
     for n in range(nm):
-        P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
-        for i in range(n):
-            s = -w.pff[k, n, i]
-            z += s * w.mode[k, i].zf
-            P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
-        s = 1.0 / w.pff[k, n, n]
-        P_fr, z = scale6(s, P_fr), s * z
-        store6(w.mode[k, n].pfr, 0, P_fr)
-        w.mode[k, n].zf = z
-        z_r = axpy6(-z, P_fr, z_r)
-        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
-    store6(w.body[k].hinge_force, 0, z_r)
-    store_inertia(w.body[k].hinge_inertia, 0, P)
+        floor = SINGULAR * w.pff[k, n, n]
+        _next_row(c, w, k, n)
+        pivot = w.pff[k, n, n]
+        sound = pivot.real > floor.real
+        if not some(sound):
+            return False
+        pivot = kept(sound, pivot)
+        note_mode(c, w, k, n, pivot)
+        w.inverse_pivot[k, n] = 1.0 / pivot
+        _next_loads(c, w, k, n)
+    six, nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    P, z_r = (six, nine, six), ZERO6
+    for n in range(0, nm, width(w)):
+        P_fr, z_f, weight = strips6(w, w.pfr[k], n), strip(w, w.zf[k], n), -strip(w, w.inverse_pivot[k], n)
+        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], weight))
+        z_r = axpy6(weight * z_f, P_fr, z_r)
+    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), total6(w, z_r)))
+    store_inertia(w.body[k].hinge_inertia, 0, sum_inertia(load_inertia(w.body[k].inertia, 0), total_inertia(w, P)))
     return True
+
+
+@helper
+def _next_row(c, w, k, n):
+    """Row n of D L' from that of D_f and the rows before: its diagonal element is the pivot."""
+    D, factor = w.pff[k], w.point_mode[0]
+    for i in range(n):
+        factor[i] = w.inverse_pivot[k, i] * D[i, n]
+    for m in range(start(w, n), c.body[k].modes, width(w)):
+        row = strip(w, D[n], m)
+        for i in range(n):
+            row -= factor[i] * strip(w, D[i], m)
+        put(w, D[n], m, row)
+
+
+@helper
+def _one_by_one(c, w, k, n):
+    """Loads of mode n, from which those of the modes before are taken: for vectors, which are stored but once."""
+    P_fr, z = column6(w.pfr[k], n), w.zf[k, n]
+    for i in range(n):
+        s = -w.point_mode[0, i]
+        z += s * w.zf[k, i]
+        P_fr = axpy6(s, column6(w.pfr[k], i), P_fr)
+    store_column6(w.pfr[k], n, P_fr)
+    w.zf[k, n] = z
+
+
+@helper
+def _from_all_after(c, w, k, n):
+    """Loads of mode n taken from those of all modes after it, in strips."""
+    s = -w.inverse_pivot[k, n]
+    P_fr, z = scale6(s, column6(w.pfr[k], n)), s * w.zf[k, n]
+    for m in range(start(w, n + 1), c.body[k].modes, width(w)):
+        row = after(w, strip(w, w.pff[k, n], m), m, n)
+        put6(w, w.pfr[k], m, axpy6(row, P_fr, strips6(w, w.pfr[k], m)))
+        put(w, w.zf[k], m, strip(w, w.zf[k], m) + z * row)
+
+
+_next_loads = by_width(_from_all_after, _one_by_one)  # rows of L^-1 P_fr and L^-1 z_f
 
 
 @helper
@@ -106,12 +151,10 @@ def refer_to_hinge(c, w, k):
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, -0.5)
     for n in range(c.body[k].modes):
-        B, P_fr = from_hinge(c, w, k, n), vec6(w.mode[k, n].pfr, 0)
+        B, P_fr = from_hinge(c, w, k, n), column6(w.pfr[k], n)
         for m in range(n + 1):
-            s = less6(w.pff[k, n, m], P_fr, from_hinge(c, w, k, m))
-            s -= dot6(B, vec6(w.mode[k, m].pfr, 0))
-            w.pff[k, n, m] = s
-            w.pff[k, m, n] = s
+            s = less6(w.pff[k, m, n], P_fr, from_hinge(c, w, k, m))
+            w.pff[k, m, n] = s - dot6(B, column6(w.pfr[k], m))
     refer_coupling(c, w, k, -0.5)
     refer_rigid(c, w, k)
 
@@ -127,7 +170,7 @@ def from_hinge(c, w, k, n):
 @helper
 def _add_momentum(c, w, k, n, P_rr, s):
     """P_fr += s B'P_rr, row n."""
-    add6(w.mode[k, n].pfr, 0, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
+    add_column6(w.pfr[k], n, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
 
 
 @helper
@@ -137,7 +180,7 @@ def refer_coupling(c, w, k, s):
     P_rr = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, s)
-        store6(w.mode[k, n].pfr, 0, shift_force(vec6(w.mode[k, n].pfr, 0), back))
+        store_column6(w.pfr[k], n, shift_force(column6(w.pfr[k], n), back))
 
 
 @helper
@@ -145,7 +188,7 @@ def refer_rigid(c, w, k):
     """z_f - B'z_r, X'P_rr X and X'z_r."""
     z_r = vec6(w.body[k].force, 0)
     for n in range(c.body[k].modes):
-        w.mode[k, n].zf -= dot6(from_hinge(c, w, k, n), z_r)
+        w.zf[k, n] -= dot6(from_hinge(c, w, k, n), z_r)
     back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
     store_inertia(w.body[k].inertia, 0, shift_inertia(load_inertia(w.body[k].inertia, 0), back))
     store6(w.body[k].force, 0, shift_force(z_r, back))
@@ -185,15 +228,23 @@ def _add_inertia(c, w, k, gamma):
         i = c.body[k].inboard_port
         if i >= 0:
             r = vec3(w.port[i].r, 0)
-            for n in range(c.body[parent].modes):
-                momentum = inertia_times(gamma, mode_motion(w, i, n))
-                for m in range(n + 1):
-                    s = dot6(momentum, mode_motion(w, i, m)) + w.pff[parent, n, m]
-                    w.pff[parent, n, m] = s
-                    w.pff[parent, m, n] = s
-                add6(w.mode[parent, n].pfr, 0, shift_force(momentum, r))
+            _add_to_modes(c, w, parent, i, gamma, r)
             gamma = shift_inertia(gamma, r)
     add_inertia(w.body[parent].inertia, 0, gamma)
+
+
+@helper
+def _add_to_modes(c, w, k, i, gamma, r):
+    """Pi' Gamma Pi added to P_ff, upper triangle, and phi Gamma Pi to P_fr, of port i of body k, at r."""
+    nm, modes, momenta = c.body[k].modes, w.port_mode[i], w.point_mode
+    for n in range(0, nm, width(w)):
+        momentum = inertia_times(gamma, strips6(w, modes, n))
+        put6(w, momenta, n, momentum)
+        put6(w, w.pfr[k], n, sum6(strips6(w, w.pfr[k], n), shift_force(momentum, r)))
+        for m in range(n, min(n + width(w), nm)):
+            for j in range(n, nm, width(w)):
+                row = plus6(strip(w, w.pff[k, m], j), column6(momenta, m), strips6(w, modes, j))
+                put(w, w.pff[k, m], j, row)
 
 
 @helper
@@ -208,11 +259,13 @@ def _add_force(c, w, z, k, F_parent):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """Back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
-    for n in range(c.body[k].modes - 1, -1, -1):
-        P_fr = vec6(w.mode[k, n].pfr, 0)
-        s = plus6(w.mode[k, n].zf, P_fr, A)
-        for i in range(n + 1, c.body[k].modes):
-            s += w.pff[k, i, n] * w.mode[k, i].etadd
-        w.mode[k, n].etadd = -s / w.pff[k, n, n]
-        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd
+    """Back substitution L' etadd = -D^-1 (L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
+    nm = c.body[k].modes
+    for n in range(0, nm, width(w)):
+        put(w, w.etadd[k], n, plus6(strip(w, w.zf[k], n), strips6(w, w.pfr[k], n), A))
+    for n in range(nm - 1, -1, -1):
+        s = w.etadd[k, n]
+        for i in range(n + 1, nm):
+            s += w.pff[k, n, i] * w.etadd[k, i]
+        w.etadd[k, n] = -w.inverse_pivot[k, n] * s
+        w.speed[c.body[k].etad_index + n].acceleration = w.etadd[k, n]

@@ -13,7 +13,8 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_inertia
-from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, vec6
+from flexmb.spatial.rows import add_column6, column6, store_column6
+from flexmb.spatial.spatial_vector import dot6, shift_force, store6, vec6
 from flexmb.spatial.vector import vec3
 
 
@@ -23,7 +24,7 @@ def eliminate_modes(c, w, k):
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
-        store6(w.mode[k, n].pfr, 0, vec6(c.mode[k, n].mfr, 0))
+        store_column6(w.pfr[k], n, column6(c.mfr[k], n))
     if not node_inertia(w, r, c.body[k].nodes):
         return False
     for i in range(c.body[k].nodes):
@@ -41,10 +42,11 @@ def eliminate_modes(c, w, k):
             g[b] = 0.0
         for i in range(nm):
             for b in range(6):
-                g[b] += w.pff[k, n, i] * w.mode[k, i].pfr[b]
-        add_product(w.body[k].hinge_inertia, 0, -1.0, g, w.mode[k, n].pfr)
+                g[b] += w.pff[k, n, i] * w.pfr[k, b, i]
+        torque, force = column6(w.pfr[k], n)
+        add_product(w.body[k].hinge_inertia, 0, -1.0, g, torque + force)
         for b in range(6):
-            w.body[k].hinge_force[b] -= g[b] * w.mode[k, n].zf
+            w.body[k].hinge_force[b] -= g[b] * w.zf[k, n]
     return True
 
 
@@ -56,7 +58,7 @@ def _load_node(c, w, k, i):
     r = vec3(w.port[port].r, 0)
     gamma = load_inertia(node.gamma, 0)
     for n in range(c.body[k].modes):
-        add6(w.mode[k, n].pfr, 0, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
+        add_column6(w.pfr[k], n, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
     add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
     add_port_force(c, w, w, k, port, vec6(node.force, 0))
 
@@ -92,6 +94,6 @@ def modal_accelerations(c, w, k, A):
     for n in range(c.body[k].modes):
         s = dot6(vec6(w.gain[r, n, 0], 0), A)
         for i in range(c.body[k].modes):
-            s += w.pff[k, n, i] * w.mode[k, i].zf
-        w.mode[k, n].etadd = -s
+            s += w.pff[k, n, i] * w.zf[k, i]
+        w.etadd[k, n] = -s
         w.speed[c.body[k].etad_index + n].acceleration = -s

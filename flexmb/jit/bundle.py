@@ -97,6 +97,11 @@ class BundleType(types.Type):
         return [key for key, _ in self.kinds].index(name)
 
 
+def is_long(kind: BundleType) -> bool:
+    """Whether strips of such a workspace have several elements (see `flexmb.jit.strips`): its numbers are floats."""
+    return bool(getattr(kind.of, "numbers", types.float64) == types.float64)
+
+
 class AnyBundleType(types.Type):
     """Type of bundles that a kernel passes on and never looks into."""
 

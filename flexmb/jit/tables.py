@@ -190,14 +190,14 @@ def _getitem(context, builder, sig, args):
     place, left = _place(builder, kind, args[0], indices)
     if left:
         return table(context, builder, sig.return_type, place, left)
-    return place if isinstance(kind.dtype, types.Record) else _load(context, builder, kind.dtype, place)
+    return place if isinstance(kind.dtype, types.Record) else load_number(context, builder, kind.dtype, place)
 
 
 @lower_builtin(operator.setitem, TableType, types.Any, types.Any)
 def _setitem(context, builder, sig, args):
     kind, index, number = sig.args
     indices = cgutils.unpack_tuple(builder, args[1]) if isinstance(index, types.BaseTuple) else [args[1]]
-    _store(context, builder, number, args[2], _place(builder, kind, args[0], indices)[0])
+    store_number(context, builder, number, args[2], _place(builder, kind, args[0], indices)[0])
     return context.get_dummy_value()
 
 
@@ -207,7 +207,7 @@ def _field(context, builder, kind, value, name):
     found, shape = kind.member(name)
     if shape:
         return table(context, builder, TableType(found, len(shape)), place, [WORD(n) for n in shape])
-    return _load(context, builder, found, place)
+    return load_number(context, builder, found, place)
 
 
 @lower_setattr_generic(RowType)
@@ -215,16 +215,18 @@ def _set_field(context, builder, sig, args, name):
     kind, number = sig.args
     place = builder.gep(args[0], [WORD(kind.record.offset(name))], inbounds=True)
     found, _ = kind.member(name)
-    _store(context, builder, found, context.cast(builder, args[1], number, found), place)
+    store_number(context, builder, found, context.cast(builder, args[1], number, found), place)
 
 
-def _load(context, builder, kind, place):
+def load_number(context: Any, builder: Any, kind: types.Type, place: Any) -> Any:
+    """A number of this type from an address."""
     if kind == DUAL:
         return kind.load(builder, place)
     return context.unpack_value(builder, kind, builder.bitcast(place, context.get_data_type(kind).as_pointer()))
 
 
-def _store(context, builder, kind, value, place):
+def store_number(context: Any, builder: Any, kind: types.Type, value: Any, place: Any) -> None:
+    """Likewise."""
     if kind == DUAL:
         kind.store(builder, value, place)
         return

@@ -20,12 +20,12 @@ def is_out_of_range(c, w, k):
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
     diagonal = 0.0
     for n in range(c.body[k].modes):
-        diagonal += w.mode[k, n].eta * c.pair[k, n, n].mff * w.mode[k, n].eta
+        diagonal += w.eta[k, n] * c.mff[k, n, n] * w.eta[k, n]
     if every(c.body[k].modes * diagonal.real <= limit):  # Cauchy and Schwarz: the sum below is no larger
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
-            squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    w.mode[k, 0].eta = kept(squares.real <= limit, w.mode[k, 0].eta)
+            squares += w.eta[k, n] * c.mff[k, n, i] * w.eta[k, i]
+    w.eta[k, 0] = kept(squares.real <= limit, w.eta[k, 0])
     return every(squares.real > limit)

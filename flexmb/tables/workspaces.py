@@ -6,12 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.jit.strips import strip_zeros
 from flexmb.tables import arrays as a
 
 
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
     """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
-    n, m = c.mode.shape
+    n, _, m = c.mfr.shape
     fields: dict[str, Any] = {
         "q": np.zeros(nq),
         "u": np.zeros(nu),
@@ -20,12 +21,12 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "ground": -c.gravity,
         "body": np.zeros(n, a.BODY_STATE),
         "hinge": np.zeros(n, a.HINGE_STATE),
-        "mode": np.zeros((n, m), a.MODE_STATE),
-        "pff": np.zeros((n, m, m)),
+        **{name: strip_zeros((n, m)) for name in ("eta", "etad", "etadd", "zf", "inverse_pivot")},
+        "pff": strip_zeros((n, m, m)),
+        "pfr": strip_zeros((n, 6, m)),
         "port": np.zeros(len(c.port), a.PORT_STATE),
-        "port_mode": np.zeros((len(c.port), m), a.COLUMN),
-        "point_mode": np.zeros(m, a.COLUMN),
-        "integral": np.zeros(12 * m),
+        "port_mode": strip_zeros((len(c.port), 6, m)),
+        "point_mode": strip_zeros((6, m)),
         "speed": np.zeros(nu, a.SPEED_STATE),
         "function": np.zeros((len(c.function), 3)),
         "fault": np.zeros(1, np.int64),
