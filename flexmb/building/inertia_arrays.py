@@ -17,9 +17,7 @@ from flexmb.modal.flexible_model import SecondOrder
 from flexmb.tables import arrays as a
 
 
-def inertia_arrays(
-    chain: list[BodyLink], m: int
-) -> tuple[dict[str, Any], dict[str, Any], list[SecondOrder | None]]:
+def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[str, Any], list[SecondOrder | None]]:
     """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
     second-order field of each."""
     body = np.zeros(len(chain), a.BODY)
@@ -41,7 +39,9 @@ def inertia_arrays(
         body["uncoupled"][k] = _is_diagonal(model.stiffness) and _is_diagonal(model.damping)
     for name in ("product", "slope", "mass_slope"):
         body[name] = -1
-    body["product"][summed], product = _rows([each.product for each in bodies.values()], strip_zeros((1 + m, NUMBERS, m)))
+    body["product"][summed], product = _rows(
+        [each.product for each in bodies.values()], strip_zeros((1 + m, NUMBERS, m))
+    )
     slopes = [each.slope for each in bodies.values()]
     mass_slopes = [each.mass_slope for each in bodies.values()]
     body["slope"][summed], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))

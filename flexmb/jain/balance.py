@@ -9,7 +9,6 @@ from flexmb.levels.body import body_inertia
 from flexmb.motion.coordinates import speed_power
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.rotation import rotation_vector
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, shift_force, times6, vec6
 from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
 from flexmb.tables.features import BALL_SPRINGS, LOADS, MODAL_DAMPING, MODES, SPRINGS, WHEELS
@@ -51,7 +50,7 @@ def _body(c, w, k, energy, momentum):
     twice = dot6(h, V)
     if has(c, MODES):
         for n in range(c.body[k].modes):
-            M_fr, etad = column6(w.pfr[k], n), w.etad[k, n]
+            M_fr, etad = vec6(w.pfr[k, n], 0), w.etad[k, n]
             twice += 2.0 * etad * dot6(M_fr, V)
             h = axpy6(etad, M_fr, h)
             eta = w.q[c.body[k].eta_index + n]

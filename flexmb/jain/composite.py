@@ -21,7 +21,8 @@ from flexmb.motion.coordinates import hinge_forces
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.pivots import is_small
-from flexmb.spatial.rows import column3, column6
+from flexmb.spatial.rows import column3
+from flexmb.spatial.spatial_vector import vec6
 from flexmb.spatial.vector import dot, mat3, scale, vec3
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
@@ -125,7 +126,7 @@ def _own_forces(c, w, m, k):
         _store_force(m.X, first + n, inertia_times(R, motion_column(c, w, k, n)))
     nm = c.body[k].modes
     for n in range(nm):
-        _store_force(m.X, modes + n, column6(w.pfr[k], n))
+        _store_force(m.X, modes + n, vec6(w.pfr[k, n], 0))
         for i in range(n, nm):
             m.M[modes + n, modes + i] = w.pff[k, n, i]
     count = c.body[k].wheel_stop - c.body[k].wheel_start

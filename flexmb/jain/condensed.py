@@ -19,7 +19,6 @@ from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, dot6, plus6, scale6, store6, sub6, vec6
 from flexmb.spatial.vector import add_outer, vec3
 
@@ -84,7 +83,7 @@ def _tables(c, w, k):
     r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
     rows, inverse = w.gain[r], c.compliance[r]
     for n in range(nm):
-        store6(rows[n, 0], 0, scale6(inverse[n, n], column6(w.pfr[k], n)))
+        store6(rows[n, 0], 0, scale6(inverse[n, n], vec6(w.pfr[k, n], 0)))
     store_inertia(w.zeta[r], 0, _squares(rows, nm, 0))
     omega = w.scratch[0]
     for j in range(nodes):

@@ -1,7 +1,7 @@
 """Modes eliminated by the factors D_f = L D L', (63), (64): for any body, at any level, with any hinge.
 
 L has a unit diagonal, D is that of the pivots: no square root is taken. After the inward sweep the workspace holds D L'
-(w.pff, upper triangle; what is below means nothing), D^-1 (w.inverse_pivot), L^-1 P_fr (w.pfr) and L^-1 z_f (w.zf).
+(w.pff, upper triangle; what is below means nothing), D^-1 (w.inverse_pivot) and rows of L^-1 [P_fr z_f] (w.pfr).
 """
 
 from flexmb.jain.doubt import note_mode
@@ -10,7 +10,7 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
 from flexmb.jit.kernel import by_width, helper
 from flexmb.jit.lanes import kept, some
-from flexmb.jit.strips import after, put, start, strip, width
+from flexmb.jit.strips import add_across, put, start, strip, width, with_seventh
 from flexmb.spatial.inertia import (
     add_inertia,
     inertia_times,
@@ -23,7 +23,7 @@ from flexmb.spatial.inertia import (
     sum_inertia,
 )
 from flexmb.spatial.pivots import SINGULAR
-from flexmb.spatial.rows import add_column6, column6, put6, store_column6, strips6, total6, total_inertia
+from flexmb.spatial.rows import axpy3, column6, column_inertia, put6, strips6
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import (
     ZERO6,
@@ -42,72 +42,90 @@ from flexmb.spatial.spatial_vector import (
 from flexmb.spatial.vector import cross, mat3, scale, sub, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
+LOAD = 6  # place of L^-1 z_f in a row of w.pfr
+
 
 @helper
 def eliminate_modes(c, w, k):
     """D_f = L D L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
-    nm = c.body[k].modes
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    for n in range(nm):
-        floor = SINGULAR * w.pff[k, n, n]
-        _next_row(c, w, k, n)
-        pivot = w.pff[k, n, n]
-        sound = pivot.real > floor.real
-        if not some(sound):
+    return _eliminate(c, w, k)
+
+
+@helper
+def _one_by_one(c, w, k):
+    """Each row of [D_f P_fr z_f] less what those before it take: of vectors, which are better not stored often."""
+    D, factor = w.pff[k], w.point_mode[0]
+    P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
+    for n in range(c.body[k].modes):
+        P_fr, z, pivot = vec6(w.pfr[k, n], 0), w.zf[k, n], D[n, n]
+        floor = SINGULAR * pivot
+        for i in range(n):
+            s = -w.inverse_pivot[k, i] * D[i, n]
+            factor[i] = s
+            pivot += s * D[i, n]
+            z += s * w.pfr[k, i, LOAD]
+            P_fr = axpy6(s, vec6(w.pfr[k, i], 0), P_fr)
+        if not _keep_pivot(c, w, k, n, pivot, floor):
             return False
-        pivot = kept(sound, pivot)
-        note_mode(c, w, k, n, pivot)
-        w.inverse_pivot[k, n] = 1.0 / pivot
-        _next_loads(c, w, k, n)
-    six, nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    P, z_r = (six, nine, six), ZERO6
-    for n in range(0, nm, width(w)):
-        P_fr, z_f, weight = strips6(w, w.pfr[k], n), strip(w, w.zf[k], n), -strip(w, w.inverse_pivot[k], n)
-        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], weight))
-        z_r = axpy6(weight * z_f, P_fr, z_r)
-    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), total6(w, z_r)))
-    store_inertia(w.body[k].hinge_inertia, 0, sum_inertia(load_inertia(w.body[k].inertia, 0), total_inertia(w, P)))
+        for m in range(n + 1, c.body[k].modes):
+            row = D[n, m]
+            for i in range(n):
+                row += factor[i] * D[i, m]
+            D[n, m] = row
+        store6(w.pfr[k, n], 0, P_fr)
+        w.pfr[k, n, LOAD] = z
+        s = -w.inverse_pivot[k, n]
+        z_r = axpy6(s * z, P_fr, z_r)
+        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], s))
+    store6(w.body[k].hinge_force, 0, z_r)
+    store_inertia(w.body[k].hinge_inertia, 0, P)
     return True
 
 
 @helper
-def _next_row(c, w, k, n):
-    """Row n of D L' from that of D_f and the rows before: its diagonal element is the pivot."""
-    D, factor = w.pff[k], w.point_mode[0]
-    for i in range(n):
-        factor[i] = w.inverse_pivot[k, i] * D[i, n]
-    for m in range(start(w, n), c.body[k].modes, width(w)):
-        row = strip(w, D[n], m)
-        for i in range(n):
-            row -= factor[i] * strip(w, D[i], m)
-        put(w, D[n], m, row)
+def _in_strips(c, w, k):
+    """Each row of [D_f P_fr z_f] taken from those after it, and from [P_rr z_r]: few sums wait for each other."""
+    D, Y, nm = w.pff[k], w.pfr[k], c.body[k].modes
+    for n in range(nm):
+        w.inverse_pivot[k, n] = SINGULAR * D[n, n]  # the least that the pivot may be
+        put(w, Y[n], 0, with_seventh(w, strip(w, Y[n], 0), w.zf[k, n]))
+    taken = ZERO6
+    for n in range(nm):
+        if not _keep_pivot(c, w, k, n, D[n, n], w.inverse_pivot[k, n]):
+            return False
+        s, own = -w.inverse_pivot[k, n], strip(w, Y[n], 0)
+        for i in range(n + 1, nm):
+            factor = s * D[n, i]
+            for m in range(start(w, i), nm, width(w)):
+                put(w, D[i], m, strip(w, D[i], m) + factor * strip(w, D[n], m))
+            put(w, Y[i], 0, strip(w, Y[i], 0) + factor * own)
+        row = s * own
+        loads = vec6(Y[n], 0)
+        taken = axpy3(loads[0], row, taken[0]), axpy3(loads[1], row, taken[1])
+    found = w.point_mode
+    put6(w, found, 0, taken)
+    P = column_inertia(found)
+    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), column6(found, LOAD)))
+    store_inertia(w.body[k].hinge_inertia, 0, sum_inertia(load_inertia(w.body[k].inertia, 0), P))
+    return True
 
 
 @helper
-def _one_by_one(c, w, k, n):
-    """Loads of mode n, from which those of the modes before are taken: for vectors, which are stored but once."""
-    P_fr, z = column6(w.pfr[k], n), w.zf[k, n]
-    for i in range(n):
-        s = -w.point_mode[0, i]
-        z += s * w.zf[k, i]
-        P_fr = axpy6(s, column6(w.pfr[k], i), P_fr)
-    store_column6(w.pfr[k], n, P_fr)
-    w.zf[k, n] = z
+def _keep_pivot(c, w, k, n, pivot, floor):
+    """The inverse of the pivot of mode n; False where it is rounding, or NaN."""
+    sound = pivot.real > floor.real
+    if not some(sound):
+        return False
+    pivot = kept(sound, pivot)
+    note_mode(c, w, k, n, pivot)
+    w.pff[k, n, n] = pivot
+    w.inverse_pivot[k, n] = 1.0 / pivot
+    return True
 
 
-@helper
-def _from_all_after(c, w, k, n):
-    """Loads of mode n taken from those of all modes after it, in strips."""
-    s = -w.inverse_pivot[k, n]
-    P_fr, z = scale6(s, column6(w.pfr[k], n)), s * w.zf[k, n]
-    for m in range(start(w, n + 1), c.body[k].modes, width(w)):
-        row = after(w, strip(w, w.pff[k, n], m), m, n)
-        put6(w, w.pfr[k], m, axpy6(row, P_fr, strips6(w, w.pfr[k], m)))
-        put(w, w.zf[k], m, strip(w, w.zf[k], m) + z * row)
-
-
-_next_loads = by_width(_from_all_after, _one_by_one)  # rows of L^-1 P_fr and L^-1 z_f
+_eliminate = by_width(_in_strips, _one_by_one)
 
 
 @helper
@@ -151,10 +169,10 @@ def refer_to_hinge(c, w, k):
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, -0.5)
     for n in range(c.body[k].modes):
-        B, P_fr = from_hinge(c, w, k, n), column6(w.pfr[k], n)
+        B, P_fr = from_hinge(c, w, k, n), vec6(w.pfr[k, n], 0)
         for m in range(n + 1):
             s = less6(w.pff[k, m, n], P_fr, from_hinge(c, w, k, m))
-            w.pff[k, m, n] = s - dot6(B, column6(w.pfr[k], m))
+            w.pff[k, m, n] = s - dot6(B, vec6(w.pfr[k, m], 0))
     refer_coupling(c, w, k, -0.5)
     refer_rigid(c, w, k)
 
@@ -170,7 +188,7 @@ def from_hinge(c, w, k, n):
 @helper
 def _add_momentum(c, w, k, n, P_rr, s):
     """P_fr += s B'P_rr, row n."""
-    add_column6(w.pfr[k], n, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
+    add6(w.pfr[k, n], 0, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
 
 
 @helper
@@ -180,7 +198,7 @@ def refer_coupling(c, w, k, s):
     P_rr = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, s)
-        store_column6(w.pfr[k], n, shift_force(column6(w.pfr[k], n), back))
+        store6(w.pfr[k, n], 0, shift_force(vec6(w.pfr[k, n], 0), back))
 
 
 @helper
@@ -240,7 +258,7 @@ def _add_to_modes(c, w, k, i, gamma, r):
     for n in range(0, nm, width(w)):
         momentum = inertia_times(gamma, strips6(w, modes, n))
         put6(w, momenta, n, momentum)
-        put6(w, w.pfr[k], n, sum6(strips6(w, w.pfr[k], n), shift_force(momentum, r)))
+        add_across(w, w.pfr[k], n, shift_force(momentum, r))
         for m in range(n, min(n + width(w), nm)):
             for j in range(n, nm, width(w)):
                 row = plus6(strip(w, w.pff[k, m], j), column6(momenta, m), strips6(w, modes, j))
@@ -259,12 +277,10 @@ def _add_force(c, w, z, k, F_parent):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """Back substitution L' etadd = -D^-1 (L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
+    """Back substitution L' etadd = -D^-1 (L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward (64)."""
     nm = c.body[k].modes
-    for n in range(0, nm, width(w)):
-        put(w, w.etadd[k], n, plus6(strip(w, w.zf[k], n), strips6(w, w.pfr[k], n), A))
     for n in range(nm - 1, -1, -1):
-        s = w.etadd[k, n]
+        s = plus6(w.pfr[k, n, LOAD], vec6(w.pfr[k, n], 0), A)
         for i in range(n + 1, nm):
             s += w.pff[k, n, i] * w.etadd[k, i]
         w.etadd[k, n] = -w.inverse_pivot[k, n] * s

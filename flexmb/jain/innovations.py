@@ -1,7 +1,8 @@
 """Innovations factorisation M = (1 + H Phi K) D (1 + H Phi K)' of trees, applied and inverted by recursion, O(N).
 
 The factors are what `flexmb.jain.sweeps.inward` leaves: per body first the free wheels, then the modes (D_f), then the
-hinge (D_R), each D = L L'. Prescribed speeds are held: their rows and columns of M are left out. With
+hinge (D_R), each D = L L'; of modes L is that of `flexmb.jain.explicit` times the roots of the pivots. Prescribed
+speeds are held: their rows and columns of M are left out. With
 
     F = (1 + H Phi K) L
 
@@ -10,7 +11,7 @@ hinge (D_R), each D = L L'. Prescribed speeds are held: their rows and columns o
     excite        y = F' x        outward
     synthesise    T = F y         inward      both together: M x, (54)
 
-For the modes L is that of `flexmb.jain.explicit` times the roots of the pivots. F is the Cholesky factor of M in the order tip to base, of each body its wheels, modes, hinge speeds. T, y and x are
+F is the Cholesky factor of M in the order tip to base, of each body its wheels, modes, hinge speeds. T, y and x are
 `speed` of a response, each in place of what it is made from. The first takes the response's forces on bodies and modes
 as well: F^-1 (T - H Phi z).
 """
@@ -19,7 +20,7 @@ from math import log, sqrt
 
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import carried_acceleration, store_origin_acceleration
-from flexmb.jain.explicit import force_to_parent
+from flexmb.jain.explicit import LOAD, force_to_parent
 from flexmb.jain.forces import add_port_torque
 from flexmb.jain.kinematics import motion_column, velocity_sweep
 from flexmb.jain.ports import mode_motion
@@ -28,7 +29,6 @@ from flexmb.jain.sweeps import inward
 from flexmb.jain.wheels import spin_axis, wheel_forces
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import axpy6, dot6, less6, shift_force, store6, vec6
 from flexmb.spatial.vector import dot, scale, vec3
 
@@ -70,7 +70,7 @@ def innovate(c, w, x, k):
         for i in range(n):
             epsilon -= w.pff[k, i, n] * x.speed[start + i]
         x.speed[start + n] = w.inverse_pivot[k, n] * epsilon
-        z = axpy6(x.speed[start + n], column6(w.pfr[k], n), z)
+        z = axpy6(x.speed[start + n], vec6(w.pfr[k, n], 0), z)
     for n in range(c.body[k].modes):
         x.speed[start + n] *= sqrt(w.pff[k, n, n])
     store6(x.body[k].force, 0, z)
@@ -86,7 +86,7 @@ def respond(c, w, x):
         A = hinge_solve.solve(c, w, x, k, carried_acceleration(c, w, x, k))
         start, nm = c.body[k].etad_index, c.body[k].modes
         for n in range(nm - 1, -1, -1):
-            rate = less6(x.speed[start + n] * sqrt(w.pff[k, n, n]), column6(w.pfr[k], n), A)
+            rate = less6(x.speed[start + n] * sqrt(w.pff[k, n, n]), vec6(w.pfr[k, n], 0), A)
             for i in range(n + 1, nm):
                 rate -= w.pff[k, n, i] * x.etadd[k, i]
             x.etadd[k, n] = w.inverse_pivot[k, n] * rate
@@ -108,7 +108,7 @@ def excite(c, w, x):
         start, nm = c.body[k].etad_index, c.body[k].modes
         for n in range(nm):
             x.etadd[k, n] = x.speed[start + n]
-            total = dot6(column6(w.pfr[k], n), A)
+            total = dot6(vec6(w.pfr[k, n], 0), A)
             for i in range(n, nm):
                 total += w.pff[k, n, i] * x.speed[start + i]
             x.speed[start + n] = total / sqrt(w.pff[k, n, n])
@@ -136,7 +136,7 @@ def synthesise(c, w, x):
         start = c.body[k].etad_index
         for n in range(c.body[k].modes):
             x.speed[start + n] /= sqrt(w.pff[k, n, n])
-            z = axpy6(x.speed[start + n], column6(w.pfr[k], n), z)
+            z = axpy6(x.speed[start + n], vec6(w.pfr[k, n], 0), z)
         for n in range(c.body[k].modes - 1, -1, -1):
             T = x.zf[k, n]
             for i in range(n + 1):
@@ -151,7 +151,7 @@ def synthesise(c, w, x):
 def add_to_modes(c, w, x, k):
     """Further forces T on the modes have the innovations y: what `inward` left is as if they had been there."""
     for n in range(c.body[k].modes):
-        w.zf[k, n] -= x.speed[c.body[k].etad_index + n] * sqrt(w.pff[k, n, n])
+        w.pfr[k, n, LOAD] -= x.speed[c.body[k].etad_index + n] * sqrt(w.pff[k, n, n])
 
 
 @helper

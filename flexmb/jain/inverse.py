@@ -13,7 +13,6 @@ from flexmb.jain.wheels import gyroscopic_torque, spin_axis
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, plus6, shift_force, store6, vec6
 from flexmb.spatial.vector import axpy, dot, scale, vec3
 
@@ -40,7 +39,7 @@ def _inertial_force(c, w, k, tau):
     A = vec6(w.body[k].accel, 0)
     F = inertia_times(load_inertia(w.body[k].inertia, 0), A)
     for n in range(c.body[k].modes):
-        M_fr = column6(w.pfr[k], n)
+        M_fr = vec6(w.pfr[k, n], 0)
         F = axpy6(w.etadd[k, n], M_fr, F)
         row = plus6(w.zf[k, n], M_fr, A)
         for i in range(c.body[k].modes):

@@ -18,10 +18,12 @@ from flexmb.spatial.vector import vec3
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real, Record
 
-BODY_RESPONSE = np.dtype([
-    ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes
-    ("accel", np.float64, (6,)),  # of the body frame, body axes
-])
+BODY_RESPONSE = np.dtype(
+    [
+        ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes
+        ("accel", np.float64, (6,)),  # of the body frame, body axes
+    ]
+)
 
 
 @bundle

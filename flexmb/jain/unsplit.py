@@ -14,7 +14,6 @@ from flexmb.jain.wheels import wheel_acceleration
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, inertia_times, load_inertia, outer_inertia, store_inertia
-from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, less6, plus6, store6, sub6, sum6, vec6
 from flexmb.tables.arrays import NO_AXIS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -102,7 +101,7 @@ def _mode_rows(c, w, x, k, a):
     """The modes' rows of D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     for n in range(c.body[k].modes):
-        P_fr = column6(w.pfr[k], n)
+        P_fr = vec6(w.pfr[k, n], 0)
         store6(gain[n], 0, P_fr)
         residual[n] = -plus6(w.zf[k, n], P_fr, a)
         for i in range(n + 1):

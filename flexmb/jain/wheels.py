@@ -7,8 +7,8 @@ from flexmb.jain.forces import add_port_torque
 from flexmb.jain.ports import port_acceleration, port_bias, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
-from flexmb.spatial.rows import add_column3, column3
-from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, times, vec3
+from flexmb.spatial.rows import column3
+from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, times, vec3
 
 
 @helper
@@ -66,6 +66,6 @@ def _remove_axial_inertia(c, w, k, port, axis, axial):
     nm = c.body[k].modes
     for n in range(nm):
         an = dot(column3(w.port_mode[port], 0, n), axis)
-        add_column3(w.pfr[k], 0, n, scale(-axial * an, axis))
+        add3(w.pfr[k, n], 0, scale(-axial * an, axis))
         for i in range(nm):
             w.pff[k, n, i] -= axial * an * dot(column3(w.port_mode[port], 0, i), axis)

@@ -13,8 +13,8 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_inertia
-from flexmb.spatial.rows import add_column6, column6, store_column6
-from flexmb.spatial.spatial_vector import dot6, shift_force, store6, vec6
+from flexmb.spatial.rows import column6
+from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, vec6
 from flexmb.spatial.vector import vec3
 
 
@@ -24,7 +24,7 @@ def eliminate_modes(c, w, k):
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
-        store_column6(w.pfr[k], n, column6(c.mfr[k], n))
+        store6(w.pfr[k, n], 0, column6(c.mfr[k], n))
     if not node_inertia(w, r, c.body[k].nodes):
         return False
     for i in range(c.body[k].nodes):
@@ -42,9 +42,8 @@ def eliminate_modes(c, w, k):
             g[b] = 0.0
         for i in range(nm):
             for b in range(6):
-                g[b] += w.pff[k, n, i] * w.pfr[k, b, i]
-        torque, force = column6(w.pfr[k], n)
-        add_product(w.body[k].hinge_inertia, 0, -1.0, g, torque + force)
+                g[b] += w.pff[k, n, i] * w.pfr[k, i, b]
+        add_product(w.body[k].hinge_inertia, 0, -1.0, g, w.pfr[k, n])
         for b in range(6):
             w.body[k].hinge_force[b] -= g[b] * w.zf[k, n]
     return True
@@ -58,7 +57,7 @@ def _load_node(c, w, k, i):
     r = vec3(w.port[port].r, 0)
     gamma = load_inertia(node.gamma, 0)
     for n in range(c.body[k].modes):
-        add_column6(w.pfr[k], n, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
+        add6(w.pfr[k, n], 0, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
     add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
     add_port_force(c, w, w, k, port, vec6(node.force, 0))
 

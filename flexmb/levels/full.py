@@ -8,7 +8,7 @@ points is left. Points with rotating inertia, or with a mass centre off the poin
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import put, strip, width
+from flexmb.jit.strips import put, put_across, strip, width
 from flexmb.levels.affine_integrals import blocks_of_cross_products, sum_integrals
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
@@ -16,7 +16,7 @@ from flexmb.levels.summed_point import add_point
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import ModalIntegrals, modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
-from flexmb.spatial.rows import put6, strips3, strips_sym, total3, total_sym
+from flexmb.spatial.rows import strips3, strips_sym, total3, total_sym
 from flexmb.spatial.vector import (
     add,
     axpy,
@@ -59,7 +59,7 @@ def coupling_and_bias(c, w, k):
         eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
         P, axial, swirl = sum_integrals(w, k, product, nm, n)  # of sum m phi_n r' and sum m phi_n (phi etadot)'
         translation = strips3(w, c.mfr[k], 3, n)
-        put6(w, w.pfr[k], n, (axial, translation))
+        put_across(w, w.pfr[k], n, (axial, translation))
         put(w, w.zf[k], n, sym_dot(spin, P) + 2.0 * dot(omega, swirl))
         stretch = sym_axpy(eta, sym_add(P, strips_sym(w, product[0], n)), stretch)
         flow = sym_axpy(etad, P, flow)

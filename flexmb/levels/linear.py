@@ -22,7 +22,8 @@ from flexmb.modal.first_order import FirstOrder, first_order
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
-from flexmb.spatial.rows import column6, column_sym, store_column6
+from flexmb.spatial.rows import column6, column_sym
+from flexmb.spatial.spatial_vector import store6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym6, sym_axpy, sym_times, vec3
 from flexmb.tables.arrays import SLOPE
 
@@ -77,7 +78,7 @@ def _mode(c, w, k, n, omega):
             for l in range(c.body[k].modes):
                 mass += w.eta[k, l] * c.mass_slope[changing, n, i, l]
         w.pff[k, n, i] = mass
-    store_column6(w.pfr[k], n, (angular, linear))
+    store6(w.pfr[k, n], 0, (angular, linear))
     w.zf[k, n] = dot(omega, add(sym_times(gyration, omega), coriolis))
 
 

@@ -1,11 +1,11 @@
 """Level ruthless (Jain & Rodriguez, Appendix B): M_m at eta = 0, b_m at eta = etadot = 0."""
 
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import put, width
+from flexmb.jit.strips import put, put_across, width
 from flexmb.levels import rigid
 from flexmb.levels.level import FidelityLevel
 from flexmb.levels.masses import modal_masses
-from flexmb.spatial.rows import put6, strips6
+from flexmb.spatial.rows import strips6
 from flexmb.spatial.spatial_vector import dot6
 from flexmb.spatial.vector import vec3
 
@@ -16,7 +16,7 @@ def inertia_and_bias(c, w, k):
     rigid_block_and_bias(c, w, k)
     modal_masses(c, w, k)
     for n in range(0, c.body[k].modes, width(w)):
-        put6(w, w.pfr[k], n, strips6(w, c.mfr[k], n))
+        put_across(w, w.pfr[k], n, strips6(w, c.mfr[k], n))
 
 
 @helper

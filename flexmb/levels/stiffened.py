@@ -20,8 +20,8 @@ from flexmb.levels.summed_point import add_point
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals, stacked, still_points
 from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
-from flexmb.spatial.rows import add_column6, column3, store_column3, store_column6
-from flexmb.spatial.spatial_vector import ZERO6
+from flexmb.spatial.rows import column3, store_column3
+from flexmb.spatial.spatial_vector import ZERO6, add6, store6
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3
 
 
@@ -33,7 +33,7 @@ def inertia_and_bias(c, w, k):
     store3(w.body[k].force, 0, zero)
     store3(w.body[k].force, 3, zero)
     for n in range(c.body[k].modes):
-        store_column6(w.pfr[k], n, ZERO6)
+        store6(w.pfr[k, n], 0, ZERO6)
         w.zf[k, n] = 0.0
         for i in range(c.body[k].modes):
             w.pff[k, n, i] = c.mff[k, n, i]
@@ -66,7 +66,7 @@ def _add_mass(c, w, k, j):
     add3(w.body[k].force, 3, force)
     for n in range(nm):
         ln = column3(w.point_mode, 3, n)
-        add_column6(w.pfr[k], n, (cross(s, ln), scale(mass, ln)))
+        add6(w.pfr[k, n], 0, (cross(s, ln), scale(mass, ln)))
         w.zf[k, n] += dot(ln, force)
         at_rest = column3(c.point_mode[j], 3, n)
         for i in range(nm):

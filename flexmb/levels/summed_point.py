@@ -4,11 +4,11 @@ Angular momentum and force follow the point's exact motion; nothing is truncated
 """
 
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import put, strip, width
+from flexmb.jit.strips import add_across, put, strip, width
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.inertia import add_inertia, rigid_inertia
-from flexmb.spatial.rows import column6, put6, strips6
-from flexmb.spatial.spatial_vector import plus6, sum6
+from flexmb.spatial.rows import column6, strips6
+from flexmb.spatial.spatial_vector import plus6
 from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3
 
 
@@ -53,7 +53,7 @@ def add_point(c, w, k, j):
     for n in range(0, nm, width(w)):
         W, L = strips6(w, w.point_mode, n)
         at_mode = add(scale(mass, cross(r, L)), sym_times(inertia, W)), scale(mass, L)
-        put6(w, w.pfr[k], n, sum6(strips6(w, w.pfr[k], n), at_mode))
+        add_across(w, w.pfr[k], n, at_mode)
         put(w, w.zf[k], n, strip(w, w.zf[k], n) + dot(L, force) + dot(W, torque))
     for n in range(nm):
         W, L = column6(w.point_mode, n)

@@ -102,18 +102,16 @@ def total_sym(w, s):
 
 
 @helper
-def total_inertia(w, p):
-    """Of a spatial inertia."""
-    b = p[1]
-    middle = (
-        total(w, b[0]),
-        total(w, b[1]),
-        total(w, b[2]),
-        total(w, b[3]),
-        total(w, b[4]),
-        total(w, b[5]),
-        total(w, b[6]),
-        total(w, b[7]),
-        total(w, b[8]),
+def axpy3(v, x, rows):
+    """Three rows, to each of which x times its number of v is added: rows + v x'."""
+    return v[0] * x + rows[0], v[1] * x + rows[1], v[2] * x + rows[2]
+
+
+@helper
+def column_inertia(a):
+    """The symmetric matrix in the first six columns of six rows as a spatial inertia."""
+    return (
+        (a[0, 0], a[1, 1], a[2, 2], a[0, 1], a[0, 2], a[1, 2]),
+        (a[0, 3], a[0, 4], a[0, 5], a[1, 3], a[1, 4], a[1, 5], a[2, 3], a[2, 4], a[2, 5]),
+        (a[3, 3], a[4, 4], a[5, 5], a[3, 4], a[3, 5], a[4, 5]),
     )
-    return total_sym(w, p[0]), middle, total_sym(w, p[2])

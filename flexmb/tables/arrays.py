@@ -232,7 +232,7 @@ class Workspace:
     etadd: Real  # (N,m)
     # modal blocks of the articulated inertia and bias force, then what `flexmb.jain.explicit` leaves of them
     pff: Real  # (N,m,m) from the inward sweep on its upper triangle counts
-    pfr: Real  # (N,6,m)
+    pfr: Real  # (N,m,8) coupling to [angular; linear], two numbers for `flexmb.jain.explicit`
     zf: Real  # (N,m)
     inverse_pivot: Real  # (N,m)
     port: Record  # (P,) PORT_STATE

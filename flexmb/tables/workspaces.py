@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from flexmb.jit.strips import strip_zeros
+from flexmb.jit.strips import ROW, strip_zeros
 from flexmb.tables import arrays as a
 
 
@@ -23,7 +23,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "hinge": np.zeros(n, a.HINGE_STATE),
         **{name: strip_zeros((n, m)) for name in ("eta", "etad", "etadd", "zf", "inverse_pivot")},
         "pff": strip_zeros((n, m, m)),
-        "pfr": strip_zeros((n, 6, m)),
+        "pfr": strip_zeros((n, m, ROW)),
         "port": np.zeros(len(c.port), a.PORT_STATE),
         "port_mode": strip_zeros((len(c.port), 6, m)),
         "point_mode": strip_zeros((6, m)),
