@@ -37,7 +37,7 @@ def eliminate_modes(c, w, k):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b]
     store6(w.body[k].hinge_force, 0, vec6(w.body[k].force, 0))
     for n in range(nm):
-        g = w.gain[r, n, 0]
+        g = w.gain[r, 0, n]
         for b in range(6):
             g[b] = 0.0
         for i in range(nm):
@@ -75,13 +75,13 @@ def _inverse(c, w, k):
                 s = 0.0
                 for j in range(nodes):
                     for b in range(6):
-                        s += T[6 * i + a, 6 * j + b] * w.gain[r, n, 1 + j, b]
+                        s += T[6 * i + a, 6 * j + b] * w.gain[r, 1 + j, n, b]
                 row[6 * i + a] = s
         for i in range(n + 1):
             s = c.compliance[r, n, i]
             for j in range(nodes):
                 for b in range(6):
-                    s -= row[6 * j + b] * w.gain[r, i, 1 + j, b]
+                    s -= row[6 * j + b] * w.gain[r, 1 + j, i, b]
             w.pff[k, n, i] = s
             w.pff[k, i, n] = s
 
@@ -91,7 +91,7 @@ def modal_accelerations(c, w, k, A):
     """etadd = nu_f - g' alpha, alpha being the acceleration A of O: outward half of (64)."""
     r = c.body[k].reduced
     for n in range(c.body[k].modes):
-        s = dot6(vec6(w.gain[r, n, 0], 0), A)
+        s = dot6(vec6(w.gain[r, 0, n], 0), A)
         for i in range(c.body[k].modes):
             s += w.pff[k, n, i] * w.zf[k, i]
         w.etadd[k, n] = -s

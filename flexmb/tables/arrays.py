@@ -168,7 +168,8 @@ class ReducedConstants(Constants):
     """
 
     compliance: Real  # (R,m,m) condensed: L^-1; Woodbury: Lam
-    gain: Real  # (R,m,1+C,6) at rest: [Psi, Ups_1 .. Ups_C] of Psi = Lam M_fr, Ups = Lam Pi'; condensed: L' times it
+    # (R,1+C,m,8) at rest, six of each row: Psi = Lam M_fr, then Ups_1 .. Ups_C of Ups = Lam Pi'; condensed: L' times it
+    gain: Real
     node: Record  # (R,C) REDUCED_NODE at rest
     root: Real  # (R,6C,6C) at rest: Omega = Pi Lam Pi' = root' root
     rank: Index  # (R,) rows of root
@@ -258,7 +259,7 @@ NODE_STATE = _record(  # node of a reduced body, axes of the body
 class ReducedWorkspace(Workspace):
     """The workspace of a scene with reduced bodies. What does not change with the deformation is written once."""
 
-    gain: Real  # (R,m,1+C,6)
+    gain: Real  # (R,1+C,m,8)
     node: Record  # (R,C) NODE_STATE
     root: Real  # (R,6C,6C)
     rank: Index  # (R,)

@@ -41,11 +41,12 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
 
 def _reduced(c: a.ReducedConstants, fields: dict[str, Any]) -> a.ReducedWorkspace:
     """With the tables at rest, which is all that ruthless bodies need."""
-    node = np.zeros(c.node.shape, a.NODE_STATE)
+    node, gain = np.zeros(c.node.shape, a.NODE_STATE), strip_zeros(c.gain.shape)
+    gain[:] = c.gain
     node["theta"] = c.node["theta"]
     return a.ReducedWorkspace(
         **fields,
-        gain=c.gain.copy(),
+        gain=gain,
         node=node,
         root=c.root.copy(),
         rank=c.rank.copy(),
