@@ -10,8 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexmb.building.links import BodyLink
 from flexmb.building.rigid_arrays import outboard_frames, rigid_inertia_rows
-from flexmb.jit.strips import strip_zeros
-from flexmb.levels.affine_integrals import NUMBERS
+from flexmb.jit.strips import ROW, strip_zeros
+from flexmb.levels.affine_integrals import NUMBERS, moving_columns
 from flexmb.levels.level import six
 from flexmb.modal.flexible_model import SecondOrder
 from flexmb.tables import arrays as a
@@ -40,7 +40,7 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
     for name in ("product", "slope", "mass_slope"):
         body[name] = -1
     body["product"][summed], product = _rows(
-        [each.product for each in bodies.values()], strip_zeros((1 + m, NUMBERS, m))
+        [each.product for each in bodies.values()], strip_zeros((m // ROW, 1 + m, NUMBERS * ROW))
     )
     slopes = [each.slope for each in bodies.values()]
     mass_slopes = [each.mass_slope for each in bodies.values()]
@@ -56,9 +56,9 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
         row["inertia"] = six(p.inertia[i])
         row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))
     shapes = shape_rows([(p.rotation[i], p.translation[i]) for p, i in turning], m)
-    tables = {"body": body, **pairs, **modes, "product": product, "slope": slope, "mass_slope": mass_slope}
+    integrals = {"product": product, "moves": moving_columns(product), "slope": slope, "mass_slope": mass_slope}
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
-    return tables, {"point": point, "point_mode": shapes}, seconds
+    return {"body": body, **pairs, **modes, **integrals}, {"point": point, "point_mode": shapes}, seconds
 
 
 def _drop_rounding(masses: a.Real, points: int) -> None:

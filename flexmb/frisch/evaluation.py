@@ -51,7 +51,7 @@ def _solution(t, y, c, w):
     """Equations and their solution; a status code."""
     _kinematics(t, y, c, w)
     for k in range(c.body.shape[0]):
-        if is_out_of_range(c, w, k):
+        if is_out_of_range(c, w.modal[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
     _equations(c, w)

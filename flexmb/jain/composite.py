@@ -52,7 +52,7 @@ def forward_dynamics(c, w, m):
         w.speed[j].acceleration = w.function[f, 2] if f >= 0 else 0.0
     inverse.inverse_dynamics(c, w, m.bias)
     for k in range(c.body.shape[0]):
-        if is_out_of_range(c, w, k):
+        if is_out_of_range(c, w.eta[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
     composite_bodies(c, w, m)

@@ -8,15 +8,15 @@ points is left. Points with rotating inertia, or with a mass centre off the poin
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.jit.strips import put, put_across, strip, width
-from flexmb.levels.affine_integrals import blocks_of_cross_products, sum_integrals
+from flexmb.jit.strips import ROW, put, put_across, strip, width
+from flexmb.levels.affine_integrals import axial_vector, columns, sum_integrals, symmetric_part, table_of_products
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import ModalIntegrals, modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
-from flexmb.spatial.rows import strips3, strips_sym, total3, total_sym
+from flexmb.spatial.rows import strips3, total3, total_sym
 from flexmb.spatial.vector import (
     add,
     axpy,
@@ -46,7 +46,7 @@ def inertia_and_bias(c, w, k):
 @helper
 def coupling_and_bias(c, w, k):
     """Integrals of r x (.) and phi_n . (.) of the point acceleration w x (w x r) + 2 w x (phi etadot)."""
-    nm, product = c.body[k].modes, c.product[c.body[k].product]
+    nm, row = c.body[k].modes, c.body[k].product
     omega = vec3(w.body[k].velocity, 0)
     spin = centrifugal(omega)
     body = c.body[k].rigid
@@ -57,11 +57,13 @@ def coupling_and_bias(c, w, k):
     momentum = (0.0, 0.0, 0.0)  # sum m phi etadot
     for n in range(0, nm, width(w)):
         eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
-        P, axial, swirl = sum_integrals(w, k, product, nm, n)  # of sum m phi_n r' and sum m phi_n (phi etadot)'
+        now, rate = sum_integrals(w, k, c.product[row], c.moves[row], nm, n)
+        P, axial = symmetric_part(*now), axial_vector(*now)  # of sum m phi_n r'
+        swirl = axial_vector(*rate)  # of sum m phi_n (phi etadot)'
         translation = strips3(w, c.mfr[k], 3, n)
         put_across(w, w.pfr[k], n, (axial, translation))
         put(w, w.zf[k], n, sym_dot(spin, P) + 2.0 * dot(omega, swirl))
-        stretch = sym_axpy(eta, sym_add(P, strips_sym(w, product[0], n)), stretch)
+        stretch = sym_axpy(eta, sym_add(P, _at_rest(w, c.product[row, n // ROW, 0], n % ROW)), stretch)
         flow = sym_axpy(etad, P, flow)
         turn = axpy(etad, axial, turn)
         moved = axpy(eta, translation, moved)
@@ -72,6 +74,12 @@ def coupling_and_bias(c, w, k):
     swept = coriolis(omega, total_sym(w, flow), total3(w, turn))
     store3(w.body[k].force, 0, add(cross(omega, sym_times(j, omega)), scale(2.0, swept)))
     store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, total3(w, momentum)))))
+
+
+@helper
+def _at_rest(w, block, at):
+    """The symmetric part of sum m phi_n x'."""
+    return symmetric_part(*columns(w, block, at))
 
 
 @helper
@@ -103,7 +111,8 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
 def polynomial(i: ModalIntegrals, model: FlexibleModel) -> InertiaTables:
     """The same of known integrals."""
     rigid, mfr = np.array([i.mass, *i.s0, *six(i.J0)]), np.vstack([i.C0, i.s1])
-    return InertiaTables(rigid, i.M_ff, mfr, np.zeros_like(mfr), i.turning, blocks_of_cross_products(i.J1, i.J2))
+    product = table_of_products(i.J1, i.J2, len(model.mass))
+    return InertiaTables(rigid, i.M_ff, mfr, np.zeros_like(mfr), i.turning, product)
 
 
 LEVEL = FidelityLevel(

@@ -65,13 +65,6 @@ def strips6(w, a, n):
 
 
 @helper
-def strips_sym(w, a, n):
-    """The same as a symmetric matrix."""
-    x, y = strips6(w, a, n)
-    return x[0], x[1], x[2], y[0], y[1], y[2]
-
-
-@helper
 def put3(w, a, i, n, v):
     put(w, a[i], n, v[0])
     put(w, a[i + 1], n, v[1])

@@ -134,7 +134,8 @@ class Constants:
     gyration: Real  # (N,6,m) ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
     stiffness: Real  # (N,m,m)
     damping: Real  # (N,m,m)
-    product: Real  # (bodies of level full,1+m,9,m) as `flexmb.levels.affine_integrals` has it
+    product: Real  # (bodies of level full,strips of m,1+m,72) as `flexmb.levels.affine_integrals` has it
+    moves: Real  # (the same bodies,m,3) 1 where a mode moves masses along an axis, else 0
     slope: Record  # (bodies of level linear,m,m) SLOPE
     mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT

@@ -156,7 +156,7 @@ def test_a_scene_without_losses_has_no_power():
 
 def _unsymmetric_inertia(system: System) -> None:
     c = unlocked(system.constants)
-    c.product[0, 2] *= 30.0  # P1_n1
+    c.product[0, :, 2] *= 30.0  # P1_n1
 
 
 def _unsymmetric_stiffness(system: System) -> None:

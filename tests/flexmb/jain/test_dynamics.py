@@ -119,7 +119,7 @@ def _transpose_a_placement(c):
 
 
 def _drop_coriolis(c):
-    c.product[:, 1:] = 0.0
+    c.product[:, :, 1:] = 0.0
 
 
 def _mass_one_in_a_million_more(c):
