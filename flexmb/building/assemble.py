@@ -10,12 +10,13 @@ from typing import TypeVar
 import numpy as np
 
 from flexmb.building.carried import CarriedTables, moved_inertia
-from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_records
+from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_rows
 from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.models import ORIGIN
 from flexmb.building.numbering import Numbering
 from flexmb.building.rigid_arrays import Frames, inboard_frames, outboard_frames
 from flexmb.hinges.catalogue import KINDS
+from flexmb.jit.strips import whole
 from flexmb.levels.body import LEVELS
 from flexmb.levels.rigid import LEVEL as RIGID
 from flexmb.scene import schema as s
@@ -119,7 +120,7 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         for side in closure_sides(closure)
     ]
 
-    m = max((link.mode_count for link in chain), default=0)
+    m = whole(max((link.mode_count for link in chain), default=0))
     inertia, points, of_points = inertia_arrays(chain, m)
     port_rows, of_ports = second_order_rows([at.node.second for at in ports.all()], 0, m)
     points["point"]["second"], second_shape = second_order_rows(of_points, len(of_ports), m)
@@ -149,12 +150,12 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     function, table = pack(functions.all())
     port = _ports(ports, port_rows)
     wheel = _wheels(wheels, [ports.number(at) for at in wheel_ports], numbering)
-    speed["doubtful"] = DOUBTFUL * moved_inertia(CarriedTables(body, port, inertia["pair"], wheel), len(speed))
+    speed["doubtful"] = DOUBTFUL * moved_inertia(CarriedTables(body, port, inertia["mff"], wheel), len(speed))
     constants = a.Constants(
         gravity=np.array(scene.gravity_m_s2, float),
         body=body,
         port=port,
-        port_mode=shape_records([(p.node.translation, p.node.rotation_modes) for p in ports.all()], m),
+        port_mode=shape_rows([(p.node.rotation_modes, p.node.translation) for p in ports.all()], m),
         second_shape=np.concatenate([of_ports, second_shape]),
         wheel=wheel,
         load=load,

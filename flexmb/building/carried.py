@@ -16,7 +16,7 @@ class CarriedTables(NamedTuple):
 
     body: Record
     port: Record
-    pair: Record
+    mff: Real
     wheel: Record
 
 
@@ -43,7 +43,7 @@ def moved_inertia(c: CarriedTables, speeds: int) -> Real:
             inertia[parent[k]] += _about(about_hinge, mass[k], arm[k])
     for k in np.flatnonzero(c.body["modes"]):
         first, n = c.body["etad_index"][k], c.body["modes"][k]
-        moved[first : first + n] = np.diagonal(c.pair["mff"][k])[:n]
+        moved[first : first + n] = np.diagonal(c.mff[k])[:n]
     moved[c.wheel["u_index"]] = c.wheel["axial"]
     return moved
 

@@ -11,18 +11,19 @@ from numpy.typing import ArrayLike, NDArray
 
 from flexmb.building.links import BodyLink
 from flexmb.building.rigid_arrays import outboard_frames, rigid_inertia_rows
+from flexmb.jit.strips import ROW, strip_zeros
+from flexmb.levels.affine_integrals import NUMBERS, moving_columns
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.modal.flexible_model import FlexibleModel, SecondOrder
 from flexmb.tables import arrays as a
 
 
-def inertia_arrays(
-    chain: list[BodyLink], m: int
-) -> tuple[dict[str, a.Record], dict[str, a.Record], list[SecondOrder | None]]:
+def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[str, Any], list[SecondOrder | None]]:
     """Inertia at rest and modal integrals by body, slopes of level linear; the points left to sum at run time, and the
     second-order field of each."""
     body = np.zeros(len(chain), a.BODY)
-    mode, pair = np.zeros((len(chain), m), a.MODE), np.zeros((len(chain), m, m), a.PAIR)
+    pairs = {name: strip_zeros((len(chain), m, m)) for name in ("mff", "stiffness", "damping")}
+    modes = {name: strip_zeros((len(chain), 6, m)) for name in ("mfr", "gyration")}
     body["orthogonal"] = body["uncoupled"] = True
     rigid = [k for k, link in enumerate(chain) if link.is_rigid and link.wheels == 0]
     alone = [chain[k] for k in rigid]
@@ -30,13 +31,17 @@ def inertia_arrays(
     summed = sorted(set(range(len(chain))).difference(rigid))
     bodies = {k: _tables(chain[k].level, chain[k].model, chain[k].wheels) for k in summed}
     for k, each in bodies.items():
-        n = len(each.mode)
-        body["rigid"][k], mode[k, :n], pair[k, :n, :n] = each.rigid, each.mode, each.pair
-        body["orthogonal"][k] = _is_diagonal(each.pair["mff"])
-        body["uncoupled"][k] = _is_diagonal(each.pair["stiffness"]) and _is_diagonal(each.pair["damping"])
+        model, n = chain[k].model, len(each.mff)
+        body["rigid"][k], pairs["mff"][k, :n, :n] = each.rigid, each.mff
+        pairs["stiffness"][k, :n, :n], pairs["damping"][k, :n, :n] = model.stiffness, model.damping
+        modes["mfr"][k, :, :n], modes["gyration"][k, :, :n] = each.mfr, each.gyration
+        body["orthogonal"][k] = _is_diagonal(each.mff)
+        body["uncoupled"][k] = _is_diagonal(model.stiffness) and _is_diagonal(model.damping)
     for name in ("product", "slope", "mass_slope"):
         body[name] = -1
-    body["product"][summed], product = _rows([each.product for each in bodies.values()], np.zeros((1 + m) * 9 * m))
+    body["product"][summed], product = _rows(
+        [each.product for each in bodies.values()], strip_zeros((m // ROW, 1 + m, NUMBERS * ROW))
+    )
     slopes = [each.slope for each in bodies.values()]
     mass_slopes = [each.mass_slope for each in bodies.values()]
     body["slope"][summed], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
@@ -50,19 +55,17 @@ def inertia_arrays(
         row["mass"], row["position"], row["offset"] = p.mass[i], p.position[i], p.com_offset[i]
         row["inertia"] = six(p.inertia[i])
         row["turning"] = bool(np.any(p.com_offset[i]) or np.any(p.inertia[i]))
-    shapes = shape_records([(p.translation[i], p.rotation[i]) for p, i in turning], m)
-    tables = {
-        "body": body, "mode": mode, "pair": pair, "product": product, "slope": slope, "mass_slope": mass_slope,
-    }  # fmt: skip
+    shapes = shape_rows([(p.rotation[i], p.translation[i]) for p, i in turning], m)
+    integrals = {"product": product, "moves": moving_columns(product), "slope": slope, "mass_slope": mass_slope}
     seconds = [None if p.second is None else p.second.map(lambda G, i=i: G[i]) for p, i in turning]
-    return tables, {"point": point, "point_mode": shapes}, seconds
+    return {"body": body, **pairs, **modes, **integrals}, {"point": point, "point_mode": shapes}, seconds
 
 
 @lru_cache(maxsize=64)
 def _tables(level: FidelityLevel, model: FlexibleModel, wheels: int) -> InertiaTables:
     """Those of a level. Equal bodies, of one scene or of copies of it, share one: its arrays must not be written to."""
     found = level.tables(model, wheels)
-    _drop_rounding(found.pair["mff"], len(model.mass))
+    _drop_rounding(found.mff, len(model.mass))
     return found
 
 
@@ -83,7 +86,8 @@ def _is_diagonal(m: a.Real) -> bool:
 def _rows(tables: Sequence[NDArray[Any] | None], empty: NDArray[Any]) -> tuple[list[int], NDArray[Any]]:
     """By body the number of its table, -1 for none; and the tables, each enlarged to the shape of `empty`."""
     some = [table for table in tables if table is not None]
-    out = np.zeros((len(some), *empty.shape), empty.dtype)
+    shape = len(some), *empty.shape
+    out = strip_zeros(shape) if empty.dtype == np.float64 else np.zeros(shape, empty.dtype)
     for row, table in zip(out, some, strict=True):
         row[tuple(slice(n) for n in table.shape)] = table
     count = np.cumsum([table is not None for table in tables]) - 1
@@ -97,12 +101,11 @@ def group(body: a.Record, name: str, counts: ArrayLike) -> None:
     body[f"{name}_start"] = stop - counts
 
 
-def shape_records(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Record:
-    """SHAPE records (len, m) of (translation, rotation) mode shapes (3, modes)."""
-    out = np.zeros((len(shapes), m), a.SHAPE)
-    for i, (translation, rotation) in enumerate(shapes):
-        out["translation"][i, : translation.shape[1]] = translation.T
-        out["rotation"][i, : rotation.shape[1]] = rotation.T
+def shape_rows(shapes: list[tuple[a.Real, a.Real]], m: int) -> a.Real:
+    """[rotation; translation] (len,6,m) of mode shapes (3,modes)."""
+    out = strip_zeros((len(shapes), 6, m))
+    for i, (rotation, translation) in enumerate(shapes):
+        out[i, :3, : rotation.shape[1]], out[i, 3:, : translation.shape[1]] = rotation, translation
     return out
 
 

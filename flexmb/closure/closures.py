@@ -153,9 +153,8 @@ class Closures:
     def _stiff(self) -> Constants:
         """The tree with modal masses M + K (STIFF/omega)^2, omega its lowest modal frequency."""
         c = self.constants[0]
-        pair = c.pair.copy()
-        pair["mff"] += (STIFF / self._slowest) ** 2 * pair["stiffness"]
-        return replace(c, pair=pair)
+        heavier = c.mff + (STIFF / self._slowest) ** 2 * c.stiffness
+        return replace(c, mff=heavier)
 
     def responses(self) -> list[list[GroupResponse]]:
         """By cluster and group, B' of the rows in the size of their closures, those that suppress nothing zero."""

@@ -53,8 +53,7 @@ def _accelerate(route, s):
         apply_load(c, w, cc, cw, i, load_on_b(cc, cw, i))
     innovations.innovations(c, w, cw.response)
     for k in range(c.body.shape[0]):
-        for n in range(c.body[k].modes):
-            w.mode[k, n].zf -= cw.response.speed[c.body[k].etad_index + n]
+        innovations.add_to_modes(c, w, cw.response, k)
         add6(about_hinge(c, w, k)[1], 0, vec6(cw.response.body[k].force, 0))
         hinge_solve.add_innovations(c, w, cw.response, k)
     outward(c, w)

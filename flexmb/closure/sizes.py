@@ -59,7 +59,7 @@ def _reaction(s, i, k, F):
     """|x| of what the modes of body k feel of a load at the node that its hinge sits on, body axes."""
     clear_path(s.c, s.cc, s.cw, i)
     for n in range(s.c.body[k].modes):
-        s.cw.response.mode[k, n].zf = -dot6(mode_motion(s.seen, s.c.body[k].outboard_port, n), F)
+        s.cw.response.zf[k, n] = -dot6(mode_motion(s.seen, s.c.body[k].outboard_port, n), F)
     return _passed(s, i)
 
 

@@ -12,7 +12,7 @@ from flexmb.tables.status import OK
 
 def joint(c: Constants) -> Joint:
     """What the recursion writes besides the workspace."""
-    n, m = c.mode.shape
+    n, _, m = c.mfr.shape
     return Joint(np.zeros((n, m + 6, m + 6)), np.zeros((n, m + 6, 6)), np.zeros((n, m + 6)))
 
 

@@ -8,6 +8,7 @@ frame of a wheel turns with its node.
 
 from flexmb.frisch.tables import FIXED_SPIN_AXIS, NO_LOADS_ON_MODES, SECOND_ORDER
 from flexmb.jit.kernel import helper
+from flexmb.spatial.rows import column3, column6
 from flexmb.spatial.spatial_vector import dot6, shift_force
 from flexmb.spatial.vector import (
     add,
@@ -41,7 +42,7 @@ def body_terms(c, w, k):
     moved, moved_rate, momentum = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     Phi, Phi_rate = sym6(e.Phi, 0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     for n in range(nm):
-        eta, etad = w.mode[k, n].eta, w.mode[k, n].etad
+        eta, etad = w.modal[k, n], w.modal_rate[k, n]
         A, E = vec3(c.element_mode[k, n].A, 0), sym6(c.element_mode[k, n].E, 0)
         moved = axpy(eta, A, moved)  # (47)
         moved_rate = axpy(etad, A, moved_rate)  # (171)
@@ -77,14 +78,14 @@ def _modal_row(c, w, k, n, R, omega, moved):
     H = sym6(c.element_mode[k, n].H, 0)  # with sum_m F_mn a_m added
     elastic = 0.0
     for m in range(c.body[k].modes):
-        eta, etad = w.mode[k, m].eta, w.mode[k, m].etad
+        eta, etad = w.modal[k, m], w.modal_rate[k, m]
         pair = c.element_pair[k, m, n]
         change = axpy(eta, vec3(pair.A1, 0), change)
         Q = axpy(eta, vec3(pair.Q1, 0), Q)
         H = sym_axpy(eta, sym6(pair.F, 0), H)
         K = axpy(etad, vec3(pair.K, 0), K)
         true_eta, true_etad = w.q[c.body[k].eta_index + m], w.u[c.body[k].etad_index + m]
-        elastic += c.pair[k, n, m].stiffness * true_eta + c.pair[k, n, m].damping * true_etad
+        elastic += c.stiffness[k, n, m] * true_eta + c.damping[k, n, m] * true_etad
     A = add(A0, change)
     Q = axpy(-e.mass, cross(moved, change), Q)
     store3(w.mode[k, n].A, 0, times(R, A))
@@ -124,7 +125,7 @@ def wheel_terms(c, w, k, i):
     if c.wheel_entry[i] >= 0:
         for n in range(c.body[k].modes):  # partition phiR_W (121) of (126)
             start = c.column[c.body[k].etad_index + n].start + c.wheel_entry[i]
-            store3(w.S, start, vec3(w.port_mode[c.wheel[i].port, n].W, 0))
+            store3(w.S, start, column3(w.port_mode[c.wheel[i].port], 0, n))
     store_sym6(w.nest[k].inertia, 0, sym_add(sym6(w.nest[k].inertia, 0), inertia))
     add3(w.nest[k].torque, 0, scale(-1.0, rate))
 
@@ -138,7 +139,7 @@ def load_terms(c, w, k, i):
     add3(w.nest[k].torque, 0, torque)
     if c.printed[NO_LOADS_ON_MODES] == 0:
         for n in range(c.body[k].modes):
-            phi = vec3(w.port_mode[port, n].W, 0), vec3(w.port_mode[port, n].L, 0)  # phiR, phiT
+            phi = column6(w.port_mode[port], n)  # phiR, phiT
             w.mode[k, n].row += dot6(phi, F)
 
 

@@ -31,7 +31,7 @@ def nested_constants(
     are not clamped at its origin.
     """
     parameters = [_parameters(link, errata) for link in chain]
-    element, mode, pair, slopes = _elements(parameters, constants.mode.shape[1])
+    element, mode, pair, slopes = _elements(parameters, constants.mff.shape[2])
     column, rows, wheel_entry = _places(constants, element, null_partitions)
     return t.NestedConstants(
         **{field.name: getattr(constants, field.name) for field in fields(constants)},
@@ -131,7 +131,7 @@ def _places(
             wheel_rows = [*range(3 * bodies + 3 * i, 3 * bodies + 3 * i + 3)]
             own[int(c.wheel["u_index"][i])], modal[int(c.wheel["u_index"][i])] = wheel_rows, []
             body_of[c.wheel["u_index"][i]] = k
-            turns = null_partitions or np.any(c.port_mode["rotation"][c.wheel["port"][i]])
+            turns = null_partitions or np.any(c.port_mode[c.wheel["port"][i], :3])
             wheel_entry[i] = 1 + len(moved) if turns else -1
             moved = moved + (wheel_rows if turns else [])
         for n in range(body["modes"]):

@@ -51,7 +51,7 @@ def _solution(t, y, c, w):
     """Equations and their solution; a status code."""
     _kinematics(t, y, c, w)
     for k in range(c.body.shape[0]):
-        if is_out_of_range(c, w, k):
+        if is_out_of_range(c, w.modal[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
     _equations(c, w)
@@ -80,7 +80,7 @@ def _power(c, w):
         start = c.body[k].etad_index
         for n in range(c.body[k].modes):
             for m in range(c.body[k].modes):
-                total -= w.u[start + n] * c.pair[k, n, m].damping * w.u[start + m]
+                total -= w.u[start + n] * c.damping[k, n, m] * w.u[start + m]
         V = vec3(w.nest[k].omega, 0), vec3(w.nest[k].velocity, 0)
         for i in range(c.body[k].load_start, c.body[k].load_stop):
             port, F = node_load(c, w, i)

@@ -12,6 +12,7 @@ from flexmb.hinges import catalogue
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import is_at_rest
 from flexmb.levels.field import field_motion
+from flexmb.spatial.rows import column6, store_column6
 from flexmb.spatial.spatial_vector import ZERO6, axpy6, shift_motion, store6, sum6, times6, vec6
 from flexmb.spatial.vector import (
     add,
@@ -35,8 +36,8 @@ def relative_motion(c, w):
     for k in range(c.body.shape[0]):
         seen = not is_at_rest(c.body[k].level)
         for n in range(c.body[k].modes):
-            w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if seen else 0.0
-            w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if seen else 0.0
+            w.modal[k, n] = w.q[c.body[k].eta_index + n] if seen else 0.0
+            w.modal_rate[k, n] = w.u[c.body[k].etad_index + n] if seen else 0.0
         for i in range(c.body[k].port_start, c.body[k].port_stop):
             _port_in_body(c, w, k, i)
         _across_hinge(c, w, k)
@@ -49,7 +50,9 @@ def _port_in_body(c, w, k, i):
     """Pose and motion of port i of body k, body axes: (2), (43), (44) and their derivatives."""
     nm = c.body[k].modes
     x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
-    r, R, w_rel, v_rel, alpha, a = field_motion(x, p, c.port_mode[i], w.mode[k], nm, w.port_mode[i])
+    r, R, w_rel, v_rel, alpha, a = field_motion(
+        w, x, p, c.port_mode[i], w.modal[k], w.modal_rate[k], nm, w.port_mode[i]
+    )
     V, A = (w_rel, v_rel), (alpha, a)
     if c.printed[FIXED_SHAPES] == 1:
         r, V = _by_constant_shapes(c, w, k, i)
@@ -66,12 +69,11 @@ def _by_constant_shapes(c, w, k, i):
     x, p = vec3(c.port[i].position, 0), vec3(c.port[i].offset, 0)
     r, V = add(x, p), ZERO6
     for n in range(c.body[k].modes):
-        psi = vec3(c.port_mode[i, n].rotation, 0)
-        phi = add(vec3(c.port_mode[i, n].translation, 0), cross(psi, p))
-        store3(w.port_mode[i, n].W, 0, psi)
-        store3(w.port_mode[i, n].L, 0, phi)
-        r = axpy(w.mode[k, n].eta, phi, r)
-        V = axpy6(w.mode[k, n].etad, (psi, phi), V)
+        psi, phi = column6(c.port_mode[i], n)
+        phi = add(phi, cross(psi, p))
+        store_column6(w.port_mode[i], n, (psi, phi))
+        r = axpy(w.modal[k, n], phi, r)
+        V = axpy6(w.modal_rate[k, n], (psi, phi), V)
     return r, V
 
 
@@ -85,8 +87,7 @@ def _port_in_world(c, w, k, i):
     store6(port.v, 0, times6(R, vec6(port.v, 0)))
     store6(port.a, 0, times6(R, vec6(port.a, 0)))
     for n in range(c.body[k].modes):
-        store3(w.port_mode[i, n].W, 0, times(R, vec3(w.port_mode[i, n].W, 0)))
-        store3(w.port_mode[i, n].L, 0, times(R, vec3(w.port_mode[i, n].L, 0)))
+        store_column6(w.port_mode[i], n, times6(R, column6(w.port_mode[i], n)))
 
 
 @helper
@@ -189,7 +190,7 @@ def _modal_columns(c, w, k, R, arm, back):
     if i >= 0:
         for n in range(c.body[p].modes):
             at = c.column[c.body[p].etad_index + n].start + c.element[k].inboard_entry
-            W, L = vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+            W, L = column6(w.port_mode[i], n)
             store3(w.S, at, W)
             store3(w.S, at + 3, add(L, cross(W, sub(arm, back))))
     for n in range(c.body[k].modes):
@@ -197,6 +198,6 @@ def _modal_columns(c, w, k, R, arm, back):
         w.S[start] = 1.0
         if o >= 0:
             at = start + c.element[k].outboard_entry
-            W, L = times(R, vec3(w.port_mode[o, n].W, 0)), times(R, vec3(w.port_mode[o, n].L, 0))
+            W, L = times6(R, column6(w.port_mode[o], n))
             store3(w.S, at, scale(-1.0, W))
             store3(w.S, at + 3, sub(cross(W, back), L))

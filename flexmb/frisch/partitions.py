@@ -72,7 +72,7 @@ def _modal_mass(c, w, k):
             value = c.element_pair[k, m, n].M1
             if slope >= 0:
                 for i in range(c.body[k].modes):
-                    value += w.mode[k, i].eta * c.M1_slope[slope, i, m, n]
+                    value += w.modal[k, i] * c.M1_slope[slope, i, m, n]
             w.Z[at + m, at + n] = value
 
 

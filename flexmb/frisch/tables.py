@@ -11,7 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jit.bundle import bundle
-from flexmb.tables.arrays import COLUMN, SPEED_STATE, Constants
+from flexmb.jit.strips import strip_zeros
+from flexmb.tables.arrays import SPEED_STATE, Constants
 from flexmb.typing import Index, Real, Record
 
 _F, _I = np.float64, np.int64
@@ -88,7 +89,7 @@ NEST = _record(  # body k, the nest of hinge point k-1, World axes
     ("load", _F, (6,)),  # total load across the hinge on the body about O
 )
 # row: right side of (110)
-NEST_MODE = _record(("eta", _F), ("etad", _F), ("A", _F, (3,)), ("Q", _F, (3,)), ("row", _F))
+NEST_MODE = _record(("A", _F, (3,)), ("Q", _F, (3,)), ("row", _F))
 NEST_PORT = _record(  # pose from the body origin and motion relative to the body
     ("r", _F, (3,)),
     ("R", _F, (9,)),
@@ -115,9 +116,11 @@ class NestedWorkspace:
     function: Real  # (F,3)
     speed: Record  # (nu,) SPEED_STATE
     nest: Record  # (N,) NEST
+    modal: Real  # (N,m) modal coordinates as the level sees them
+    modal_rate: Real  # (N,m)
     mode: Record  # (N,m) NEST_MODE
     port: Record  # (P,) NEST_PORT
-    port_mode: Record  # (P,m) COLUMN
+    port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
     wheel: Record  # (W,) NEST_WHEEL
     S: Real  # (nnz,) entries of S
     Z: Real  # (nx,nx) coefficient matrix of (111); rows and columns without relation stay zero
@@ -149,9 +152,11 @@ def workspace(c: NestedConstants, nq: int) -> NestedWorkspace:
         function=np.zeros((len(c.function), 3)),
         speed=np.zeros(nu, SPEED_STATE),
         nest=np.zeros(n, NEST),
+        modal=strip_zeros((n, m)),
+        modal_rate=strip_zeros((n, m)),
         mode=np.zeros((n, m), NEST_MODE),
         port=np.zeros(len(c.port), NEST_PORT),
-        port_mode=np.zeros((len(c.port), m), COLUMN),
+        port_mode=strip_zeros((len(c.port), 6, m)),
         wheel=np.zeros(len(c.wheel), NEST_WHEEL),
         S=np.zeros(len(c.entry_row)),
         Z=np.zeros((nx, nx)),

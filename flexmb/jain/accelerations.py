@@ -5,10 +5,10 @@ is for accelerations that x holds: the workspace w itself, or a response to forc
 """
 
 from flexmb.jain.kinematics import motion_column
-from flexmb.jain.ports import mode_motion
+from flexmb.jain.ports import moved_by_modes
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
-from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, times6_t, vec6
+from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sub6, sum6, times6_t, vec6
 from flexmb.spatial.vector import cross, mat3, sub, times_t, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
@@ -22,7 +22,7 @@ def acceleration_sweep(c, w):
             A = axpy6(w.speed[c.body[k].u_index + n].acceleration, motion_column(c, w, k, n), A)
         if has(c, MODES):
             for n in range(c.body[k].modes):
-                w.mode[k, n].etadd = w.speed[c.body[k].etad_index + n].acceleration
+                w.etadd[k, n] = w.speed[c.body[k].etad_index + n].acceleration
         store_body_acceleration(c, w, k, A)
 
 
@@ -43,9 +43,7 @@ def carried_acceleration(c, w, x, k):
     if has(c, INBOARD_NODES):
         i = c.body[k].inboard_port
         if i >= 0:
-            A_parent = shift_motion(A_parent, vec3(w.port[i].r, 0))
-            for n in range(c.body[p].modes):
-                A_parent = axpy6(x.mode[p, n].etadd, mode_motion(w, i, n), A_parent)
+            A_parent = sum6(shift_motion(A_parent, vec3(w.port[i].r, 0)), moved_by_modes(c, w, x, p, i))
     return times6_t(R, shift_motion(A_parent, vec3(w.body[k].arm, 0)))
 
 
@@ -69,7 +67,6 @@ def store_origin_acceleration(c, w, x, k, A):
     if has(c, OUTBOARD_NODES):
         i = c.body[k].outboard_port
         if i >= 0:
-            for n in range(c.body[k].modes):
-                A = axpy6(-x.mode[k, n].etadd, mode_motion(w, i, n), A)
+            A = sub6(A, moved_by_modes(c, w, x, k, i))
             A = A[0], sub(A[1], cross(A[0], vec3(w.port[i].r, 0)))
     store6(x.body[k].accel, 0, A)

@@ -20,7 +20,7 @@ KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 
-    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff and w.mode.
+    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr and w.zf.
     """
     for i in range(4):
         energy[i] = 0.0
@@ -50,13 +50,13 @@ def _body(c, w, k, energy, momentum):
     twice = dot6(h, V)
     if has(c, MODES):
         for n in range(c.body[k].modes):
-            M_fr, etad = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].etad
+            M_fr, etad = vec6(w.pfr[k, n], 0), w.etad[k, n]
             twice += 2.0 * etad * dot6(M_fr, V)
             h = axpy6(etad, M_fr, h)
             eta = w.q[c.body[k].eta_index + n]
             for i in range(c.body[k].modes):
-                twice += etad * w.pff[k, n, i] * w.mode[k, i].etad
-                energy[STRAIN] += 0.5 * eta * c.pair[k, n, i].stiffness * w.q[c.body[k].eta_index + i]
+                twice += etad * w.pff[k, n, i] * w.etad[k, i]
+                energy[STRAIN] += 0.5 * eta * c.stiffness[k, n, i] * w.q[c.body[k].eta_index + i]
     if has(c, WHEELS):
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             axial, axis, spin = c.wheel[i].axial, spin_axis(c, w, i), w.u[c.wheel[i].u_index]
@@ -80,7 +80,7 @@ def power(c, w):
             for n in range(c.body[k].modes):
                 start, stop = (n, n + 1) if c.body[k].uncoupled else (0, c.body[k].modes)
                 for i in range(start, stop):
-                    total -= w.u[c.body[k].etad_index + n] * c.pair[k, n, i].damping * w.u[c.body[k].etad_index + i]
+                    total -= w.u[c.body[k].etad_index + n] * c.damping[k, n, i] * w.u[c.body[k].etad_index + i]
         if has(c, LOADS):
             for i in range(c.body[k].load_start, c.body[k].load_stop):
                 port, F = load_at_port(c, w, k, i)

@@ -21,6 +21,7 @@ from flexmb.motion.coordinates import hinge_forces
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.linear_algebra import cholesky_rows, cholesky_solve
 from flexmb.spatial.pivots import is_small
+from flexmb.spatial.rows import column3
 from flexmb.spatial.spatial_vector import vec6
 from flexmb.spatial.vector import dot, mat3, scale, vec3
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
@@ -51,7 +52,7 @@ def forward_dynamics(c, w, m):
         w.speed[j].acceleration = w.function[f, 2] if f >= 0 else 0.0
     inverse.inverse_dynamics(c, w, m.bias)
     for k in range(c.body.shape[0]):
-        if is_out_of_range(c, w, k):
+        if is_out_of_range(c, w.eta[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
     composite_bodies(c, w, m)
@@ -103,7 +104,7 @@ def _reverse(m, n):
 def composite_bodies(c, w, m):
     """R(k) = Phi R(k-1) Phi' + M_m (47), X(k) = R(k) H' and the rows of M that body k has (50), tips to base.
 
-    Needs M_m of all bodies in w.body.inertia, w.pff and w.mode.pfr, and leaves R there.
+    Needs M_m of all bodies in w.body.inertia, w.pff and w.pfr, and leaves R there.
     """
     for k in range(c.body.shape[0] - 1, -1, -1):
         if c.body[k].outboard_port >= 0:
@@ -125,7 +126,7 @@ def _own_forces(c, w, m, k):
         _store_force(m.X, first + n, inertia_times(R, motion_column(c, w, k, n)))
     nm = c.body[k].modes
     for n in range(nm):
-        _store_force(m.X, modes + n, vec6(w.mode[k, n].pfr, 0))
+        _store_force(m.X, modes + n, vec6(w.pfr[k, n], 0))
         for i in range(n, nm):
             m.M[modes + n, modes + i] = w.pff[k, n, i]
     count = c.body[k].wheel_stop - c.body[k].wheel_start
@@ -136,9 +137,9 @@ def _own_forces(c, w, m, k):
         _store_force(m.X, wheels + i, (torque, (0.0, 0.0, 0.0)))
         out = c.body[k].outboard_port
         for n in range(nm):
-            row = dot(vec3(w.port_mode[port, n].W, 0), torque)
+            row = dot(column3(w.port_mode[port], 0, n), torque)
             if out >= 0:
-                row -= dot(vec3(w.port_mode[out, n].W, 0), torque)
+                row -= dot(column3(w.port_mode[out], 0, n), torque)
             m.M[modes + n, wheels + i] = row
         m.M[wheels + i, wheels + i] = axial
 

@@ -14,13 +14,14 @@ the deformation, the tables are made anew at each evaluation.
 from math import sqrt
 
 from flexmb.jain.explicit import cholesky, refer_rigid
-from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
+from flexmb.jit.strips import put, put_across, strip, width
 from flexmb.levels.body import is_at_rest
-from flexmb.spatial.inertia import add_product, outer_inertia, store_full, store_inertia, sum_inertia
-from flexmb.spatial.spatial_vector import ZERO6, axpy6, dot6, plus6, scale6, store6, sub6, vec6
-from flexmb.spatial.vector import add_outer, vec3
+from flexmb.spatial.inertia import add_product, store_inertia
+from flexmb.spatial.rows import column_inertia, strips6
+from flexmb.spatial.spatial_vector import dot6, plus6, store6, sub6, vec6
+from flexmb.spatial.vector import vec3
 
 NEGLIGIBLE = 2.0**-49  # pivots of a matrix of unit diagonal below it are rounding: 16 units
 
@@ -37,7 +38,7 @@ def eliminate_modes(c, w, k):
     _to_orthonormal(c, w, k)
     for b in range(21):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b] - w.zeta[r, b]
-    F = _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 0)
+    F = _sum_of_modes(w, w.zf[k], w.gain[r, 0], c.body[k].modes)
     store6(w.body[k].hinge_force, 0, sub6(vec6(w.body[k].force, 0), F))
     if nodes == 0:
         return True
@@ -81,58 +82,53 @@ def _pass_nodes(w, k, r, nodes):
 def _tables(c, w, k):
     """L^-1 M_fr, L^-1 Pi', zeta, Theta and root of Omega at the present deformation; L is diagonal."""
     r, nodes, nm = c.body[k].reduced, c.body[k].nodes, c.body[k].modes
-    rows, inverse, modes = w.gain[r], c.compliance[r], w.mode[k]
+    rows, inverse, found = w.gain[r], c.compliance[r], w.point_mode
     for n in range(nm):
-        store6(rows[n, 0], 0, scale6(inverse[n, n], vec6(modes[n].pfr, 0)))
-    store_inertia(w.zeta[r], 0, _squares(rows, nm, 0))
+        _scale_row(w, inverse[n, n], w.pfr[k, n], rows[0, n])
+    _products(w, rows[0], rows[0], nm, found)
+    store_inertia(w.zeta[r], 0, column_inertia(found))
     omega = w.scratch[0]
     for j in range(nodes):
         port = c.node[r, j].port
+        for n in range(0, nm, width(w)):
+            put_across(w, rows[1 + j], n, strips6(w, w.port_mode[port], n))
         for n in range(nm):
-            store6(rows[n, 1 + j], 0, scale6(inverse[n, n], mode_motion(w, port, n)))
-        _theta(rows, nm, j, vec3(w.port[port].r, 0), w.node[r, j].theta)
-        store_full(omega, 6 * j, _squares(rows, nm, 1 + j))
-        for i in range(j):
-            _products(rows, nm, 1 + j, 1 + i, omega, 6 * j, 6 * i)
+            _scale_row(w, inverse[n, n], rows[1 + j, n], rows[1 + j, n])
+        _products(w, rows[1 + j], rows[0], nm, found)
+        _theta(found, vec3(w.port[port].r, 0), w.node[r, j].theta)
+        for i in range(j + 1):
+            _products(w, rows[1 + j], rows[1 + i], nm, found)
             for a in range(6):
                 for b in range(6):
-                    omega[6 * i + b, 6 * j + a] = omega[6 * j + a, 6 * i + b]
+                    omega[6 * j + a, 6 * i + b] = found[a, b]
+                    omega[6 * i + b, 6 * j + a] = found[a, b]
     w.rank[r] = semidefinite_root(omega, w.scratch[1, 0], w.root[r], 6 * nodes)
 
 
 @helper
-def _squares(rows, nm, j):
-    """sum_n x x' of x = rows[n, j] as a spatial inertia."""
-    six, nine = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    found = six, nine, six
-    for n in range(nm):
-        x = vec6(rows[n, j], 0)
-        found = sum_inertia(found, outer_inertia(x[0], x[1], 1.0))
-    return found
+def _scale_row(w, s, row, out):
+    """Six elements of `row` times s into `out`."""
+    for b in range(0, 6, width(w)):
+        put(w, out, b, s * strip(w, row, b))
 
 
 @helper
-def _products(rows, nm, i, j, out, p, q):
-    """sum_n x y' of x = rows[n, i], y = rows[n, j] into the block of `out` that starts at p, q."""
-    for half in range(0, 6, 3):
-        left = right = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-        for n in range(nm):
-            x = vec3(rows[n, i], half)
-            left = add_outer(left, x, vec3(rows[n, j], 0))
-            right = add_outer(right, x, vec3(rows[n, j], 3))
-        for a in range(3):
-            for b in range(3):
-                out[p + half + a, q + b] = left[3 * a + b]
-                out[p + half + a, q + 3 + b] = right[3 * a + b]
+def _products(w, left, right, nm, out):
+    """sum_n x y' of six elements x of the rows of `left` and y of those of `right` into six rows of `out`."""
+    for a in range(6):
+        for b in range(0, 6, width(w)):
+            total = 0.0
+            for n in range(nm):
+                total += left[n, a] * strip(w, right[n], b)
+            put(w, out[a], b, total)
 
 
 @helper
-def _theta(rows, nm, j, r, theta):
-    """Theta = phi' - Pi Lam M_fr of node j at r."""
-    _products(rows, nm, 1 + j, 0, theta, 0, 0)
+def _theta(product, r, theta):
+    """Theta = phi' - Pi Lam M_fr of a node at r, with this product."""
     for a in range(6):
         for b in range(6):
-            theta[a, b] = -theta[a, b]
+            theta[a, b] = -product[a, b]
         theta[a, a] += 1.0
     theta[3, 1] += r[2]
     theta[3, 2] -= r[1]
@@ -185,20 +181,23 @@ def _to_orthonormal(c, w, k):
     """L^-1 z_f in place."""
     rows = c.compliance[c.body[k].reduced]
     for i in range(c.body[k].modes - 1, -1, -1):
-        s = w.mode[k, i].zf
-        w.mode[k, i].zf = rows[i, i] * s
+        s = w.zf[k, i]
+        w.zf[k, i] = rows[i, i] * s
         if not c.body[k].orthogonal:
             for n in range(i + 1, c.body[k].modes):
-                w.mode[k, n].zf += rows[n, i] * s
+                w.zf[k, n] += rows[n, i] * s
 
 
 @helper
-def _sum_of_modes(rows, modes, nm, j):
-    """Psi' z_f for j = 0, Ups' z_f of node j - 1 beyond."""
-    total = ZERO6
-    for n in range(nm):
-        total = axpy6(modes[n].zf, vec6(rows[n, j], 0), total)
-    return total
+def _sum_of_modes(w, zf, rows, nm):
+    """Psi' z_f or Ups' z_f of a node, by the rows of either."""
+    found = w.point_mode[0]
+    for b in range(0, 6, width(w)):
+        total = 0.0
+        for n in range(nm):
+            total += zf[n] * strip(w, rows[n], b)
+        put(w, found, b, total)
+    return vec6(found, 0)
 
 
 @helper
@@ -207,7 +206,7 @@ def _responses(c, w, k):
     r = c.body[k].reduced
     nodes = c.body[k].nodes
     for i in range(nodes):
-        store6(w.node[r, i].response, 0, _sum_of_modes(w.gain[r], w.mode[k], c.body[k].modes, 1 + i))
+        store6(w.node[r, i].response, 0, _sum_of_modes(w, w.zf[k], w.gain[r, 1 + i], c.body[k].modes))
     for a in range(w.rank[r]):
         s = 0.0
         for i in range(nodes):
@@ -227,17 +226,17 @@ def modal_accelerations(c, w, k, A):
         node = w.node[r, i]
         for b in range(6):
             node.response[b] = plus6(node.force[b], vec6(node.carried[b], 0), A)
-    rows, modes = w.gain[r], w.mode[k]
+    rows = w.gain[r]
     for n in range(c.body[k].modes):
-        s = plus6(modes[n].zf, vec6(rows[n, 0], 0), A)
+        s = plus6(w.zf[k, n], vec6(rows[0, n], 0), A)
         for i in range(nodes):
-            s += dot6(vec6(rows[n, 1 + i], 0), vec6(w.node[r, i].response, 0))
-        modes[n].etadd = -s
+            s += dot6(vec6(rows[1 + i, n], 0), vec6(w.node[r, i].response, 0))
+        w.etadd[k, n] = -s
     for i in range(c.body[k].modes):
-        row, s = c.compliance[r, i], w.mode[k, i].etadd
-        w.mode[k, i].etadd = row[i] * s
+        row, s = c.compliance[r, i], w.etadd[k, i]
+        w.etadd[k, i] = row[i] * s
         if not c.body[k].orthogonal:
             for n in range(i):
-                w.mode[k, n].etadd += row[n] * s
+                w.etadd[k, n] += row[n] * s
     for n in range(c.body[k].modes):
-        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd
+        w.speed[c.body[k].etad_index + n].acceleration = w.etadd[k, n]

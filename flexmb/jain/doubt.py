@@ -6,11 +6,10 @@ from flexmb.spatial.pivots import is_small
 
 
 @helper
-def note_modes(c, w, k, L):
-    """Note small pivots of the modes of body k, of a Cholesky factor L."""
-    for n in range(c.body[k].modes):
-        if not every((L[n, n] * L[n, n]).real > c.speed[c.body[k].etad_index + n].doubtful):
-            w.doubt[0] = 1
+def note_mode(c, w, k, n, pivot):
+    """Note the pivot of mode n of body k if it is small."""
+    if not every(pivot.real > c.speed[c.body[k].etad_index + n].doubtful):
+        w.doubt[0] = 1
 
 
 @helper

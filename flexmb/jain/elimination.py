@@ -7,6 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
+from flexmb.jit.strips import ROW, strip_zeros
 from flexmb.levels.body import LEVELS
 from flexmb.tables import arrays as a
 
@@ -65,12 +66,12 @@ def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
     """Whether condensing body k is taken to be faster than a Cholesky factor of D_f.
 
     Measured (tests/benchmarks/test_elimination.py) on chains of clamped beams, one node each: ruthless ones gain from
-    7 to 8 modes on, those of level full, whose tables are made anew at each evaluation, from 13 to 14. Estimated from
+    10 to 12 modes on, those of level full, whose tables are made anew at each evaluation, from 16 to 20. Estimated from
     operation counts, not measured: the growth of the thresholds with the nodes. A tip counts as one node: it would
     gain earlier, but not what compiling costs.
     """
     body = c.body[k]
-    return bool(body["modes"] >= (8 if LEVELS[body["level"]].at_rest else 14) * max(1, nodes))
+    return bool(body["modes"] >= (11 if LEVELS[body["level"]].at_rest else 18) * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:
@@ -95,11 +96,11 @@ def _node_ports(c: a.Constants) -> dict[int, list[int]]:
 def _reduced_constants(
     c: a.Constants, reduced: list[int], nodes: dict[int, list[int]], variant: int
 ) -> a.ReducedConstants:
-    most, m = max(len(nodes[k]) for k in reduced), c.mode.shape[1]
+    most, m = max(len(nodes[k]) for k in reduced), c.mff.shape[2]
     size = 6 * max(most, 1)
     tables: dict[str, Any] = {
         "compliance": np.zeros((len(reduced), m, m)),
-        "gain": np.zeros((len(reduced), m, 1 + most, 6)),
+        "gain": strip_zeros((len(reduced), 1 + most, m, ROW)),
         "node": np.zeros((len(reduced), most), a.REDUCED_NODE),
         "root": np.zeros((len(reduced), size, size)),
         "rank": np.zeros(len(reduced), np.int64),
@@ -130,7 +131,7 @@ class _Rest:
     def of(cls, c: a.Constants, k: int, ports: list[int]) -> _Rest:
         """About O. Where O sits on a node d of the body: with V = X V_O - B etadot, the congruence of (13), (17)."""
         n, hinge = c.body["modes"][k], int(c.body["outboard_port"][k])
-        M_ff, M_fr, Pi_t = c.pair["mff"][k, :n, :n], c.mode["mfr"][k, :n], _shapes(c, ports, n)
+        M_ff, M_fr, Pi_t = c.mff[k, :n, :n], c.mfr[k, :, :n].T, _shapes(c, ports, n)
         phi_t = np.vstack([np.zeros((0, 6)), *(_shift(_place(c, port)) for port in ports)])
         if hinge < 0:
             return cls(M_ff, M_fr, Pi_t, phi_t)
@@ -161,8 +162,8 @@ def _fill(c: a.Constants, k: int, row: int, ports: list[int], variant: int, tabl
     if variant == a.WOODBURY:
         inverse, psi, ups = inverse.T @ inverse, inverse.T @ psi, inverse.T @ ups
     tables["compliance"][row, :n, :n] = inverse
-    tables["gain"][row, :n, 0] = psi
-    tables["gain"][row, :n, 1 : 1 + len(ports)] = ups.reshape(n, len(ports), 6)
+    tables["gain"][row, 0, :n, :6] = psi
+    tables["gain"][row, 1 : 1 + len(ports), :n, :6] = ups.reshape(n, len(ports), 6).swapaxes(0, 1)
 
 
 def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
@@ -179,7 +180,7 @@ def _scaled_root(ups: a.Real) -> tuple[a.Real, a.Real, a.Real]:
 
 def _shapes(c: a.Constants, ports: list[int], n: int) -> a.Real:
     """Pi' (n, 6C) of the nodes at rest: angular and linear velocity by modal speed."""
-    rotation, translation = c.port_mode["rotation"][ports, :n], c.port_mode["translation"][ports, :n]
+    rotation, translation = np.split(c.port_mode[ports, :, :n].swapaxes(1, 2), 2, axis=2)
     linear = translation + np.cross(rotation, c.port["offset"][ports][:, None])
     return np.concatenate([rotation, linear], axis=2).swapaxes(0, 1).reshape(n, 6 * len(ports))
 

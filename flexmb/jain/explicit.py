@@ -1,14 +1,16 @@
-"""Modes eliminated by an explicit Cholesky factor of D_f, (63), (64): for any body, at any level, with any hinge.
+"""Modes eliminated by the factors D_f = L D L', (63), (64): for any body, at any level, with any hinge.
 
-After the inward sweep the workspace holds L of D_f = L L' (w.pff), L^-1 P_fr (w.mode.pfr) and L^-1 z_f (w.mode.zf).
+L has a unit diagonal, D is that of the pivots: no square root is taken. After the inward sweep the workspace holds D L'
+(w.pff, upper triangle; what is below means nothing), D^-1 (w.inverse_pivot) and rows of L^-1 [P_fr z_f] (w.pfr).
 """
 
-from flexmb.jain.doubt import note_modes
+from flexmb.jain.doubt import note_mode
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
-from flexmb.jit.kernel import helper
+from flexmb.jit.kernel import by_width, helper
 from flexmb.jit.lanes import kept, some
+from flexmb.jit.strips import add_across, put, start, strip, width, with_seventh
 from flexmb.levels.body import RIGID
 from flexmb.spatial.inertia import (
     add_inertia,
@@ -23,8 +25,10 @@ from flexmb.spatial.inertia import (
     sum_inertia,
 )
 from flexmb.spatial.pivots import SINGULAR
+from flexmb.spatial.rows import axpy3, column6, column_inertia, put6, strips6
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.spatial_vector import (
+    ZERO6,
     add6,
     axpy6,
     dot6,
@@ -33,38 +37,97 @@ from flexmb.spatial.spatial_vector import (
     scale6,
     shift_force,
     store6,
+    sum6,
     times6,
     vec6,
 )
 from flexmb.spatial.vector import cross, mat3, scale, sub, sym6, vec3
 from flexmb.tables.features import INBOARD_NODES, MODES, OUTBOARD_NODES
 
+LOAD = 6  # place of L^-1 z_f in a row of w.pfr
+
 
 @helper
 def eliminate_modes(c, w, k):
-    """D_f = L L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
-    nm = c.body[k].modes
+    """D_f = L D L', P_R = P_rr - P_rf D_f^-1 P_fr and z_R likewise, about O; L^-1 P_fr and L^-1 z_f are kept."""
     if has(c, OUTBOARD_NODES) and c.body[k].outboard_port >= 0:
         refer_to_hinge(c, w, k)
-    if nm > 0 and not cholesky(w.pff[k], nm):
-        return False
-    note_modes(c, w, k, w.pff[k])
+    return _eliminate(c, w, k)
+
+
+@helper
+def _one_by_one(c, w, k):
+    """Each row of [D_f P_fr z_f] less what those before it take: of vectors, which are better not stored often."""
+    D, factor = w.pff[k], w.point_mode[0]
     P, z_r = load_inertia(w.body[k].inertia, 0), vec6(w.body[k].force, 0)
-    for n in range(nm):
-        P_fr, z = vec6(w.mode[k, n].pfr, 0), w.mode[k, n].zf
+    for n in range(c.body[k].modes):
+        P_fr, z, pivot = vec6(w.pfr[k, n], 0), w.zf[k, n], D[n, n]
+        floor = SINGULAR * pivot
         for i in range(n):
-            s = -w.pff[k, n, i]
-            z += s * w.mode[k, i].zf
-            P_fr = axpy6(s, vec6(w.mode[k, i].pfr, 0), P_fr)
-        s = 1.0 / w.pff[k, n, n]
-        P_fr, z = scale6(s, P_fr), s * z
-        store6(w.mode[k, n].pfr, 0, P_fr)
-        w.mode[k, n].zf = z
-        z_r = axpy6(-z, P_fr, z_r)
-        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], -1.0))
+            s = -w.inverse_pivot[k, i] * D[i, n]
+            factor[i] = s
+            pivot += s * D[i, n]
+            z += s * w.pfr[k, i, LOAD]
+            P_fr = axpy6(s, vec6(w.pfr[k, i], 0), P_fr)
+        if not _keep_pivot(c, w, k, n, pivot, floor):
+            return False
+        for m in range(n + 1, c.body[k].modes):
+            row = D[n, m]
+            for i in range(n):
+                row += factor[i] * D[i, m]
+            D[n, m] = row
+        store6(w.pfr[k, n], 0, P_fr)
+        w.pfr[k, n, LOAD] = z
+        s = -w.inverse_pivot[k, n]
+        z_r = axpy6(s * z, P_fr, z_r)
+        P = sum_inertia(P, outer_inertia(P_fr[0], P_fr[1], s))
     store6(w.body[k].hinge_force, 0, z_r)
     store_inertia(w.body[k].hinge_inertia, 0, P)
     return True
+
+
+@helper
+def _in_strips(c, w, k):
+    """Each row of [D_f P_fr z_f] taken from those after it, and from [P_rr z_r]: few sums wait for each other."""
+    D, Y, nm = w.pff[k], w.pfr[k], c.body[k].modes
+    for n in range(nm):
+        w.inverse_pivot[k, n] = SINGULAR * D[n, n]  # the least that the pivot may be
+        put(w, Y[n], 0, with_seventh(w, strip(w, Y[n], 0), w.zf[k, n]))
+    taken = ZERO6
+    for n in range(nm):
+        if not _keep_pivot(c, w, k, n, D[n, n], w.inverse_pivot[k, n]):
+            return False
+        s, own = -w.inverse_pivot[k, n], strip(w, Y[n], 0)
+        for i in range(n + 1, nm):
+            factor = s * D[n, i]
+            for m in range(start(w, i), nm, width(w)):
+                put(w, D[i], m, strip(w, D[i], m) + factor * strip(w, D[n], m))
+            put(w, Y[i], 0, strip(w, Y[i], 0) + factor * own)
+        row = s * own
+        loads = vec6(Y[n], 0)
+        taken = axpy3(loads[0], row, taken[0]), axpy3(loads[1], row, taken[1])
+    found = w.point_mode
+    put6(w, found, 0, taken)
+    P = column_inertia(found)
+    store6(w.body[k].hinge_force, 0, sum6(vec6(w.body[k].force, 0), column6(found, LOAD)))
+    store_inertia(w.body[k].hinge_inertia, 0, sum_inertia(load_inertia(w.body[k].inertia, 0), P))
+    return True
+
+
+@helper
+def _keep_pivot(c, w, k, n, pivot, floor):
+    """The inverse of the pivot of mode n; False where it is rounding, or NaN."""
+    sound = pivot.real > floor.real
+    if not some(sound):
+        return False
+    pivot = kept(sound, pivot)
+    note_mode(c, w, k, n, pivot)
+    w.pff[k, n, n] = pivot
+    w.inverse_pivot[k, n] = 1.0 / pivot
+    return True
+
+
+_eliminate = by_width(_in_strips, _one_by_one)
 
 
 @helper
@@ -108,12 +171,10 @@ def refer_to_hinge(c, w, k):
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, -0.5)
     for n in range(c.body[k].modes):
-        B, P_fr = from_hinge(c, w, k, n), vec6(w.mode[k, n].pfr, 0)
+        B, P_fr = from_hinge(c, w, k, n), vec6(w.pfr[k, n], 0)
         for m in range(n + 1):
-            s = less6(w.pff[k, n, m], P_fr, from_hinge(c, w, k, m))
-            s -= dot6(B, vec6(w.mode[k, m].pfr, 0))
-            w.pff[k, n, m] = s
-            w.pff[k, m, n] = s
+            s = less6(w.pff[k, m, n], P_fr, from_hinge(c, w, k, m))
+            w.pff[k, m, n] = s - dot6(B, vec6(w.pfr[k, m], 0))
     refer_coupling(c, w, k, -0.5)
     refer_rigid(c, w, k)
 
@@ -129,7 +190,7 @@ def from_hinge(c, w, k, n):
 @helper
 def _add_momentum(c, w, k, n, P_rr, s):
     """P_fr += s B'P_rr, row n."""
-    add6(w.mode[k, n].pfr, 0, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
+    add6(w.pfr[k, n], 0, scale6(s, inertia_times(P_rr, from_hinge(c, w, k, n))))
 
 
 @helper
@@ -139,7 +200,7 @@ def refer_coupling(c, w, k, s):
     P_rr = load_inertia(w.body[k].inertia, 0)
     for n in range(c.body[k].modes):
         _add_momentum(c, w, k, n, P_rr, s)
-        store6(w.mode[k, n].pfr, 0, shift_force(vec6(w.mode[k, n].pfr, 0), back))
+        store6(w.pfr[k, n], 0, shift_force(vec6(w.pfr[k, n], 0), back))
 
 
 @helper
@@ -147,7 +208,7 @@ def refer_rigid(c, w, k):
     """z_f - B'z_r, X'P_rr X and X'z_r."""
     z_r = vec6(w.body[k].force, 0)
     for n in range(c.body[k].modes):
-        w.mode[k, n].zf -= dot6(from_hinge(c, w, k, n), z_r)
+        w.zf[k, n] -= dot6(from_hinge(c, w, k, n), z_r)
     back = scale(-1.0, vec3(w.port[c.body[k].outboard_port].r, 0))
     store_inertia(w.body[k].inertia, 0, shift_inertia(load_inertia(w.body[k].inertia, 0), back))
     store6(w.body[k].force, 0, shift_force(z_r, back))
@@ -197,15 +258,23 @@ def _add_inertia(c, w, k, gamma):
         i = c.body[k].inboard_port
         if i >= 0:
             r = vec3(w.port[i].r, 0)
-            for n in range(c.body[parent].modes):
-                momentum = inertia_times(gamma, mode_motion(w, i, n))
-                for m in range(n + 1):
-                    s = dot6(momentum, mode_motion(w, i, m)) + w.pff[parent, n, m]
-                    w.pff[parent, n, m] = s
-                    w.pff[parent, m, n] = s
-                add6(w.mode[parent, n].pfr, 0, shift_force(momentum, r))
+            _add_to_modes(c, w, parent, i, gamma, r)
             gamma = shift_inertia(gamma, r)
     add_inertia(w.body[parent].inertia, 0, gamma)
+
+
+@helper
+def _add_to_modes(c, w, k, i, gamma, r):
+    """Pi' Gamma Pi added to P_ff, upper triangle, and phi Gamma Pi to P_fr, of port i of body k, at r."""
+    nm, modes, momenta = c.body[k].modes, w.port_mode[i], w.point_mode
+    for n in range(0, nm, width(w)):
+        momentum = inertia_times(gamma, strips6(w, modes, n))
+        put6(w, momenta, n, momentum)
+        add_across(w, w.pfr[k], n, shift_force(momentum, r))
+        for m in range(n, min(n + width(w), nm)):
+            for j in range(n, nm, width(w)):
+                row = plus6(strip(w, w.pff[k, m], j), column6(momenta, m), strips6(w, modes, j))
+                put(w, w.pff[k, m], j, row)
 
 
 @helper
@@ -220,11 +289,11 @@ def _add_force(c, w, z, k, F_parent):
 
 @helper
 def modal_accelerations(c, w, k, A):
-    """Back substitution L' etadd = -(L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward half of (64)."""
-    for n in range(c.body[k].modes - 1, -1, -1):
-        P_fr = vec6(w.mode[k, n].pfr, 0)
-        s = plus6(w.mode[k, n].zf, P_fr, A)
-        for i in range(n + 1, c.body[k].modes):
-            s += w.pff[k, i, n] * w.mode[k, i].etadd
-        w.mode[k, n].etadd = -s / w.pff[k, n, n]
-        w.speed[c.body[k].etad_index + n].acceleration = w.mode[k, n].etadd
+    """Back substitution L' etadd = -D^-1 (L^-1 z_f + L^-1 P_fr alpha) from the acceleration of O: outward (64)."""
+    nm = c.body[k].modes
+    for n in range(nm - 1, -1, -1):
+        s = plus6(w.pfr[k, n, LOAD], vec6(w.pfr[k, n], 0), A)
+        for i in range(n + 1, nm):
+            s += w.pff[k, n, i] * w.etadd[k, i]
+        w.etadd[k, n] = -w.inverse_pivot[k, n] * s
+        w.speed[c.body[k].etad_index + n].acceleration = w.etadd[k, n]

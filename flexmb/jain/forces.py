@@ -1,8 +1,9 @@
 """What acts on the bodies besides inertia: elasticity and the loads at nodes."""
 
-from flexmb.jain.ports import mode_motion
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.strips import put, strip, width
+from flexmb.spatial.rows import strips3, strips6
 from flexmb.spatial.spatial_vector import add6, dot6, scale6, shift_force
 from flexmb.spatial.vector import add3, dot, mat3, scale, times, times_t, vec3
 from flexmb.tables.arrays import FORCE, NODE_AXES
@@ -15,13 +16,13 @@ def elastic_forces(c, w, k):
     nm, q, u = c.body[k].modes, c.body[k].eta_index, c.body[k].etad_index
     if not has(c, COUPLED_MODES) or c.body[k].uncoupled:
         for n in range(nm):
-            w.mode[k, n].zf += c.pair[k, n, n].stiffness * w.q[q + n] + c.pair[k, n, n].damping * w.u[u + n]
+            w.zf[k, n] += c.stiffness[k, n, n] * w.q[q + n] + c.damping[k, n, n] * w.u[u + n]
     else:
         for n in range(nm):
-            s = w.mode[k, n].zf
+            s = w.zf[k, n]
             for i in range(nm):
-                s += c.pair[k, n, i].stiffness * w.q[q + i] + c.pair[k, n, i].damping * w.u[u + i]
-            w.mode[k, n].zf = s
+                s += c.stiffness[k, n, i] * w.q[q + i] + c.damping[k, n, i] * w.u[u + i]
+            w.zf[k, n] = s
 
 
 @helper
@@ -54,8 +55,8 @@ def add_port_force(c, w, z, k, port, F):
     z holds forces: the workspace w itself, or a response to the factors in w.
     """
     if has(c, MODES):
-        for n in range(c.body[k].modes):
-            z.mode[k, n].zf += dot6(mode_motion(w, port, n), F)
+        for n in range(0, c.body[k].modes, width(w)):
+            put(w, z.zf[k], n, strip(w, z.zf[k], n) + dot6(strips6(w, w.port_mode[port], n), F))
     add6(z.body[k].force, 0, shift_force(F, vec3(w.port[port].r, 0)))
 
 
@@ -64,5 +65,5 @@ def add_port_torque(c, w, z, k, port, torque):
     """z += A [torque; 0], as `add_port_force`."""
     add3(z.body[k].force, 0, torque)
     if has(c, MODES):
-        for n in range(c.body[k].modes):
-            z.mode[k, n].zf += dot(vec3(w.port_mode[port, n].W, 0), torque)
+        for n in range(0, c.body[k].modes, width(w)):
+            put(w, z.zf[k], n, strip(w, z.zf[k], n) + dot(strips3(w, w.port_mode[port], 0, n), torque))

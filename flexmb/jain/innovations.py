@@ -1,7 +1,8 @@
 """Innovations factorisation M = (1 + H Phi K) D (1 + H Phi K)' of trees, applied and inverted by recursion, O(N).
 
 The factors are what `flexmb.jain.sweeps.inward` leaves: per body first the free wheels, then the modes (D_f), then the
-hinge (D_R), each D = L L'. Prescribed speeds are held: their rows and columns of M are left out. With
+hinge (D_R), each D = L L'; of modes L is that of `flexmb.jain.explicit` times the roots of the pivots. Prescribed
+speeds are held: their rows and columns of M are left out. With
 
     F = (1 + H Phi K) L
 
@@ -19,7 +20,7 @@ from math import log, sqrt
 
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import carried_acceleration, store_origin_acceleration
-from flexmb.jain.explicit import force_to_parent
+from flexmb.jain.explicit import LOAD, force_to_parent
 from flexmb.jain.forces import add_port_torque
 from flexmb.jain.kinematics import motion_column, velocity_sweep
 from flexmb.jain.ports import mode_motion
@@ -65,11 +66,13 @@ def innovate(c, w, x, k):
     z = _force_at_hinge(c, w, x, k)
     start = c.body[k].etad_index
     for n in range(c.body[k].modes):
-        epsilon = x.speed[start + n] - x.mode[k, n].zf
+        epsilon = x.speed[start + n] - x.zf[k, n]
         for i in range(n):
-            epsilon -= w.pff[k, n, i] * x.speed[start + i]
-        x.speed[start + n] = epsilon / w.pff[k, n, n]
-        z = axpy6(x.speed[start + n], vec6(w.mode[k, n].pfr, 0), z)
+            epsilon -= w.pff[k, i, n] * x.speed[start + i]
+        x.speed[start + n] = w.inverse_pivot[k, n] * epsilon
+        z = axpy6(x.speed[start + n], vec6(w.pfr[k, n], 0), z)
+    for n in range(c.body[k].modes):
+        x.speed[start + n] *= sqrt(w.pff[k, n, n])
     store6(x.body[k].force, 0, z)
     z = hinge_solve.innovate(c, w, x, k, z)
     if c.body[k].parent >= 0:
@@ -83,11 +86,11 @@ def respond(c, w, x):
         A = hinge_solve.solve(c, w, x, k, carried_acceleration(c, w, x, k))
         start, nm = c.body[k].etad_index, c.body[k].modes
         for n in range(nm - 1, -1, -1):
-            rate = less6(x.speed[start + n], vec6(w.mode[k, n].pfr, 0), A)
+            rate = less6(x.speed[start + n] * sqrt(w.pff[k, n, n]), vec6(w.pfr[k, n], 0), A)
             for i in range(n + 1, nm):
-                rate -= w.pff[k, i, n] * x.mode[k, i].etadd
-            x.mode[k, n].etadd = rate / w.pff[k, n, n]
-            x.speed[start + n] = x.mode[k, n].etadd
+                rate -= w.pff[k, n, i] * x.etadd[k, i]
+            x.etadd[k, n] = w.inverse_pivot[k, n] * rate
+            x.speed[start + n] = x.etadd[k, n]
         store_origin_acceleration(c, w, x, k, A)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
@@ -104,11 +107,11 @@ def excite(c, w, x):
         A = hinge_solve.excite(c, w, x, k, carried_acceleration(c, w, x, k))
         start, nm = c.body[k].etad_index, c.body[k].modes
         for n in range(nm):
-            x.mode[k, n].etadd = x.speed[start + n]
-            total = dot6(vec6(w.mode[k, n].pfr, 0), A)
+            x.etadd[k, n] = x.speed[start + n]
+            total = dot6(vec6(w.pfr[k, n], 0), A)
             for i in range(n, nm):
-                total += w.pff[k, i, n] * x.speed[start + i]
-            x.speed[start + n] = total
+                total += w.pff[k, n, i] * x.speed[start + i]
+            x.speed[start + n] = total / sqrt(w.pff[k, n, n])
         store_origin_acceleration(c, w, x, k, A)
         for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
             j = c.wheel[i].u_index
@@ -132,15 +135,23 @@ def synthesise(c, w, x):
         z = _force_at_hinge(c, w, x, k)
         start = c.body[k].etad_index
         for n in range(c.body[k].modes):
-            z = axpy6(x.speed[start + n], vec6(w.mode[k, n].pfr, 0), z)
+            x.speed[start + n] /= sqrt(w.pff[k, n, n])
+            z = axpy6(x.speed[start + n], vec6(w.pfr[k, n], 0), z)
         for n in range(c.body[k].modes - 1, -1, -1):
-            T = x.mode[k, n].zf
+            T = x.zf[k, n]
             for i in range(n + 1):
-                T += w.pff[k, n, i] * x.speed[start + i]
+                T += w.pff[k, i, n] * x.speed[start + i]
             x.speed[start + n] = T
         z = hinge_solve.synthesise(c, w, x, k, z)
         if c.body[k].parent >= 0:
             force_to_parent(c, w, x, k, z)
+
+
+@helper
+def add_to_modes(c, w, x, k):
+    """Further forces T on the modes have the innovations y: what `inward` left is as if they had been there."""
+    for n in range(c.body[k].modes):
+        w.pfr[k, n, LOAD] -= x.speed[c.body[k].etad_index + n] * sqrt(w.pff[k, n, n])
 
 
 @helper
@@ -152,7 +163,7 @@ def log_determinant(c, w):
             if c.speed[c.wheel[i].u_index].prescribed < 0:
                 total += log(c.wheel[i].axial)
         for n in range(c.body[k].modes):
-            total += 2.0 * log(w.pff[k, n, n])
+            total += log(w.pff[k, n, n])
         total += hinge_solve.log_determinant(c, w, k)
     return total
 
@@ -178,7 +189,7 @@ def _force_at_hinge(c, w, x, k):
     if i >= 0:
         z = shift_force(z, scale(-1.0, vec3(w.port[i].r, 0)))
         for n in range(c.body[k].modes):
-            x.mode[k, n].zf -= dot6(mode_motion(w, i, n), z)
+            x.zf[k, n] -= dot6(mode_motion(w, i, n), z)
     return z
 
 
@@ -191,7 +202,7 @@ def project(c, w, x, k):
     z = _force_at_hinge(c, w, x, k)
     store6(x.body[k].force, 0, z)
     for n in range(c.body[k].modes):
-        x.speed[c.body[k].etad_index + n] -= x.mode[k, n].zf
+        x.speed[c.body[k].etad_index + n] -= x.zf[k, n]
     for n in range(c.body[k].nv):
         x.speed[c.body[k].u_index + n] -= dot6(motion_column(c, w, k, n), z)
     if c.body[k].parent >= 0:

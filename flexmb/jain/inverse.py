@@ -35,16 +35,16 @@ def inverse_dynamics(c, w, tau):
 
 @helper
 def _inertial_force(c, w, k, tau):
-    """f_m = M_m alpha_m + b_m (36), rigid part into w.body.force, modal part into w.mode.zf; wheels' rows into tau."""
+    """f_m = M_m alpha_m + b_m (36), rigid part into w.body.force, modal part into w.zf; wheels' rows into tau."""
     A = vec6(w.body[k].accel, 0)
     F = inertia_times(load_inertia(w.body[k].inertia, 0), A)
     for n in range(c.body[k].modes):
-        M_fr = vec6(w.mode[k, n].pfr, 0)
-        F = axpy6(w.mode[k, n].etadd, M_fr, F)
-        row = plus6(w.mode[k, n].zf, M_fr, A)
+        M_fr = vec6(w.pfr[k, n], 0)
+        F = axpy6(w.etadd[k, n], M_fr, F)
+        row = plus6(w.zf[k, n], M_fr, A)
         for i in range(c.body[k].modes):
-            row += w.pff[k, n, i] * w.mode[k, i].etadd
-        w.mode[k, n].zf = row
+            row += w.pff[k, n, i] * w.etadd[k, i]
+        w.zf[k, n] = row
     add6(w.body[k].force, 0, F)
     for i in range(c.body[k].wheel_start, c.body[k].wheel_stop):
         port = c.wheel[i].port
@@ -64,7 +64,7 @@ def _project_force(c, w, k, tau):
     if i >= 0:
         F = shift_force(F, scale(-1.0, vec3(w.port[i].r, 0)))
     for n in range(c.body[k].modes):
-        row = w.mode[k, n].zf
+        row = w.zf[k, n]
         if i >= 0:
             row -= dot6(mode_motion(w, i, n), F)
         tau[c.body[k].etad_index + n] = row

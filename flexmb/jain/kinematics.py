@@ -59,8 +59,8 @@ def move_body(c, w, k, shape, rates, displaced):
         exact = not is_at_rest(c.body[k].level)
         if exact or displaced:
             for n in range(c.body[k].modes):
-                w.mode[k, n].eta = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-                w.mode[k, n].etad = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+                w.eta[k, n] = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
+                w.etad[k, n] = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
             for i in range(c.body[k].port_start, c.body[k].port_stop):
                 move_port(c, w, k, i)
     _cross_hinge(c, w, k)

@@ -2,15 +2,17 @@
 
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
+from flexmb.jit.strips import strip, width
 from flexmb.levels.field import field_motion, second_order_motion
-from flexmb.spatial.spatial_vector import axpy6, shift_motion, store6, sum6, vec6
+from flexmb.spatial.rows import column6, strips6, total6
+from flexmb.spatial.spatial_vector import ZERO6, axpy6, shift_motion, store6, sum6, vec6
 from flexmb.spatial.vector import add, cross, mat3, matmul, scale, store3, store9, vec3
 from flexmb.tables.features import SECOND_ORDER
 
 
 @helper
 def move_port(c, w, k, i):
-    """Pose and relative motion of port i of body k, from eta and etadot in w.mode."""
+    """Pose and relative motion of port i of body k, from w.eta and w.etad."""
     if c.body[k].modes == 0:
         return  # set once in the workspace
     x = vec3(c.port[i].position, 0)
@@ -18,11 +20,11 @@ def move_port(c, w, k, i):
     row = c.port[i].second
     if has(c, SECOND_ORDER) and row >= 0:
         r, R, w_rel, v_rel, alpha, a = second_order_motion(
-            x, offset, c.port_mode[i], c.second_shape[row], w.mode[k], c.body[k].modes, w.port_mode[i]
+            x, offset, c.port_mode[i], c.second_shape[row], w.eta[k], w.etad[k], c.body[k].modes, w.port_mode[i]
         )
     else:
         r, R, w_rel, v_rel, alpha, a = field_motion(
-            x, offset, c.port_mode[i], w.mode[k], c.body[k].modes, w.port_mode[i]
+            w, x, offset, c.port_mode[i], w.eta[k], w.etad[k], c.body[k].modes, w.port_mode[i]
         )
     store3(w.port[i].r, 0, r)
     store9(w.port[i].R, 0, matmul(R, mat3(c.port[i].frame, 0)))
@@ -33,7 +35,16 @@ def move_port(c, w, k, i):
 @helper
 def mode_motion(w, i, n):
     """Column n of Pi_i: velocity of port i relative to its body by the speed of mode n, body axes."""
-    return vec3(w.port_mode[i, n].W, 0), vec3(w.port_mode[i, n].L, 0)
+    return column6(w.port_mode[i], n)
+
+
+@helper
+def moved_by_modes(c, w, x, k, i):
+    """Pi_i etaddot: what the modal accelerations that x holds add to the acceleration of port i, body axes."""
+    A = ZERO6
+    for n in range(0, c.body[k].modes, width(w)):
+        A = axpy6(strip(w, x.etadd[k], n), strips6(w, w.port_mode[i], n), A)
+    return total6(w, A)
 
 
 @helper
@@ -55,6 +66,4 @@ def port_bias(w, k, i):
 def port_acceleration(c, w, k, i):
     """Acceleration of port i, minus gravity, body axes."""
     A = sum6(port_bias(w, k, i), shift_motion(vec6(w.body[k].accel, 0), vec3(w.port[i].r, 0)))
-    for n in range(c.body[k].modes):
-        A = axpy6(w.mode[k, n].etadd, mode_motion(w, i, n), A)
-    return A
+    return sum6(A, moved_by_modes(c, w, w, k, i))

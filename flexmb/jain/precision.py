@@ -63,12 +63,12 @@ def _squares(s, h):
 
 @helper
 def _weigh_modes(c, w, x, k, s):
-    """S'S x of the modes of body k: D_nn is the sum of squares of a row of its factor."""
+    """S'S x of the modes of body k: D_nn from its factors."""
     out = c.body[k].outboard_port
     for n in range(c.body[k].modes):
         size = 0.0
         for i in range(n + 1):
-            size += w.pff[k, n, i] * w.pff[k, n, i]
+            size += w.pff[k, i, n] * w.pff[k, i, n] * w.inverse_pivot[k, i]
         if out >= 0:
             size += _squares(s, mode_motion(w, out, n))
         x.speed[c.body[k].etad_index + n] *= size

@@ -9,22 +9,21 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.jain.forces import add_port_force
-from flexmb.jain.ports import mode_motion
+from flexmb.jain.ports import moved_by_modes
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import helper
-from flexmb.spatial.spatial_vector import axpy6, scale6, shift_motion, vec6
+from flexmb.jit.strips import strip_zeros
+from flexmb.spatial.spatial_vector import scale6, shift_motion, sum6, vec6
 from flexmb.spatial.vector import vec3
 from flexmb.tables.arrays import Constants
 from flexmb.typing import Real, Record
 
-BODY_RESPONSE = np.dtype([
-    ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes
-    ("accel", np.float64, (6,)),  # of the body frame, body axes
-])
-MODE_RESPONSE = np.dtype([
-    ("zf", np.float64),  # z_f: minus the load on the mode
-    ("etadd", np.float64),
-])
+BODY_RESPONSE = np.dtype(
+    [
+        ("force", np.float64, (6,)),  # z_r: minus the load on the body, with what its children hand on; body axes
+        ("accel", np.float64, (6,)),  # of the body frame, body axes
+    ]
+)
 
 
 @bundle
@@ -33,17 +32,19 @@ class Response:
 
     ground: Real  # (3,) zero: gravity is no part of a response
     body: Record  # (N,) BODY_RESPONSE
-    mode: Record  # (N,m) MODE_RESPONSE
+    zf: Real  # (N,m) z_f: minus the loads on modes
+    etadd: Real  # (N,m)
     speed: Real  # (nu,) generalised forces T, their innovations y, accelerations M^-1 T: each in place of the last
 
 
 def response(c: Constants) -> Response:
     """A response of the right sizes, all zero."""
-    n, m = c.mode.shape
+    n, _, m = c.mfr.shape
     return Response(
         ground=np.zeros(3),
         body=np.zeros(n, BODY_RESPONSE),
-        mode=np.zeros((n, m), MODE_RESPONSE),
+        zf=strip_zeros((n, m)),
+        etadd=strip_zeros((n, m)),
         speed=np.zeros(len(c.speed)),
     )
 
@@ -63,7 +64,7 @@ def clear_body(c, x, k):
     for i in range(6):
         x.body[k].force[i] = 0.0
     for n in range(c.body[k].modes):
-        x.mode[k, n].zf = 0.0
+        x.zf[k, n] = 0.0
 
 
 @helper
@@ -90,6 +91,4 @@ def push(c, w, x, k, port, F):
 def port_response(c, w, x, k, port):
     """Acceleration of a port of body k that the forces cause, body axes."""
     A = shift_motion(vec6(x.body[k].accel, 0), vec3(w.port[port].r, 0))
-    for n in range(c.body[k].modes):
-        A = axpy6(x.mode[k, n].etadd, mode_motion(w, port, n), A)
-    return A
+    return sum6(A, moved_by_modes(c, w, x, k, port))

@@ -42,7 +42,7 @@ def bodies(c, w):
     displaced = w.displaced[0] != 0
     for k in range(c.body.shape[0]):  # all of a body at once, while its rows are at hand
         move_body(c, w, k, False, False, displaced)
-        if has(c, MODES) and is_out_of_range(c, w, k):
+        if has(c, MODES) and is_out_of_range(c, w.eta[k], k):
             w.fault[0] = k
             return OUT_OF_RANGE
         if has(c, RIGID) and c.body[k].started:

@@ -5,7 +5,7 @@ D = script-H P script-H' of order n_m + n_r is factorised whole, D = L L'. The s
 """
 
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
-from flexmb.jain.doubt import note_hinge, note_modes
+from flexmb.jain.doubt import note_hinge, note_mode
 from flexmb.jain.explicit import about_hinge, cholesky, refer_to_hinge, to_parent
 from flexmb.jain.hinge_solve import find_free, impose
 from flexmb.jain.kinematics import motion_column
@@ -73,7 +73,8 @@ def _eliminate(c, w, x, k):
             D[n, i] = dot6(F, motion_column(c, w, k, w.hinge[k].free_speed[i - nm]))
     if not cholesky(D, rows):
         return False
-    note_modes(c, w, k, D)
+    for n in range(nm):
+        note_mode(c, w, k, n, D[n, n] * D[n, n])
     note_hinge(c, w, k, D, nm)
     P_plus, z_plus = about_hinge(c, w, k)
     store_inertia(P_plus, 0, P)
@@ -100,11 +101,11 @@ def _mode_rows(c, w, x, k, a):
     """The modes' rows of D = script-H P script-H', P script-H' and epsilon = T - script-H (z + P a)."""
     D, gain, residual = x.D[k], x.gain[k], x.residual[k]
     for n in range(c.body[k].modes):
-        P_fr = vec6(w.mode[k, n].pfr, 0)
+        P_fr = vec6(w.pfr[k, n], 0)
         store6(gain[n], 0, P_fr)
-        residual[n] = -plus6(w.mode[k, n].zf, P_fr, a)
+        residual[n] = -plus6(w.zf[k, n], P_fr, a)
         for i in range(n + 1):
-            D[n, i] = w.pff[k, n, i]
+            D[n, i] = w.pff[k, i, n]
 
 
 @helper
@@ -120,7 +121,7 @@ def _accelerate(c, w, x, k):
             s -= D[i, n] * rates[i]
         rates[n] = s / D[n, n]
     for n in range(nm):
-        w.mode[k, n].etadd = rates[n]
+        w.etadd[k, n] = rates[n]
         w.speed[c.body[k].etad_index + n].acceleration = rates[n]
     A = sum6(A_plus, vec6(w.body[k].bias, 0))
     for n in range(nm, rows):

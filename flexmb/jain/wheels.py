@@ -7,7 +7,8 @@ from flexmb.jain.forces import add_port_torque
 from flexmb.jain.ports import port_acceleration, port_bias, port_velocity
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, outer_inertia
-from flexmb.spatial.vector import axpy, cross, dot, mat3, scale, times, vec3
+from flexmb.spatial.rows import column3
+from flexmb.spatial.vector import add3, axpy, cross, dot, mat3, scale, times, vec3
 
 
 @helper
@@ -64,8 +65,7 @@ def _remove_axial_inertia(c, w, k, port, axis, axial):
     add_inertia(w.body[k].inertia, 0, outer_inertia(axis, zero, -axial))
     nm = c.body[k].modes
     for n in range(nm):
-        an = dot(vec3(w.port_mode[port, n].W, 0), axis)
-        for i in range(3):
-            w.mode[k, n].pfr[i] -= axial * an * axis[i]
+        an = dot(column3(w.port_mode[port], 0, n), axis)
+        add3(w.pfr[k, n], 0, scale(-axial * an, axis))
         for i in range(nm):
-            w.pff[k, n, i] -= axial * an * dot(vec3(w.port_mode[port, i].W, 0), axis)
+            w.pff[k, n, i] -= axial * an * dot(column3(w.port_mode[port], 0, i), axis)

@@ -13,6 +13,7 @@ from flexmb.jain.ports import mode_motion
 from flexmb.jain.reduced import node_inertia
 from flexmb.jit.kernel import helper
 from flexmb.spatial.inertia import add_inertia, add_product, inertia_times, load_inertia, shift_inertia
+from flexmb.spatial.rows import column6
 from flexmb.spatial.spatial_vector import add6, dot6, shift_force, store6, vec6
 from flexmb.spatial.vector import vec3
 
@@ -23,7 +24,7 @@ def eliminate_modes(c, w, k):
     r = c.body[k].reduced
     nm = c.body[k].modes
     for n in range(nm):
-        store6(w.mode[k, n].pfr, 0, vec6(c.mode[k, n].mfr, 0))
+        store6(w.pfr[k, n], 0, column6(c.mfr[k], n))
     if not node_inertia(w, r, c.body[k].nodes):
         return False
     for i in range(c.body[k].nodes):
@@ -36,15 +37,15 @@ def eliminate_modes(c, w, k):
         w.body[k].hinge_inertia[b] = w.body[k].inertia[b]
     store6(w.body[k].hinge_force, 0, vec6(w.body[k].force, 0))
     for n in range(nm):
-        g = w.gain[r, n, 0]
+        g = w.gain[r, 0, n]
         for b in range(6):
             g[b] = 0.0
         for i in range(nm):
             for b in range(6):
-                g[b] += w.pff[k, n, i] * w.mode[k, i].pfr[b]
-        add_product(w.body[k].hinge_inertia, 0, -1.0, g, w.mode[k, n].pfr)
+                g[b] += w.pff[k, n, i] * w.pfr[k, i, b]
+        add_product(w.body[k].hinge_inertia, 0, -1.0, g, w.pfr[k, n])
         for b in range(6):
-            w.body[k].hinge_force[b] -= g[b] * w.mode[k, n].zf
+            w.body[k].hinge_force[b] -= g[b] * w.zf[k, n]
     return True
 
 
@@ -56,7 +57,7 @@ def _load_node(c, w, k, i):
     r = vec3(w.port[port].r, 0)
     gamma = load_inertia(node.gamma, 0)
     for n in range(c.body[k].modes):
-        add6(w.mode[k, n].pfr, 0, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
+        add6(w.pfr[k, n], 0, shift_force(inertia_times(gamma, mode_motion(w, port, n)), r))
     add_inertia(w.body[k].inertia, 0, shift_inertia(gamma, r))
     add_port_force(c, w, w, k, port, vec6(node.force, 0))
 
@@ -74,13 +75,13 @@ def _inverse(c, w, k):
                 s = 0.0
                 for j in range(nodes):
                     for b in range(6):
-                        s += T[6 * i + a, 6 * j + b] * w.gain[r, n, 1 + j, b]
+                        s += T[6 * i + a, 6 * j + b] * w.gain[r, 1 + j, n, b]
                 row[6 * i + a] = s
         for i in range(n + 1):
             s = c.compliance[r, n, i]
             for j in range(nodes):
                 for b in range(6):
-                    s -= row[6 * j + b] * w.gain[r, i, 1 + j, b]
+                    s -= row[6 * j + b] * w.gain[r, 1 + j, i, b]
             w.pff[k, n, i] = s
             w.pff[k, i, n] = s
 
@@ -90,8 +91,8 @@ def modal_accelerations(c, w, k, A):
     """etadd = nu_f - g' alpha, alpha being the acceleration A of O: outward half of (64)."""
     r = c.body[k].reduced
     for n in range(c.body[k].modes):
-        s = dot6(vec6(w.gain[r, n, 0], 0), A)
+        s = dot6(vec6(w.gain[r, 0, n], 0), A)
         for i in range(c.body[k].modes):
-            s += w.pff[k, n, i] * w.mode[k, i].zf
-        w.mode[k, n].etadd = -s
+            s += w.pff[k, n, i] * w.zf[k, i]
+        w.etadd[k, n] = -s
         w.speed[c.body[k].etad_index + n].acceleration = -s

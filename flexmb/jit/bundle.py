@@ -116,6 +116,11 @@ def _bundle_type(of: type, kinds: tuple[tuple[str, types.Type], ...], features: 
     return BundleType(of, kinds, features)
 
 
+def is_long(kind: BundleType) -> bool:
+    """Whether strips of such a workspace have several elements (see `flexmb.jit.strips`): its numbers are floats."""
+    return bool(getattr(kind.of, "numbers", types.float64) == types.float64)
+
+
 class AnyBundleType(types.Type):
     """Type of bundles that a kernel passes on and never looks into."""
 

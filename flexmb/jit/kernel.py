@@ -13,7 +13,7 @@ from typing import Any
 from numba import config, njit
 from numba.extending import overload
 
-from flexmb.jit.bundle import BundleType
+from flexmb.jit.bundle import BundleType, is_long
 from flexmb.jit.hooks import HOOKS, SEMANTICS
 from flexmb.jit.lanes import LANE
 
@@ -93,6 +93,27 @@ def by_number(one: Callable[..., Any], lanes: Callable[..., Any]) -> Callable[..
 
         def call(*args):
             return choice(*args)
+
+        return _named_after(choice, call)
+
+    return choose
+
+
+def by_width(strips: Callable[..., Any], one: Callable[..., Any]) -> Callable[..., Any]:
+    """One function of (c, w, ...): `strips` where strips of the workspace w have several elements, else `one`.
+
+    Decided by type, while the caller is compiled, like `by_bundle`; interpreted as Python it is `one`.
+    """
+
+    def choose(c: Any, w: Any, *args: Any) -> Any:
+        return one(c, w, *args)
+
+    @overload(choose, jit_options=AS_PART)
+    def _typed(c, w, *args):
+        choice = strips if is_long(w) else one
+
+        def call(c, w, *args):
+            return choice(c, w, *args)
 
         return _named_after(choice, call)
 

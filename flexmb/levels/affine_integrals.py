@@ -1,83 +1,88 @@
-"""Modal integrals that are affine in eta, summed over modes: long loops without a gap, of a row of `Constants.product`.
+"""Modal integrals that are affine in eta, summed over modes: strips of a table of `Constants.product`.
 
-A row is made of blocks of NUMBERS * nm numbers: first that of the integrals P0_n of a body at rest, then, for every
-mode i, that of their slopes P1_ni by eta_i. In a block the number varies before the mode n. The numbers are those of a
-3x3 matrix sum m a b': [xx yy zz xy xz yz] of its symmetric part, and its axial vector sum m b x a.
+Of a body, first the integrals P0_n = sum m phi_n x' at rest, then, for every mode i, their slopes P1_ni = sum m phi_n
+phi_i' by eta_i: 3x3 matrices, column after column, for each number a strip of modes n. A mode that moves no mass along
+an axis has no such column; most modes of beams move along one axis alone. What is not there is not summed.
 """
 
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.levels.level import sixes
+from flexmb.jit.lanes import some
+from flexmb.jit.strips import ROW, strip, whole
+from flexmb.spatial.vector import axpy
 from flexmb.typing import Real
 
-AXIAL = 6  # where the axial vector starts
 NUMBERS = 9
 
 
 @helper
-def sum_integrals(blocks, modes, nm, p):
-    """P0_n + sum_i eta_i P1_ni into p, then the axial vectors of sum_i etadot_i P1_ni."""
-    size, axial = NUMBERS * nm, AXIAL * nm
-    value, rate = p[:size], p[size : size + 3 * nm]
-    for j in range(value.shape[0]):
-        value[j] = blocks[j]
-    for j in range(rate.shape[0]):
-        rate[j] = 0.0
-    i = 0
-    while i + 3 < nm:
-        a, b, c, d = modes[i], modes[i + 1], modes[i + 2], modes[i + 3]
-        four = blocks[(1 + i) * size : (5 + i) * size]
-        _add_four(a.eta, b.eta, c.eta, d.eta, four, size, value)
-        _add_four(a.etad, b.etad, c.etad, d.etad, four[axial:], size, rate)
-        i += 4
-    while i < nm:
-        block = blocks[(1 + i) * size : (2 + i) * size]
-        _add(modes[i].eta, block, value)
-        _add(modes[i].etad, block[axial:], rate)
-        i += 1
+def sum_integrals(w, k, product, moves, nm, n):
+    """Columns of P_n = P0_n + sum_i eta_i P1_ni and of sum_i etad_i P1_ni, of body k, for the strip from mode n on."""
+    blocks, at = product[n // ROW], n % ROW
+    X, Y, Z = columns(w, blocks[0], at)
+    x = y = z = (0.0, 0.0, 0.0)
+    for i in range(nm):
+        slope, eta, etad = blocks[1 + i], w.eta[k, i], w.etad[k, i]
+        if some(moves[i, 0] != 0.0):
+            column = _column(w, slope, 0, at)
+            X, x = axpy(eta, column, X), axpy(etad, column, x)
+        if some(moves[i, 1] != 0.0):
+            column = _column(w, slope, 1, at)
+            Y, y = axpy(eta, column, Y), axpy(etad, column, y)
+        if some(moves[i, 2] != 0.0):
+            column = _column(w, slope, 2, at)
+            Z, z = axpy(eta, column, Z), axpy(etad, column, z)
+    return (X, Y, Z), (x, y, z)
 
 
 @helper
-def symmetric(p, i, nm):
-    """Six numbers from p[i] on, of one mode."""
-    return p[i], p[i + nm], p[i + 2 * nm], p[i + 3 * nm], p[i + 4 * nm], p[i + 5 * nm]
+def columns(w, block, at):
+    """The three columns of matrices for the strip from element `at` on, of a row of `Constants.product`."""
+    return _column(w, block, 0, at), _column(w, block, 1, at), _column(w, block, 2, at)
 
 
 @helper
-def vector(p, i, nm):
-    """Three numbers from p[i] on, of one mode."""
-    return p[i], p[i + nm], p[i + 2 * nm]
+def _column(w, block, column, at):
+    first = 3 * column * ROW + at
+    return strip(w, block, first), strip(w, block, first + ROW), strip(w, block, first + 2 * ROW)
 
 
 @helper
-def _add_four(s, t, u, v, blocks, size, y):
-    """y += s a + t b + u c + v d of four blocks a, b, c, d that follow each other at a distance of `size`."""
-    a, b, c, d = blocks, blocks[size:], blocks[2 * size :], blocks[3 * size :]
-    for j in range(y.shape[0]):
-        y[j] += s * a[j] + t * b[j] + u * c[j] + v * d[j]
+def symmetric_part(X, Y, Z):
+    """Of a matrix with these columns: (xx, yy, zz, xy, xz, yz)."""
+    return X[0], Y[1], Z[2], 0.5 * (X[1] + Y[0]), 0.5 * (X[2] + Z[0]), 0.5 * (Y[2] + Z[1])
 
 
 @helper
-def _add(s, a, y):
-    """y += s a."""
-    for j in range(y.shape[0]):
-        y[j] += s * a[j]
+def axial_vector(X, Y, Z):
+    """sum m b x a of sum m a b' with these columns."""
+    return Y[2] - Z[1], Z[0] - X[2], X[1] - Y[0]
 
 
-def blocks_of_cross_products(at_rest: Real, slope: Real) -> Real:
-    """A row of `Constants.product` from sum m x~' phi_n~ (n,3,3) and sum m phi_n~' phi_i~ (n,n,3,3)."""
-    blocks, slopes = _nine(_products(at_rest)), _nine(_products(slope))
-    return np.concatenate([blocks[None], np.swapaxes(slopes, 0, 1)]).swapaxes(1, 2).ravel()
+def table_of_products(at_rest: Real, slope: Real, points: int) -> Real:
+    """(strips,1+n,72) of `Constants.product` from sum m x~' phi_n~ (n,3,3) and sum m phi_n~' phi_i~ (n,n,3,3).
+
+    Numbers of slopes that are rounding of a sum over so many points are zero: gamma(points) of its terms, which by
+    Cauchy and Schwarz are at most the root of what both modes have on the diagonal.
+    """
+    P0, P1 = _products(at_rest), _products(slope)
+    size = np.sqrt(np.abs(np.einsum("nnaa->n", P1)))
+    P1 = np.where(np.abs(P1) > points * 2.0**-53 * np.outer(size, size)[..., None, None], P1, 0.0)
+    blocks = np.concatenate([P0[None], np.swapaxes(P1, 0, 1)])  # [., n, row, column]
+    n = len(P0)
+    padded = np.zeros((1 + n, 3, 3, whole(n)))
+    padded[..., :n] = blocks.transpose(0, 3, 2, 1)
+    return padded.reshape(1 + n, NUMBERS, -1, ROW).transpose(2, 0, 1, 3).reshape(-1, 1 + n, NUMBERS * ROW)
+
+
+def moving_columns(product: Real) -> Real:
+    """(B,m,3) 1 where a mode has a column in a table (B,strips,1+m,72), else 0."""
+    there = np.any(product[:, :, 1:] != 0.0, axis=1)
+    return np.any(there.reshape(*there.shape[:2], 3, 3 * ROW), axis=-1).astype(float)
 
 
 def _products(J: Real) -> Real:
     """sum m a b' from sum m a~' b~ = (a.b) 1 - b a', over the leading axes."""
     half_trace = 0.5 * np.trace(J, axis1=-2, axis2=-1)
     return np.swapaxes(half_trace[..., None, None] * np.eye(3) - J, -1, -2)
-
-
-def _nine(P: Real) -> Real:
-    """Matrices (...,3,3) as nine numbers (...,9): [xx yy zz xy xz yz] of the symmetric part, the axial vector."""
-    axial = [P[..., 2, 1] - P[..., 1, 2], P[..., 0, 2] - P[..., 2, 0], P[..., 1, 0] - P[..., 0, 1]]
-    return np.concatenate([sixes(0.5 * (P + np.swapaxes(P, -1, -2))), np.stack(axial, axis=-1)], axis=-1)

@@ -8,13 +8,15 @@ points is left. Points with rotating inertia, or with a mass centre off the poin
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.levels.affine_integrals import AXIAL, NUMBERS, blocks_of_cross_products, sum_integrals, symmetric, vector
-from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six
+from flexmb.jit.strips import ROW, put, put_across, strip, width
+from flexmb.levels.affine_integrals import axial_vector, columns, sum_integrals, symmetric_part, table_of_products
+from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import ModalIntegrals, modal_integrals
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
+from flexmb.spatial.rows import strips3, total3, total_sym
 from flexmb.spatial.vector import (
     add,
     axpy,
@@ -44,35 +46,40 @@ def inertia_and_bias(c, w, k):
 @helper
 def coupling_and_bias(c, w, k):
     """Integrals of r x (.) and phi_n . (.) of the point acceleration w x (w x r) + 2 w x (phi etadot)."""
-    nm = c.body[k].modes
-    at_rest, p = c.product[c.body[k].product], w.integral
-    sum_integrals(at_rest, w.mode[k], nm, p)
+    nm, row = c.body[k].modes, c.body[k].product
     omega = vec3(w.body[k].velocity, 0)
     spin = centrifugal(omega)
     body = c.body[k].rigid
-    s = vec3(body, 1)
+    moved = (0.0, 0.0, 0.0)  # sum m phi eta
     stretch = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (u r' + x u'), u = phi eta
     flow = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum m (phi etadot) r', symmetric part
     turn = (0.0, 0.0, 0.0)  # and axial vector
     momentum = (0.0, 0.0, 0.0)  # sum m phi etadot
-    for n in range(nm):
-        eta, etad = w.mode[k, n].eta, w.mode[k, n].etad
-        P, axial = symmetric(p, n, nm), vector(p, AXIAL * nm + n, nm)  # sum m phi_n r'
-        swirl = vector(p, NUMBERS * nm + n, nm)  # axial vector of sum m phi_n (phi etadot)'
-        translation = vec3(c.mode[k, n].mfr, 3)
-        store3(w.mode[k, n].pfr, 0, axial)
-        store3(w.mode[k, n].pfr, 3, translation)
-        w.mode[k, n].zf = sym_dot(spin, P) + 2.0 * dot(omega, swirl)
-        stretch = sym_axpy(eta, sym_add(P, symmetric(at_rest, n, nm)), stretch)
+    for n in range(0, nm, width(w)):
+        eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
+        now, rate = sum_integrals(w, k, c.product[row], c.moves[row], nm, n)
+        P, axial = symmetric_part(*now), axial_vector(*now)  # of sum m phi_n r'
+        swirl = axial_vector(*rate)  # of sum m phi_n (phi etadot)'
+        translation = strips3(w, c.mfr[k], 3, n)
+        put_across(w, w.pfr[k], n, (axial, translation))
+        put(w, w.zf[k], n, sym_dot(spin, P) + 2.0 * dot(omega, swirl))
+        stretch = sym_axpy(eta, sym_add(P, _at_rest(w, c.product[row, n // ROW, 0], n % ROW)), stretch)
         flow = sym_axpy(etad, P, flow)
         turn = axpy(etad, axial, turn)
-        s = axpy(eta, translation, s)
+        moved = axpy(eta, translation, moved)
         momentum = axpy(etad, translation, momentum)
-    j = stretched(sym6(body, 4), stretch)
+    s = add(vec3(body, 1), total3(w, moved))
+    j = stretched(sym6(body, 4), total_sym(w, stretch))
     store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
-    torque = add(cross(omega, sym_times(j, omega)), scale(2.0, coriolis(omega, flow, turn)))
-    store3(w.body[k].force, 0, torque)
-    store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, momentum))))
+    swept = coriolis(omega, total_sym(w, flow), total3(w, turn))
+    store3(w.body[k].force, 0, add(cross(omega, sym_times(j, omega)), scale(2.0, swept)))
+    store3(w.body[k].force, 3, cross(omega, add(cross(omega, s), scale(2.0, total3(w, momentum)))))
+
+
+@helper
+def _at_rest(w, block, at):
+    """The symmetric part of sum m phi_n x'."""
+    return symmetric_part(*columns(w, block, at))
 
 
 @helper
@@ -103,10 +110,9 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
 
 def polynomial(i: ModalIntegrals, model: FlexibleModel) -> InertiaTables:
     """The same of known integrals."""
-    mode, pair = empty_tables(model)
-    pair["mff"], mode["mfr"] = i.M_ff, np.hstack([i.C0.T, i.s1.T])
-    rigid = np.array([i.mass, *i.s0, *six(i.J0)])
-    return InertiaTables(rigid, mode, pair, i.turning, blocks_of_cross_products(i.J1, i.J2))
+    rigid, mfr = np.array([i.mass, *i.s0, *six(i.J0)]), np.vstack([i.C0, i.s1])
+    product = table_of_products(i.J1, i.J2, len(model.mass))
+    return InertiaTables(rigid, i.M_ff, mfr, np.zeros_like(mfr), i.turning, product)
 
 
 LEVEL = FidelityLevel(

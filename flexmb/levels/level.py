@@ -11,7 +11,6 @@ import numpy as np
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
 from flexmb.scene.bodies import Level
-from flexmb.tables.arrays import MODE, PAIR
 from flexmb.typing import Real, Record
 
 _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
@@ -19,16 +18,17 @@ _SIX = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
 
 @dataclass(frozen=True)
 class InertiaTables:
-    """Tables of one body for `flexmb.tables.arrays.Constants`, (m) and (m,m) modes.
+    """Tables of one body with m modes for `flexmb.tables.arrays.Constants`.
 
-    `rigid` (10,) holds mass, first moment and inertia about the origin at rest; `mode` and `pair` are MODE and PAIR
-    records; `summed` are the points left to sum at run time. `product`, `slope` (SLOPE records) and `mass_slope` are
-    rows of the tables of these names.
+    `rigid` (10,) holds mass, first moment and inertia about the origin at rest; `summed` are the points left to sum at
+    run time. `mff` (m,m), `mfr` (6,m), `gyration` (6,m), `product`, `slope` (SLOPE records) and `mass_slope` are rows
+    of the tables of these names.
     """
 
     rigid: Real
-    mode: Record
-    pair: Record
+    mff: Real
+    mfr: Real
+    gyration: Real
     summed: TurningPoints | None = None
     product: Real | None = None
     slope: Record | None = None
@@ -52,13 +52,6 @@ class FidelityLevel:
     flexible: bool = True  # whether the body keeps its modes
     at_rest: bool = False  # whether inertia and kinematics are those of the rest shape, for all coordinates
     second_order: bool = False  # whether displacements have a part of second order in the coordinates
-
-
-def empty_tables(model: FlexibleModel) -> tuple[Record, Record]:
-    """`mode` and `pair` of a body with its stiffness and damping, all else zero."""
-    mode, pair = np.zeros(model.mode_count, MODE), np.zeros((model.mode_count, model.mode_count), PAIR)
-    pair["stiffness"], pair["damping"] = model.stiffness, model.damping
-    return mode, pair
 
 
 def six(m: Real) -> list[float]:

@@ -16,12 +16,14 @@ from dataclasses import replace
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six, sixes
+from flexmb.levels.level import FidelityLevel, InertiaTables, six, sixes
 from flexmb.levels.summed_point import add_point
 from flexmb.modal.first_order import FirstOrder, first_order
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import TurningPoints
 from flexmb.spatial.inertia import rigid_inertia, store_inertia
+from flexmb.spatial.rows import column6, column_sym
+from flexmb.spatial.spatial_vector import store6
 from flexmb.spatial.vector import add, axpy, cross, dot, scale, store3, sub, sym6, sym_axpy, sym_times, vec3
 from flexmb.tables.arrays import SLOPE
 
@@ -38,14 +40,14 @@ def inertia_and_bias(c, w, k):
     swirl = (0.0, 0.0, 0.0)  # C0 etadot
     b = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)  # sum_n B_n etadot_n
     for n in range(nm):
-        eta = w.mode[k, n].eta
-        etad = w.mode[k, n].etad
-        coupling = c.mode[k, n].mfr
-        gyration = sym6(c.mode[k, n].gyration, 0)
-        s = axpy(eta, vec3(coupling, 3), s)
+        eta = w.eta[k, n]
+        etad = w.etad[k, n]
+        angular, linear = column6(c.mfr[k], n)
+        gyration = column_sym(c.gyration[k], n)
+        s = axpy(eta, linear, s)
         j = sym_axpy(-2.0 * eta, gyration, j)
-        momentum = axpy(etad, vec3(coupling, 3), momentum)
-        swirl = axpy(etad, vec3(coupling, 0), swirl)
+        momentum = axpy(etad, linear, momentum)
+        swirl = axpy(etad, angular, swirl)
         b = sym_axpy(etad, gyration, b)
         _mode(c, w, k, n, omega)
     store_inertia(w.body[k].inertia, 0, rigid_inertia(body[0], s, j))
@@ -61,41 +63,38 @@ def _mode(c, w, k, n, omega):
     """Coupling, modal masses and force of mode n."""
     row = c.body[k].slope
     changing = c.body[k].mass_slope
-    angular = vec3(c.mode[k, n].mfr, 0)
-    linear = vec3(c.mode[k, n].mfr, 3)
-    gyration = sym6(c.mode[k, n].gyration, 0)
+    angular, linear = column6(c.mfr[k], n)
+    gyration = column_sym(c.gyration[k], n)
     coriolis = (0.0, 0.0, 0.0)
     for i in range(c.body[k].modes):
-        eta = w.mode[k, i].eta
+        eta = w.eta[k, i]
         slope = c.slope[row, n, i]
         angular = axpy(eta, vec3(slope.mfr, 0), angular)
         linear = axpy(eta, vec3(slope.mfr, 3), linear)
         gyration = sym_axpy(-eta, sym6(slope.gyration, 0), gyration)
-        coriolis = axpy(w.mode[k, i].etad, vec3(slope.coriolis, 0), coriolis)
-        mass = c.pair[k, n, i].mff
+        coriolis = axpy(w.etad[k, i], vec3(slope.coriolis, 0), coriolis)
+        mass = c.mff[k, n, i]
         if changing >= 0:
             for l in range(c.body[k].modes):
-                mass += w.mode[k, l].eta * c.mass_slope[changing, n, i, l]
+                mass += w.eta[k, l] * c.mass_slope[changing, n, i, l]
         w.pff[k, n, i] = mass
-    store3(w.mode[k, n].pfr, 0, angular)
-    store3(w.mode[k, n].pfr, 3, linear)
-    w.mode[k, n].zf = dot(omega, add(sym_times(gyration, omega), coriolis))
+    store6(w.pfr[k, n], 0, (angular, linear))
+    w.zf[k, n] = dot(omega, add(sym_times(gyration, omega), coriolis))
 
 
 def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
     """First order in eta; the rotary inertia of the wheels belongs to their nodes, which turn exactly: it is summed."""
     points, rotors = _wheels_apart(model, wheels)
-    mode, pair = empty_tables(model)
     i: FirstOrder = first_order(points)
-    pair["mff"], mode["mfr"], mode["gyration"] = i.M0, np.hstack([i.C0, i.L0]), -0.5 * sixes(i.E)
-    slope = np.zeros(pair.shape, SLOPE)
+    slope = np.zeros(i.M0.shape, SLOPE)
     by_mode = np.swapaxes(i.C1, 0, 1)
     slope["mfr"] = np.concatenate([by_mode, np.swapaxes(i.L1, 0, 1)], axis=2)
     slope["coriolis"] = by_mode - i.C1
     slope["gyration"] = sixes(i.G)
     mass_slope = np.moveaxis(i.M1, 0, 2) if np.any(i.M1) else None
     rigid = np.array([i.mass, *i.s0, *six(i.J0)])
-    return InertiaTables(rigid, mode, pair, rotors, slope=slope, mass_slope=mass_slope)
+    mfr, gyration = np.hstack([i.C0, i.L0]).T, -0.5 * sixes(i.E).T
+    return InertiaTables(rigid, i.M0, mfr, gyration, rotors, slope=slope, mass_slope=mass_slope)
 
 
 def _wheels_apart(model: FlexibleModel, wheels: int) -> tuple[FlexibleModel, TurningPoints]:

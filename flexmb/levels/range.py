@@ -8,11 +8,11 @@ RANGE = 10.0  # beyond so many body sizes a motion has diverged, and no modal fi
 
 
 @helper
-def is_out_of_range(c, w, k):
+def is_out_of_range(c, eta, k):
     """Whether the mean square deflection eta' M_ff eta / m exceeds RANGE^2 times the body's mean square size.
 
-    eta as the level sees it: a ruthless body never leaves its range. Of lanes: all of them; what goes on of single ones
-    is NaN.
+    eta (m,) as the level sees it: a ruthless body never leaves its range. Of lanes: all of them; what goes on of single
+    ones is NaN.
     """
     if c.body[k].modes == 0 or is_at_rest(c.body[k].level):
         return False
@@ -20,12 +20,12 @@ def is_out_of_range(c, w, k):
     limit = RANGE * RANGE * 0.5 * (body[4] + body[5] + body[6])
     diagonal = 0.0
     for n in range(c.body[k].modes):
-        diagonal += w.mode[k, n].eta * c.pair[k, n, n].mff * w.mode[k, n].eta
+        diagonal += eta[n] * c.mff[k, n, n] * eta[n]
     if every(c.body[k].modes * diagonal.real <= limit):  # Cauchy and Schwarz: the sum below is no larger
         return False
     squares = 0.0
     for n in range(c.body[k].modes):
         for i in range(c.body[k].modes):
-            squares += w.mode[k, n].eta * c.pair[k, n, i].mff * w.mode[k, i].eta
-    w.mode[k, 0].eta = kept(squares.real <= limit, w.mode[k, 0].eta)
+            squares += eta[n] * c.mff[k, n, i] * eta[i]
+    eta[0] = kept(squares.real <= limit, eta[0])
     return every(squares.real > limit)

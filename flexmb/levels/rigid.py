@@ -3,7 +3,7 @@
 import numpy as np
 
 from flexmb.jit.kernel import helper
-from flexmb.levels.level import FidelityLevel, InertiaTables, empty_tables, six, sixes
+from flexmb.levels.level import FidelityLevel, InertiaTables, six, sixes
 from flexmb.modal.first_order import inertia_slope
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
@@ -34,11 +34,9 @@ def tables(model: FlexibleModel, wheels: int) -> InertiaTables:
     """The rest shape."""
     integrals = modal_integrals(model)
     n, block = integrals.mode_count, integrals.spatial_mass
-    mode, pair = empty_tables(model)
     rr = block[n:, n:]
-    pair["mff"], mode["mfr"] = block[:n, :n], block[:n, n:]
-    mode["gyration"] = -0.5 * sixes(inertia_slope(model))
-    return InertiaTables(np.array([rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])]), mode, pair)
+    rigid = np.array([rr[5, 5], rr[2, 4], rr[0, 5], rr[1, 3], *six(rr[:3, :3])])
+    return InertiaTables(rigid, block[:n, :n], block[n:, :n], -0.5 * sixes(inertia_slope(model)).T)
 
 
 LEVEL = FidelityLevel(

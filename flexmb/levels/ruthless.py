@@ -1,10 +1,13 @@
 """Level ruthless (Jain & Rodriguez, Appendix B): M_m at eta = 0, b_m at eta = etadot = 0."""
 
 from flexmb.jit.kernel import helper
+from flexmb.jit.strips import put, put_across, width
 from flexmb.levels import rigid
 from flexmb.levels.level import FidelityLevel
 from flexmb.levels.masses import modal_masses
-from flexmb.spatial.vector import dot, sym6, sym_times, vec3
+from flexmb.spatial.rows import strips6
+from flexmb.spatial.spatial_vector import dot6
+from flexmb.spatial.vector import vec3
 
 
 @helper
@@ -12,9 +15,8 @@ def inertia_and_bias(c, w, k):
     """The rigid body at rest shape, constant modal blocks, and the centrifugal force w' B_n w on each mode."""
     rigid_block_and_bias(c, w, k)
     modal_masses(c, w, k)
-    for n in range(c.body[k].modes):
-        for i in range(6):
-            w.mode[k, n].pfr[i] = c.mode[k, n].mfr[i]
+    for n in range(0, c.body[k].modes, width(w)):
+        put_across(w, w.pfr[k], n, strips6(w, c.mfr[k], n))
 
 
 @helper
@@ -22,8 +24,10 @@ def rigid_block_and_bias(c, w, k):
     """The same without the modal blocks of M_m, for callers that do not need them."""
     rigid.inertia_and_bias(c, w, k)
     omega = vec3(w.body[k].velocity, 0)
-    for n in range(c.body[k].modes):
-        w.mode[k, n].zf = dot(omega, sym_times(sym6(c.mode[k, n].gyration, 0), omega))
+    spin = omega[0] * omega[0], omega[1] * omega[1], omega[2] * omega[2]
+    across = 2.0 * omega[0] * omega[1], 2.0 * omega[0] * omega[2], 2.0 * omega[1] * omega[2]
+    for n in range(0, c.body[k].modes, width(w)):
+        put(w, w.zf[k], n, dot6((spin, across), strips6(w, c.gyration[k], n)))
 
 
 LEVEL = FidelityLevel(

@@ -20,6 +20,8 @@ from flexmb.levels.summed_point import add_point
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals, stacked, still_points
 from flexmb.spatial.inertia import add_inertia, rigid_inertia, store_inertia
+from flexmb.spatial.rows import column3, store_column3
+from flexmb.spatial.spatial_vector import ZERO6, add6, store6
 from flexmb.spatial.vector import add, add3, axpy, cross, dot, scale, store3, vec3
 
 
@@ -31,11 +33,10 @@ def inertia_and_bias(c, w, k):
     store3(w.body[k].force, 0, zero)
     store3(w.body[k].force, 3, zero)
     for n in range(c.body[k].modes):
-        store3(w.mode[k, n].pfr, 0, zero)
-        store3(w.mode[k, n].pfr, 3, zero)
-        w.mode[k, n].zf = 0.0
+        store6(w.pfr[k, n], 0, ZERO6)
+        w.zf[k, n] = 0.0
         for i in range(c.body[k].modes):
-            w.pff[k, n, i] = c.pair[k, n, i].mff
+            w.pff[k, n, i] = c.mff[k, n, i]
     for j in range(c.body[k].point_start, c.body[k].point_stop):
         if c.point[j].turning:
             add_point(c, w, k, j)
@@ -64,13 +65,12 @@ def _add_mass(c, w, k, j):
     add3(w.body[k].force, 0, cross(r, force))
     add3(w.body[k].force, 3, force)
     for n in range(nm):
-        ln = vec3(w.point_mode[n].L, 0)
-        add3(w.mode[k, n].pfr, 0, cross(s, ln))
-        add3(w.mode[k, n].pfr, 3, scale(mass, ln))
-        w.mode[k, n].zf += dot(ln, force)
-        at_rest = vec3(c.point_mode[j, n].translation, 0)
+        ln = column3(w.point_mode, 3, n)
+        add6(w.pfr[k, n], 0, (cross(s, ln), scale(mass, ln)))
+        w.zf[k, n] += dot(ln, force)
+        at_rest = column3(c.point_mode[j], 3, n)
         for i in range(nm):
-            change = dot(ln, vec3(w.point_mode[i].L, 0)) - dot(at_rest, vec3(c.point_mode[j, i].translation, 0))
+            change = dot(ln, column3(w.point_mode, 3, i)) - dot(at_rest, column3(c.point_mode[j], 3, i))
             w.pff[k, n, i] += mass * change
 
 
@@ -82,17 +82,17 @@ def _motion(c, w, k, j):
     v = (0.0, 0.0, 0.0)
     bend = (0.0, 0.0, 0.0)
     for n in range(c.body[k].modes):
-        at_rest = vec3(c.point_mode[j, n].translation, 0)
+        at_rest = column3(c.point_mode[j], 3, n)
         phi = at_rest
         rate = (0.0, 0.0, 0.0)
         for i in range(c.body[k].modes):
             G = vec3(second[n, i].translation, 0)
-            phi = axpy(w.mode[k, i].eta, G, phi)
-            rate = axpy(w.mode[k, i].etad, G, rate)
-        r = axpy(0.5 * w.mode[k, n].eta, add(at_rest, phi), r)
-        v = axpy(w.mode[k, n].etad, phi, v)
-        bend = axpy(w.mode[k, n].etad, rate, bend)
-        store3(w.point_mode[n].L, 0, phi)
+            phi = axpy(w.eta[k, i], G, phi)
+            rate = axpy(w.etad[k, i], G, rate)
+        r = axpy(0.5 * w.eta[k, n], add(at_rest, phi), r)
+        v = axpy(w.etad[k, n], phi, v)
+        bend = axpy(w.etad[k, n], rate, bend)
+        store_column3(w.point_mode, 3, n, phi)
     return r, v, bend
 
 

@@ -4,8 +4,11 @@ Angular momentum and force follow the point's exact motion; nothing is truncated
 """
 
 from flexmb.jit.kernel import helper
+from flexmb.jit.strips import add_across, put, strip, width
 from flexmb.levels.field import field_motion, second_order_motion
 from flexmb.spatial.inertia import add_inertia, rigid_inertia
+from flexmb.spatial.rows import column6, strips6
+from flexmb.spatial.spatial_vector import plus6
 from flexmb.spatial.vector import add, add3, cross, dot, rotate_sym, scale, sym6, sym_add, sym_times, vec3
 
 
@@ -20,11 +23,11 @@ def add_point(c, w, k, j):
     row = c.point[j].second
     if row >= 0:
         r, rotation, w_rel, v_rel, alpha_rel, a_rel = second_order_motion(
-            x, offset, c.point_mode[j], c.second_shape[row], w.mode[k], nm, w.point_mode
+            x, offset, c.point_mode[j], c.second_shape[row], w.eta[k], w.etad[k], nm, w.point_mode
         )
     else:
         r, rotation, w_rel, v_rel, alpha_rel, a_rel = field_motion(
-            x, offset, c.point_mode[j], w.mode[k], nm, w.point_mode
+            w, x, offset, c.point_mode[j], w.eta[k], w.etad[k], nm, w.point_mode
         )
     inertia = rotate_sym(rotation, sym6(c.point[j].inertia, 0))
     # about the body origin: the mass mu at r, and the central inertia
@@ -47,12 +50,13 @@ def add_point(c, w, k, j):
     torque = add(sym_times(inertia, turning), cross(spin, sym_times(inertia, spin)))
     add3(w.body[k].force, 0, add(cross(r, force), torque))
     add3(w.body[k].force, 3, force)
+    for n in range(0, nm, width(w)):
+        W, L = strips6(w, w.point_mode, n)
+        at_mode = add(scale(mass, cross(r, L)), sym_times(inertia, W)), scale(mass, L)
+        add_across(w, w.pfr[k], n, at_mode)
+        put(w, w.zf[k], n, strip(w, w.zf[k], n) + dot(L, force) + dot(W, torque))
     for n in range(nm):
-        wn = vec3(w.point_mode[n].W, 0)
-        ln = vec3(w.point_mode[n].L, 0)
-        hn = sym_times(inertia, wn)
-        add3(w.mode[k, n].pfr, 0, add(scale(mass, cross(r, ln)), hn))
-        add3(w.mode[k, n].pfr, 3, scale(mass, ln))
-        w.mode[k, n].zf += dot(ln, force) + dot(wn, torque)
-        for i in range(nm):
-            w.pff[k, n, i] += mass * dot(ln, vec3(w.point_mode[i].L, 0)) + dot(hn, vec3(w.point_mode[i].W, 0))
+        W, L = column6(w.point_mode, n)
+        momentum = sym_times(inertia, W), scale(mass, L)
+        for i in range(0, nm, width(w)):
+            put(w, w.pff[k, n], i, plus6(strip(w, w.pff[k, n], i), momentum, strips6(w, w.point_mode, i)))

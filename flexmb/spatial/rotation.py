@@ -83,21 +83,19 @@ def _series(t2):
 
     The first term left out is below 1e-14 of the value for b2, b3 and below 1e-17 for the others.
     """
-    a1 = 1.0
-    a2 = 1.0
-    a3 = 1.0
-    for k in range(8, 0, -1):  # Horner: sum over k of m! (-t2)^k / (2k + m)!, m = 1, 2, 3
-        n = 2.0 * k
-        a1 = 1.0 - t2 / (n * (n + 1.0)) * a1
-        a2 = 1.0 - t2 / ((n + 1.0) * (n + 2.0)) * a2
-        a3 = 1.0 - t2 / ((n + 2.0) * (n + 3.0)) * a3
-    a2 *= 0.5
-    a3 /= 6.0
+    # Horner: sum over k of (-t2)^k / (2k + m)!, m = 1, 2, 3
+    a1 = 1.0 / 362880.0 - t2 * (1.0 / 39916800.0 - t2 * (1.0 / 6227020800.0 - t2 * (1.0 / 1307674368000.0)))
+    a1 = 1.0 - t2 * (1.0 / 6.0 - t2 * (1.0 / 120.0 - t2 * (1.0 / 5040.0 - t2 * a1)))
+    a2 = 1.0 / 3628800.0 - t2 * (1.0 / 479001600.0 - t2 * (1.0 / 87178291200.0 - t2 * (1.0 / 20922789888000.0)))
+    a2 = 1.0 / 2.0 - t2 * (1.0 / 24.0 - t2 * (1.0 / 720.0 - t2 * (1.0 / 40320.0 - t2 * a2)))
+    a3 = 1.0 / 39916800.0 - t2 * (1.0 / 6227020800.0 - t2 * (1.0 / 1307674368000.0 - t2 * (1.0 / 355687428096000.0)))
+    a3 = 1.0 / 6.0 - t2 * (1.0 / 120.0 - t2 * (1.0 / 5040.0 - t2 * (1.0 / 362880.0 - t2 * a3)))
     b2 = -1.0 / 12.0 + t2 * (
-        1.0 / 180.0 - t2 * (1.0 / 6720.0 - t2 * (1.0 / 453600.0 - t2 * (1.0 / 47900160.0 - t2 / 7264857600.0)))
+        1.0 / 180.0 - t2 * (1.0 / 6720.0 - t2 * (1.0 / 453600.0 - t2 * (1.0 / 47900160.0 - t2 * (1.0 / 7264857600.0))))
     )
     b3 = -1.0 / 60.0 + t2 * (
-        1.0 / 1260.0 - t2 * (1.0 / 60480.0 - t2 * (1.0 / 4989600.0 - t2 * (1.0 / 622702080.0 - t2 / 108972864000.0)))
+        1.0 / 1260.0
+        - t2 * (1.0 / 60480.0 - t2 * (1.0 / 4989600.0 - t2 * (1.0 / 622702080.0 - t2 * (1.0 / 108972864000.0))))
     )
     return a1, a2, a3, b2, b3
 
@@ -144,8 +142,19 @@ exponential_coefficients = by_number(_one_form, _both_forms)
 @helper
 def exponential(theta, k):
     """R = exp(skew(theta)) with k = exponential_coefficients(theta . theta)."""
+    return _in_powers(theta, k[0], k[1])
+
+
+@helper
+def left_jacobian(theta, k):
+    """J_l(theta): R' = skew(J_l thetadot) R."""
+    return _in_powers(theta, k[1], k[2])
+
+
+@helper
+def _in_powers(theta, a, b):
+    """1 + a skew(theta) + b skew(theta)^2."""
     x, y, z = theta
-    a, b = k[0], k[1]
     return (
         1.0 - b * (y * y + z * z),
         b * x * y - a * z,
@@ -161,7 +170,7 @@ def exponential(theta, k):
 
 @helper
 def left_jacobian_times(theta, k, v):
-    """J_l(theta) v = v + a2 theta x v + a3 theta x (theta x v): R' = skew(J_l thetadot) R."""
+    """J_l(theta) v = v + a2 theta x v + a3 theta x (theta x v)."""
     c = cross(theta, v)
     return add(add(v, scale(k[1], c)), scale(k[2], cross(theta, c)))
 

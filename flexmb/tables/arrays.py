@@ -1,7 +1,8 @@
 """The arrays kernels work on: one table of names, shapes and units.
 
 N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
-W wheels; L loads; F functions of time; m the largest number of modes; nq, nu lengths of q and u. Everything about a
+W wheels; L loads; F functions of time; m the largest number of modes, as whole strips (`flexmb.jit.strips`): what is
+beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
 body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
 frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
 ``c.body[k].parent``.
@@ -70,15 +71,6 @@ BODY = _record(  # what rigid trees need comes first, so that it lies together
     ("load_start", _I),
     ("load_stop", _I),
 )
-MODE = _record(  # mode n of a body
-    ("mfr", _F, (6,)),  # coupling to [angular; linear] at rest
-    ("gyration", _F, (6,)),  # ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
-)
-PAIR = _record(  # modes n, i of a body
-    ("mff", _F),  # modal mass matrix
-    ("stiffness", _F),
-    ("damping", _F),
-)
 SLOPE = _record(  # level linear: mode n of a body by eta_k
     ("mfr", _F, (6,)),  # d mfr_n / deta_k = [C1_kn; L1_kn]
     ("coriolis", _F, (3,)),  # C1_kn - C1_nk, velocity-dependent force w . coriolis etad_k on the mode
@@ -99,7 +91,7 @@ PORT = _record(
     ("frame", _F, (9,)),  # rotation port -> node axes
     ("second", _I),  # level stiffened: row of `second_shape`, else -1
 )
-SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # mode shape at a port or point
+SHAPE = _record(("translation", _F, (3,)), ("rotation", _F, (3,)))  # of second order, at a port or point
 WHEEL = _record(
     ("port", _I),
     ("q_index", _I),
@@ -139,15 +131,19 @@ class Constants:
 
     gravity: Real  # (3,) World axes, m/s^2
     body: Record  # (N,) BODY
-    mode: Record  # (N,m) MODE
-    pair: Record  # (N,m,m) PAIR
-    product: Real  # (bodies of level full,(1+m)*9*m) as `flexmb.levels.affine_integrals` has it
+    mff: Real  # (N,m,m) modal mass matrix at rest
+    mfr: Real  # (N,6,m) coupling to [angular; linear] at rest
+    gyration: Real  # (N,6,m) ruthless, linear: B_n = -1/2 dJ/deta_n, centrifugal force w' B_n w on the mode
+    stiffness: Real  # (N,m,m)
+    damping: Real  # (N,m,m)
+    product: Real  # (bodies of level full,strips of m,1+m,72) as `flexmb.levels.affine_integrals` has it
+    moves: Real  # (the same bodies,m,3) 1 where a mode moves masses along an axis, else 0
     slope: Record  # (bodies of level linear,m,m) SLOPE
     mass_slope: Real  # (those of them whose modal masses change,m,m,m) [n,i,k] d mff_ni / deta_k
     point: Record  # (S,) POINT
-    point_mode: Record  # (S,m) SHAPE
+    point_mode: Real  # (S,6,m) mode shapes [rotation; translation]
     port: Record  # (P,) PORT
-    port_mode: Record  # (P,m) SHAPE
+    port_mode: Real  # (P,6,m) mode shapes [rotation; translation]
     second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD
@@ -175,7 +171,8 @@ class ReducedConstants(Constants):
     """
 
     compliance: Real  # (R,m,m) condensed: L^-1; Woodbury: Lam
-    gain: Real  # (R,m,1+C,6) at rest: [Psi, Ups_1 .. Ups_C] of Psi = Lam M_fr, Ups = Lam Pi'; condensed: L' times it
+    # (R,1+C,m,8) at rest, six of each row: Psi = Lam M_fr, then Ups_1 .. Ups_C of Ups = Lam Pi'; condensed: L' times it
+    gain: Real
     node: Record  # (R,C) REDUCED_NODE at rest
     root: Real  # (R,6C,6C) at rest: Omega = Pi Lam Pi' = root' root
     rank: Index  # (R,) rows of root
@@ -210,20 +207,12 @@ HINGE_STATE = _record(  # by free speed
     ("residual", _F, (6,)),  # L^-1 epsilon_R
     ("free_speed", _I, (6,)),  # the hinge's speeds that are free
 )
-MODE_STATE = _record(  # mode n of a body
-    ("eta", _F),  # as the level sees it: 0 for ruthless
-    ("etad", _F),
-    ("etadd", _F),
-    ("zf", _F),  # modal bias force, then L^-1 of it
-    ("pfr", _F, (6,)),  # coupling, then L^-1 of it
-)
 PORT_STATE = _record(
     ("r", _F, (3,)),  # position from the body origin
     ("R", _F, (9,)),  # R_body_port
     ("v", _F, (6,)),  # velocity relative to the body
     ("a", _F, (6,)),  # acceleration relative to the body at etaddot = 0
 )
-COLUMN = _record(("W", _F, (3,)), ("L", _F, (3,)))  # angular and linear velocity per modal speed
 SPEED_STATE = _record(
     ("acceleration", _F),  # udot
     ("applied", _F),  # spring + damper + motor
@@ -245,12 +234,17 @@ class Workspace:
     cosine: Real  # (N,)
     body: Record  # (N,) BODY_STATE
     hinge: Record  # (N,) HINGE_STATE; not touched where every hinge has a single axis
-    mode: Record  # (N,m) MODE_STATE
-    pff: Real  # (N,m,m) modal block of the articulated inertia, then its Cholesky factor
+    eta: Real  # (N,m) modal coordinates as the level sees them: 0 for ruthless
+    etad: Real  # (N,m)
+    etadd: Real  # (N,m)
+    # modal blocks of the articulated inertia and bias force, then what `flexmb.jain.explicit` leaves of them
+    pff: Real  # (N,m,m) from the inward sweep on its upper triangle counts
+    pfr: Real  # (N,m,8) coupling to [angular; linear], two numbers for `flexmb.jain.explicit`
+    zf: Real  # (N,m)
+    inverse_pivot: Real  # (N,m)
     port: Record  # (P,) PORT_STATE
-    port_mode: Record  # (P,m) COLUMN
-    point_mode: Record  # (m,) COLUMN, scratch of one summed point
-    integral: Real  # (12*m,) sums of one body's `product`
+    port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
+    point_mode: Real  # (6,m) likewise of one summed point; scratch
     speed: Record  # (nu,) SPEED_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body where an evaluation failed
@@ -271,7 +265,7 @@ NODE_STATE = _record(  # node of a reduced body, axes of the body
 class ReducedWorkspace(Workspace):
     """The workspace of a scene with reduced bodies. What does not change with the deformation is written once."""
 
-    gain: Real  # (R,m,1+C,6)
+    gain: Real  # (R,1+C,m,8)
     node: Record  # (R,C) NODE_STATE
     root: Real  # (R,6C,6C)
     rank: Index  # (R,)

@@ -49,7 +49,7 @@ def features(c: Constants) -> frozenset[str]:
         raise ValueError(f'FLEXMB_KERNELS is {asked!r}: use "exact", which is meant if it is not set, or "{GENERAL}"')
     if asked == GENERAL:
         return frozenset({GENERAL})
-    body, speed, pair = c.body, c.speed, c.pair
+    body, speed = c.body, c.speed
     found = {
         SEVERAL: not np.all(_single(body, speed)),
         QUATERNIONS: np.any(body["quaternion"] >= 0),
@@ -66,7 +66,7 @@ def features(c: Constants) -> frozenset[str]:
         SPRINGS: np.any(speed["stiffness"] != 0.0),
         BALL_SPRINGS: np.any(body["ball_spring"] != 0.0),
         DAMPERS: np.any(speed["damping"] != 0.0),
-        MODAL_DAMPING: np.any(pair["damping"] != 0.0),
+        MODAL_DAMPING: np.any(c.damping != 0.0),
     }
     numbered = {f"{HINGE} {n}" for n in set(body["hinge_kind"].tolist())}
     numbered |= {f"{AXIS} {n}" for n in set(body["axis"].tolist())}

@@ -7,13 +7,14 @@ from typing import Any
 import numpy as np
 
 from flexmb.jit.lanes import LANES
+from flexmb.jit.strips import ROW, strip_zeros
 from flexmb.tables import arrays as a
 from flexmb.typing import Record
 
 
 def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
     """Workspace of the right sizes; ports get their pose at rest, which is all that bodies without modes need."""
-    n, m = c.mode.shape
+    n, _, m = c.mfr.shape
     together = -(-n // LANES) * LANES
     fields: dict[str, Any] = {
         "q": np.zeros(nq),
@@ -26,12 +27,12 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "cosine": np.zeros(together),
         "body": np.zeros(n, a.BODY_STATE),
         "hinge": np.zeros(n, a.HINGE_STATE),
-        "mode": np.zeros((n, m), a.MODE_STATE),
-        "pff": np.zeros((n, m, m)),
+        **{name: strip_zeros((n, m)) for name in ("eta", "etad", "etadd", "zf", "inverse_pivot")},
+        "pff": strip_zeros((n, m, m)),
+        "pfr": strip_zeros((n, m, ROW)),
         "port": ports_at_rest(c),
-        "port_mode": np.zeros((len(c.port), m), a.COLUMN),
-        "point_mode": np.zeros(m, a.COLUMN),
-        "integral": np.zeros(12 * m),
+        "port_mode": strip_zeros((len(c.port), 6, m)),
+        "point_mode": strip_zeros((6, m)),
         "speed": np.zeros(nu, a.SPEED_STATE),
         "function": np.zeros((len(c.function), 3)),
         "fault": np.zeros(1, np.int64),
@@ -51,11 +52,12 @@ def ports_at_rest(c: a.Constants) -> Record:
 
 def _reduced(c: a.ReducedConstants, fields: dict[str, Any]) -> a.ReducedWorkspace:
     """With the tables at rest, which is all that ruthless bodies need."""
-    node = np.zeros(c.node.shape, a.NODE_STATE)
+    node, gain = np.zeros(c.node.shape, a.NODE_STATE), strip_zeros(c.gain.shape)
+    gain[:] = c.gain
     node["theta"] = c.node["theta"]
     return a.ReducedWorkspace(
         **fields,
-        gain=c.gain.copy(),
+        gain=gain,
         node=node,
         root=c.root.copy(),
         rank=c.rank.copy(),

@@ -220,6 +220,4 @@ def test_failures_are_status_codes():
 
 def replace_mass(system: flexmb.System, factor: float):
     """Constants whose modal masses are scaled."""
-    pair = system.constants.pair.copy()
-    pair["mff"] *= factor
-    return replace(system.constants, pair=pair)
+    return replace(system.constants, mff=factor * system.constants.mff)

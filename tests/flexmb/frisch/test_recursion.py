@@ -119,7 +119,7 @@ def test_it_is_not_blind():
     other = flexmb.compile(scene)
     heavier = np.array([1.01, *np.ones(len(other.body_names) - 1)])
     unlocked(other.constants).body["rigid"] *= heavier[:, None]
-    other.constants.mode["mfr"] *= heavier[:, None, None]
+    other.constants.mfr[:] *= heavier[:, None, None]
     state = other.initial_state
     nested = flexmb.compile(scene).nested()
     _, motion = nested.motion(0.0, packed(state))

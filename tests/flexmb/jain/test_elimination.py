@@ -201,9 +201,9 @@ def test_constants_of_appendix_b():
     """(B4) at rest: zeta, Theta and Omega from the modal mass matrix and the shapes of the node."""
     system = flexmb.compile(flexible_chain(2, 6, "ruthless"), "condensed")
     c = system.recursion_constants
-    M_ff, M_fr = c.pair["mff"][0], c.mode["mfr"][0]
+    M_ff, M_fr = c.mff[0, :6, :6], c.mfr[0, :, :6].T
     port = c.node["port"][0, 0]
-    Pi = np.concatenate([c.port_mode["rotation"][port], c.port_mode["translation"][port]], axis=1).T
+    Pi = c.port_mode[port, :, :6]
     phi = np.eye(6)
     phi[3:, :3] = -np.cross(np.eye(3), c.port["position"][port])  # - r~
     bound = gamma(36) * np.linalg.cond(M_ff)
