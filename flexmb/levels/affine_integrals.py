@@ -20,7 +20,7 @@ NUMBERS = 9
 def sum_integrals(w, k, product, moves, nm, n):
     """Columns of P_n = P0_n + sum_i eta_i P1_ni and of sum_i etad_i P1_ni, of body k, for the strip from mode n on."""
     blocks, at = product[n // ROW], n % ROW
-    X, Y, Z = columns(w, blocks[0], at)
+    X, Y, Z = columns_of(w, blocks[0], at)
     x = y = z = (0.0, 0.0, 0.0)
     for i in range(nm):
         slope, eta, etad = blocks[1 + i], w.eta[k, i], w.etad[k, i]
@@ -37,7 +37,7 @@ def sum_integrals(w, k, product, moves, nm, n):
 
 
 @helper
-def columns(w, block, at):
+def columns_of(w, block, at):
     """The three columns of matrices for the strip from element `at` on, of a row of `Constants.product`."""
     return _column(w, block, 0, at), _column(w, block, 1, at), _column(w, block, 2, at)
 
@@ -49,14 +49,16 @@ def _column(w, block, column, at):
 
 
 @helper
-def symmetric_part(X, Y, Z):
+def symmetric_part(columns):
     """Of a matrix with these columns: (xx, yy, zz, xy, xz, yz)."""
+    X, Y, Z = columns
     return X[0], Y[1], Z[2], 0.5 * (X[1] + Y[0]), 0.5 * (X[2] + Z[0]), 0.5 * (Y[2] + Z[1])
 
 
 @helper
-def axial_vector(X, Y, Z):
+def axial_vector(columns):
     """sum m b x a of sum m a b' with these columns."""
+    X, Y, Z = columns
     return Y[2] - Z[1], Z[0] - X[2], X[1] - Y[0]
 
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from flexmb.jit.kernel import helper
 from flexmb.jit.strips import ROW, put, put_across, strip, width
-from flexmb.levels.affine_integrals import axial_vector, columns, sum_integrals, symmetric_part, table_of_products
+from flexmb.levels.affine_integrals import axial_vector, columns_of, sum_integrals, symmetric_part, table_of_products
 from flexmb.levels.level import FidelityLevel, InertiaTables, six
 from flexmb.levels.masses import modal_masses
 from flexmb.levels.summed_point import add_point
@@ -58,8 +58,8 @@ def coupling_and_bias(c, w, k):
     for n in range(0, nm, width(w)):
         eta, etad = strip(w, w.eta[k], n), strip(w, w.etad[k], n)
         now, rate = sum_integrals(w, k, c.product[row], c.moves[row], nm, n)
-        P, axial = symmetric_part(*now), axial_vector(*now)  # of sum m phi_n r'
-        swirl = axial_vector(*rate)  # of sum m phi_n (phi etadot)'
+        P, axial = symmetric_part(now), axial_vector(now)  # of sum m phi_n r'
+        swirl = axial_vector(rate)  # of sum m phi_n (phi etadot)'
         translation = strips3(w, c.mfr[k], 3, n)
         put_across(w, w.pfr[k], n, (axial, translation))
         put(w, w.zf[k], n, sym_dot(spin, P) + 2.0 * dot(omega, swirl))
@@ -79,7 +79,7 @@ def coupling_and_bias(c, w, k):
 @helper
 def _at_rest(w, block, at):
     """The symmetric part of sum m phi_n x'."""
-    return symmetric_part(*columns(w, block, at))
+    return symmetric_part(columns_of(w, block, at))
 
 
 @helper

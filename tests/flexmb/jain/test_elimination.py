@@ -142,7 +142,7 @@ def test_tables_that_follow_the_deformation():
 
 @pytest.mark.parametrize(
     ("level", "modes", "expected"),
-    [("ruthless", 7, "explicit"), ("ruthless", 8, "condensed"), ("full", 13, "explicit"), ("full", 14, "condensed")],
+    [("ruthless", 10, "explicit"), ("ruthless", 11, "condensed"), ("full", 17, "explicit"), ("full", 18, "condensed")],
 )
 def test_the_fastest_form_by_rule(level, modes, expected):
     system = flexmb.compile(flexible_chain(2, modes, level))
