@@ -14,12 +14,15 @@ from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
 from flexmb.jain.wheels import wheel_acceleration, wheel_forces
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.prefetch import prefetch
 from flexmb.levels import rigid
 from flexmb.levels.body import RIGID
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
 from flexmb.tables.features import LOADS, MODES, WHEELS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
+
+AHEAD = 6  # bodies between asking for a record and writing it: what the memory takes for one
 
 
 @helper
@@ -69,6 +72,7 @@ def inward(c, w):
     """
     w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
+        prefetch(w.body, k - AHEAD)
         sound = not has(c, MODES) or eliminate_modes(c, w, k)
         if not (sound and hinge_solve.eliminate(c, w, k)):
             w.fault[0] = k
