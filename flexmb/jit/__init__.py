@@ -12,6 +12,7 @@ duals.py        a number and its derivatives along eight directions: eight colum
 wide_arrays.py  arrays of lanes and duals
 pointer.py      kernels as arguments of kernels
 direct.py       kernels called by address, from Python and from kernels
+prefetch.py     records asked for ahead of their turn, in sweeps over many bodies
 objects.py      kernels as functions of the interpreter: what they read of Python's objects
 parts.py        helpers are compiled into their callers only
 cache.py        compiled kernels on disk

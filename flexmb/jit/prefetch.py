@@ -15,7 +15,7 @@ _LINE, _LINES = 64, 8  # bytes of a line, and how many of a record every sweep u
 
 
 def prefetch(table: Any, i: Any) -> None:
-    """For kernels: row i, which is soon written; it need not be there."""
+    """For kernels: row i is soon read and written. There may be no such row: asking for it harms nothing."""
 
 
 @type_callable(prefetch)
