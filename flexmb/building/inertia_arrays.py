@@ -43,9 +43,10 @@ def inertia_arrays(chain: list[BodyLink], m: int) -> tuple[dict[str, Any], dict[
         [each.product for each in bodies.values()], strip_zeros((m // ROW, 1 + m, NUMBERS * ROW))
     )
     slopes = [each.slope for each in bodies.values()]
+    most = max((len(each.mff) for each in bodies.values()), default=0)  # no strips: these grow fast
     mass_slopes = [each.mass_slope for each in bodies.values()]
-    body["slope"][summed], slope = _rows(slopes, np.zeros((m, m), a.SLOPE))
-    body["mass_slope"][summed], mass_slope = _rows(mass_slopes, np.zeros((m, m, m)))
+    body["slope"][summed], slope = _rows(slopes, np.zeros((most, most), a.SLOPE))
+    body["mass_slope"][summed], mass_slope = _rows(mass_slopes, np.zeros((most, most, most)))
     turning = [(p, i) for p in (each.summed for each in bodies.values()) if p is not None for i in range(len(p.mass))]
     points = np.zeros(len(chain), int)
     points[summed] = [0 if each.summed is None else len(each.summed.mass) for each in bodies.values()]

@@ -73,7 +73,9 @@ def inward(c, w):
     w.doubt[0] = 0
     for k in range(c.body.shape[0] - 1, -1, -1):
         prefetch(w.body, k - AHEAD)
-        sound = not has(c, MODES) or eliminate_modes(c, w, k)
+        sound = True
+        if has(c, MODES):
+            sound = eliminate_modes(c, w, k)
         if not (sound and hinge_solve.eliminate(c, w, k)):
             w.fault[0] = k
             return False

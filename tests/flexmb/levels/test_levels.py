@@ -113,7 +113,7 @@ def test_tables_are_no_larger_than_the_bodies_that_need_them():
     assert (arm.slope.shape, arm.mass_slope.shape) == ((1, 1, 1), (0, 1, 1, 1))
     recipe = replace(RECIPE, carriers=("modal", "rigid"), levels=("linear", "linear", "full", "full"), bodies=4)
     tree = flexmb.compile(trees.random_scene(32, recipe)).constants
-    assert (len(tree.slope), len(tree.mass_slope), len(tree.mode)) == (1, 1, 6)
+    assert (len(tree.slope), len(tree.mass_slope), len(tree.mff)) == (1, 1, 6)
     full = flexmb.compile(mass_on_a_radial_spring("full", 0.0)).constants
     assert len(full.slope) == len(full.mass_slope) == 0
 
