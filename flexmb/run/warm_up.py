@@ -41,7 +41,7 @@ def pendulum() -> Scene:
 def with_panel() -> Scene:
     """The same with a beam of so many modes that they are condensed."""
     panel = _bob().revolute("pivot", "ground", "bob").beam(
-        "panel", length=1.0, elements=8, modes=8, level="ruthless",
+        "panel", length=1.0, elements=8, modes=16, level="ruthless",
         section=beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=1.7e-10, Iz=1.7e-10, rho=2700.0),
     )  # fmt: skip
     return panel.weld("root", "bob", "panel").scene()

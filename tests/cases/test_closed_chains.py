@@ -61,7 +61,7 @@ def test_floating_frames_in_a_flexible_loop():
     support = engine("exudyn").supports(scene)
     assert support.kind == "surrogate" and 'closure "c"' in support.reason
     run = Run(np.linspace(0.0, 0.1, 11))
-    ours = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-6, "dop853"))
+    ours = engine("native").compile(scene).simulate(run, Effort("tolerance", 1e-8, "dop853"))
     theirs = engine("exudyn").compile(scene).simulate(run, Effort("step", 1e-3, "GeneralizedAlpha"))
     assert ours.status == theirs.status == "finished"
     for joint, load in ours.loads.items():
