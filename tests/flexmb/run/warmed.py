@@ -26,7 +26,7 @@ def tree() -> Scene:
 def condensed() -> Scene:
     """A hub with a beam of many modes."""
     builder = _hub().spherical("ball", "ground", "hub")
-    builder.beam("panel", length=0.5, elements=8, section=SECTION, modes=10, level="ruthless")
+    builder.beam("panel", length=0.5, elements=8, section=SECTION, modes=16, level="ruthless")
     return builder.weld("root", "hub", "panel").scene()
 
 
