@@ -9,6 +9,7 @@ from flexmb.jain import axis
 from flexmb.jain.ports import move_port, port_bias, port_velocity
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
+from flexmb.jit.strips import part, put, width
 from flexmb.levels.body import is_at_rest
 from flexmb.spatial.spatial_vector import (
     ZERO6,
@@ -58,12 +59,22 @@ def move_body(c, w, k, shape, rates, displaced):
     if has(c, MODES):
         exact = not is_at_rest(c.body[k].level)
         if exact or displaced:
-            for n in range(c.body[k].modes):
-                w.eta[k, n] = w.q[c.body[k].eta_index + n] if exact or shape else 0.0
-                w.etad[k, n] = w.u[c.body[k].etad_index + n] if exact or rates else 0.0
+            modes = c.body[k].modes
+            _take(w, w.eta[k], modes, exact or shape, w.q, c.body[k].eta_index)
+            _take(w, w.etad[k], modes, exact or rates, w.u, c.body[k].etad_index)
             for i in range(c.body[k].port_start, c.body[k].port_stop):
                 move_port(c, w, k, i)
     _cross_hinge(c, w, k)
+
+
+@helper
+def _take(w, row, modes, shown, numbers, first):
+    """A row by mode from numbers[first] on, or zeros; written in strips, for it is soon read in strips."""
+    for n in range(0, modes, width(w)):
+        if shown:
+            put(w, row, n, part(w, numbers, first, n, modes))
+        else:
+            put(w, row, n, 0.0)
 
 
 @helper

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
 from numba.extending import lower_builtin
 
@@ -32,6 +33,7 @@ from flexmb.typing import Real
 
 _STRIP = ir.VectorType(ir.DoubleType(), LANES)
 _PLACE = ir.IntType(32)
+_PLACES = ir.Constant(ir.VectorType(WORD, LANES), list(range(LANES)))
 ROW = LANES  # length of rows that hold six strips as columns
 
 
@@ -62,6 +64,11 @@ def start(w, n):
 def strip(w: Any, row: Any, n: int) -> Any:
     """The strip of w that starts at row[n]."""
     return row[n]
+
+
+def part(w: Any, row: Any, first: int, n: int, count: int) -> Any:
+    """The strip of w from element n on of the `count` numbers that start at row[first]; zeros beyond them."""
+    return row[first + n]
 
 
 def put(w: Any, row: Any, n: int, x: Any) -> None:
@@ -129,6 +136,14 @@ class _Strip(AbstractTemplate):
             return signature(LANE if is_long(w) else row.dtype, w, row, types.intp)
 
 
+@infer_global(part)
+class _Part(AbstractTemplate):
+    def generic(self, args, kws):
+        if _is_place(*args[:3]) and all(isinstance(each, types.Integer) for each in args[3:]):
+            w, row = args[:2]
+            return signature(LANE if is_long(w) else row.dtype, w, row, *[types.intp] * 3)
+
+
 @infer_global(put)
 class _Put(AbstractTemplate):
     def generic(self, args, kws):
@@ -149,6 +164,21 @@ def _lower_strip(context, builder, sig, args):
     if is_long(w):
         return builder.load(builder.bitcast(place, _STRIP.as_pointer()), align=8)
     return load_number(context, builder, row.dtype, place)
+
+
+@lower_builtin(part, BundleType, TableType, types.Integer, types.Integer, types.Integer)
+def _lower_part(context, builder, sig, args):
+    """What lies beyond is not read."""
+    w, row = sig.args[:2]
+    _, value, first, n, number = args
+    place = _place(builder, row, value, builder.add(first, n))
+    if not is_long(w):
+        return load_number(context, builder, row.dtype, place)
+    there = builder.icmp_signed("<", _PLACES, repeated(builder, builder.sub(number, n)))
+    pointer, nothing = builder.bitcast(place, _STRIP.as_pointer()), ir.Constant(_STRIP, None)
+    kind = ir.FunctionType(_STRIP, [pointer.type, _PLACE, there.type, _STRIP])
+    load = cgutils.get_or_insert_function(builder.module, kind, f"llvm.masked.load.v{LANES}f64.p0")
+    return builder.call(load, [pointer, _PLACE(8), there, nothing])
 
 
 @lower_builtin(put, BundleType, TableType, types.Integer, types.Any)
@@ -202,8 +232,7 @@ def _lower_after(context, builder, sig, args):
     zero = context.cast(builder, ir.Constant(ir.DoubleType(), 0.0), types.float64, x)
     if not is_long(w):
         return builder.select(builder.icmp_signed(">", n, i), value, zero)
-    places = ir.Constant(ir.VectorType(WORD, LANES), list(range(LANES)))
-    return builder.select(builder.icmp_signed(">", places, repeated(builder, builder.sub(i, n))), value, zero)
+    return builder.select(builder.icmp_signed(">", _PLACES, repeated(builder, builder.sub(i, n))), value, zero)
 
 
 def _is_six(w: types.Type, V: types.Type) -> bool:

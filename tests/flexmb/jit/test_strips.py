@@ -12,6 +12,7 @@ from flexmb.jit.strips import (
     ROW,
     add_across,
     after,
+    part,
     put,
     put_across,
     start,
@@ -100,6 +101,26 @@ def test_interpreted_a_strip_is_one_element():
     assert found.result == 1
     out = found.arguments[2].out.astype(float)
     np.testing.assert_allclose(out, expected(rows().a, 8, 2), rtol=0.0, atol=8 * ULP)
+
+
+@kernel
+def taken(first, count, w):
+    for n in range(0, count, width(w)):
+        put(w, w.out[0], n, part(w, w.a[0], first, n, count))
+
+
+@pytest.mark.parametrize(("first", "count"), [(0, 8), (3, 1), (5, 11), (16, 8), (21, 3), (0, 0)])
+def test_a_part_of_a_row_has_zeros_beyond_it_whatever_is_there(first, count):
+    """Numbers that are not finite, or nothing: the last ones are at the end of the row."""
+    w, lanes = rows(), lane_rows()
+    for each in (w, lanes):
+        each.out[0] = np.nan
+        each.a[0, :first], each.a[0, first + count :] = np.inf, np.nan
+        taken(first, count, each)
+    wanted = w.a[0, first : first + count]
+    np.testing.assert_array_equal(w.out[0, :count], wanted)
+    np.testing.assert_array_equal(w.out[0, count : whole(count)], 0.0)
+    np.testing.assert_array_equal(lanes.out[0, :count], np.repeat(wanted[:, None], LANES, axis=1))
 
 
 @kernel
