@@ -69,8 +69,10 @@ def crosscheck(out: Path, *options: str) -> Sequence[str]:
     return [sys.executable, "-c", main, "run", "canonical", "--out", str(out), *options]
 
 
-def run(command: Sequence[str], kernels: Path | None = None) -> Spent:
+def run(command: Sequence[str], kernels: Path | None = None, **variables: str) -> Spent:
     """A process in the root of the repository, with its own folder of kernels, unless it is to use that of the user.
+
+    variables: of its environment, beside those of this process.
 
     It keeps the bytecode of what it imports, as Python does by itself, whatever the environment of the benchmarks says:
     a process that parses all sources anew is no second one.
@@ -78,7 +80,7 @@ def run(command: Sequence[str], kernels: Path | None = None) -> Spent:
     """
     from resource import RUSAGE_CHILDREN, getrusage  # Unix only, as most peers are
 
-    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"}
+    environment = os.environ | {"PYTHONPATH": str(ROOT), "OPENBLAS_NUM_THREADS": "1"} | variables
     environment.pop("PYTHONDONTWRITEBYTECODE", None)
     if kernels is not None:
         environment["NUMBA_CACHE_DIR"] = str(kernels)
