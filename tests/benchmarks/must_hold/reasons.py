@@ -15,27 +15,28 @@ class Reason(NamedTuple):
 REASONS = (
     Reason(
         ("batch_flexible",),
-        "one copy alone became faster by more than eight at once. Sums over modes and their elimination fill vector "
-        "instructions in both now: alone by eight modes of a body, in lanes by eight bodies. A sample in lanes takes "
-        "0.92 µs (1.10 before), one copy 2.9 (3.5). Lanes still pay for tables padded from five modes to eight, and 4 % "
-        "for the copying of states.",
+        "one copy alone became faster by more than eight at once. Sums over modes and their elimination fill "
+        "vector instructions in both now: alone by eight modes of a body, in lanes by eight bodies. A sample in "
+        "lanes takes 0.92 µs (1.10 before), one copy 2.9 (3.5). Lanes still pay for tables padded from five modes "
+        "to eight, and 4 % for the copying of states.",
     ),
     Reason(
         ("modes_full_5", "modes_full_10", "modes_full_20"),
-        "the articulated route is a hundredth to a sixth short, as runs of this row differ (10 modes 6.1 to 7.0, 20 modes "
-        "12.6 to 15.3). Of some 0.8 µs a body with ten modes integrals and bias take a third, the elimination of modes "
-        "another (each pivot waits for a vector that was just stored), the motion of ports a tenth.",
+        "the articulated route is a hundredth to a sixth short, as runs of this row differ (10 modes 6.1 to 7.0, "
+        "20 modes 12.6 to 15.3). Of some 0.8 µs a body with ten modes integrals and bias take a third, the "
+        "elimination of modes another (each pivot waits for a vector that was just stored), the motion of ports a "
+        "tenth.",
     ),
     Reason(
         ("growth_chain_1000_100000", "growth_star_1000_100000", "growth_binary_tree_1000_100000"),
         "memory. Three passes read and write 1.4 kB of constants and states a body, 3 kB in all: a thousand bodies "
-        "lie in the cache, a hundred thousand stream from memory, which at its 12 GB/s takes 250 ns. Records asked for "
-        "ahead of their turn hide a part. The faster the kernel, the larger the ratio.",
+        "lie in the cache, a hundred thousand stream from memory, which at its 12 GB/s takes 250 ns. Records asked "
+        "for ahead of their turn hide a part. The faster the kernel, the larger the ratio.",
     ),
     Reason(
         ("charts",),
-        "points where nothing is left to gain: all runs of the chart err by rounding of the reference alone (6e-14 of a "
-        "goal of 1e-6), so that the finest of three native steps is only slower than a coarse one of a peer. With the "
-        "same steps native is the faster one.",
+        "points where nothing is left to gain: all runs of the chart err by rounding of the reference alone (6e-14 "
+        "of a goal of 1e-6), so that the finest of three native steps is only slower than a coarse one of a peer. "
+        "With the same steps native is the faster one.",
     ),
 )
