@@ -33,10 +33,4 @@ REASONS = (
         "lie in the cache, a hundred thousand stream from memory, which at its 12 GB/s takes 250 ns. Records asked "
         "for ahead of their turn hide a part. The faster the kernel, the larger the ratio.",
     ),
-    Reason(
-        ("charts",),
-        "points where nothing is left to gain: all runs of the chart err by rounding of the reference alone (6e-14 "
-        "of a goal of 1e-6), so that the finest of three native steps is only slower than a coarse one of a peer. "
-        "With the same steps native is the faster one.",
-    ),
 )
