@@ -8,6 +8,7 @@ from __future__ import annotations
 import msgspec
 import pytest
 
+from flexmb.jit import hooks
 from flexmb.jit.kernel import helper, kernel
 from tests.flexmb.jit.kernel_budget import (
     SCENES,
@@ -63,7 +64,9 @@ def _doubled(x):
     return 2.0 * x
 
 
-def test_helpers_are_counted_as_they_are_compiled() -> None:
+def test_helpers_are_counted_as_they_are_compiled(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(hooks, "cache_directory", lambda: tmp_path)  # where nobody has compiled it
+
     @kernel
     def fresh(x):
         return _doubled(x) + 1.0
