@@ -97,7 +97,8 @@ Every key, those with a default in brackets with it; the structs below say more 
 - ``conservation``: ``variant``; ``quantity`` ("energy", "linear_momentum" or "angular_momentum"); ``limit``;
   ``engines`` [the variant's, less ``also``]; ``scale`` [the largest magnitude] (SI); ``expect``, ``band`` (for it all),
   ``diverged_s``, ``because`` and ``reason``, as above;
-- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``.
+- ``chart``: ``title`` [the observable's]; ``observable``; ``variants``; ``reference``;
+- ``reference``: what ``reference.csv`` holds and how it is made, explained in `crosscheck.library.recipe`.
 
 ``library/check`` holds the rules: all numbers finite and in their ranges, names unique, patterns of kinds of channels
 that exist. Every problem found is reported with its place and the remedy. Beside the run file, ``accepted.toml`` holds
@@ -110,6 +111,7 @@ from typing import Literal
 
 import msgspec
 
+from crosscheck.library.recipe import EffortLadder, ReferenceRecipe
 from flexmb.scene.schema import Level
 
 Expectation = Literal["agree", "differ", "unresolved", "refused", "diverged", "failed"]
@@ -128,6 +130,13 @@ MutationKind = Literal[
     "stiffness",
     "dropped_stiffening",
 ]
+Family = Literal["closed_form", "published", "converged", "agreed"]
+FAMILIES: dict[str, Family] = {
+    "closed form": "closed_form",
+    "published": "published",
+    "high precision": "converged",
+    "independent codes": "agreed",
+}
 Quantity = Literal["energy", "linear_momentum", "angular_momentum"]
 
 
@@ -157,15 +166,6 @@ class Refined(_CasePart, frozen=True, kw_only=True):
     pieces: int | None = None
     elements: int | None = None
     order: float = 2.0
-
-
-class EffortLadder(_CasePart, frozen=True, kw_only=True):
-    """Efforts that replace an engine's own ladder for a variant: `values` from coarse to fine, at least two."""
-
-    engine: str
-    kind: Literal["tolerance", "step"]
-    method: str
-    values: tuple[float, ...]
 
 
 class Variant(_CasePart, frozen=True, kw_only=True):
@@ -287,6 +287,7 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
     controls: tuple[Control, ...] = msgspec.field(name="control", default=())
     conservations: tuple[Conservation, ...] = msgspec.field(name="conservation", default=())
     charts: tuple[Chart, ...] = msgspec.field(name="chart", default=())
+    reference: ReferenceRecipe | None = None
 
     def variant(self, name: str) -> Variant:
         """The variant called `name`; CaseError names those there are."""
@@ -297,14 +298,35 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
         raise CaseError(f'no variant "{name}"; the variants are {known}')
 
 
+class Anchor(_CasePart, frozen=True, kw_only=True):
+    """A number from outside: `value` (SI) of a component of a channel at time `t_s`, known to `uncertainty` (SI).
+
+    `component` is "x", "y", "z", for orientations also "w", "" where the channel has only one.
+    """
+
+    channel: str
+    component: str = ""
+    t_s: float
+    value: float
+    uncertainty: float
+    source: str
+
+
 class Provenance(_CasePart, frozen=True, kw_only=True):
     """provenance.toml: where the case's data and its expected outcome come from.
 
-    `reference` says what anchors the case: a published number, a closed form, or the agreement of independent codes.
-    `uncertainty` states, in words and numbers, how well that anchor is known.
+    `reference` says what anchors the case: a published number; a closed form; runs to high precision, which converge by
+    two algorithms and two integrators of this library; or the agreement of independent codes. `uncertainty` states, in
+    words and numbers, how well that anchor is known. `anchors` are numbers from outside, which the reference must meet.
     """
 
     reference: Literal["published", "closed form", "high precision", "independent codes"]
     sources: tuple[str, ...]
     uncertainty: str
     notes: str = ""
+    anchors: tuple[Anchor, ...] = msgspec.field(name="anchor", default=())
+
+    @property
+    def family(self) -> Family:
+        """The family of cases that it belongs to."""
+        return FAMILIES[self.reference]

@@ -26,7 +26,7 @@ ORDERS = (0.1, 16.0)
 def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defect]:
     """The problems of a variant."""
     if not variant.engines:
-        yield problem(place.key("engines"), "name at least one engine", "for example [\"native\"]")
+        yield problem(place.key("engines"), "name at least one engine", 'for example ["native"]')
     yield from check_engines_once(variant.engines, place.key("engines"))
     yield from check_engines_once(variant.also, place.key("also"))
     twice = sorted(set(variant.engines) & set(variant.also))

@@ -1,0 +1,58 @@
+"""`crosscheck stability`: maps of where a motion or a method fails."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.app import Jobs, Out, app, check_limit, console, refuse, sole_writer
+from crosscheck.running.pool import TIME_LIMIT_S, Limits
+from crosscheck.terminal.listings import maps_table
+from flexmb.scene.problems import closest
+
+
+@app.command()
+def stability(
+    maps: Annotated[list[str], typer.Argument(help="Names of maps, `all`, or `list` to see which there are.")],
+    out: Out = Path("out"),
+    depth: Annotated[
+        int | None, typer.Option(help="How often cells at a boundary are halved; by default what the map says.", min=0)
+    ] = None,
+    pictures: Annotated[Path | None, typer.Option(help="Folder for the pictures and maps.json; default --out.")] = None,
+    fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
+    jobs: Jobs = None,
+    time_limit: Annotated[
+        float | None,
+        typer.Option("--time-limit", metavar="SECONDS", help=f"Stop a longer cell; default {TIME_LIMIT_S:g}."),
+    ] = None,
+) -> None:
+    """
+    Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
+
+    **Writes** into `--out` the records of each map, `<map>.jsonl`, and into `--pictures` `<map>.svg` and the verdicts,
+    `maps.json`. A run that was stopped resumes where it was.
+
+    **Exit code**: 0 every boundary lies within one of the finest cells of its overlay; 1 one does not, or cells did not
+    run; 2 there is no such map.
+
+    **Examples**: `crosscheck stability list` · `crosscheck stability vibrating_hinge --depth 5` ·
+    `crosscheck stability all --pictures docs/pictures`
+    """
+    from crosscheck.stability.run import PROVIDER, maps_of
+    from crosscheck.terminal.map_runs import run_and_draw  # they load the compiler
+
+    check_limit(time_limit)
+    known = maps_of(PROVIDER)
+    if maps == ["list"]:
+        console.print(maps_table(known.values()))
+        return
+    chosen = list(known) if maps == ["all"] else maps
+    for name in chosen:
+        if name not in known:
+            refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
+    with sole_writer(out):
+        limits = Limits(jobs, time_limit)
+        code = run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits)
+    raise typer.Exit(code)

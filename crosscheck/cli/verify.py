@@ -1,0 +1,60 @@
+"""`crosscheck verify`: a CSV of any code against a case."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.app import app, console, found, in_one_line, refuse
+from crosscheck.terminal.csv_channels import channels_table
+from crosscheck.terminal.text import words
+from crosscheck.terminal.verdicts import print_outcome
+from crosscheck.verify.against_case import sample_times_csv, verify_csv
+
+
+@app.command()
+def verify(
+    case: Annotated[str, typer.Argument(help="Case name or folder.")],
+    csv: Annotated[Path, typer.Argument(help="Your code's results (see below).")],
+    coarse: Annotated[
+        Path | None,
+        typer.Option(help="The same results at half the accuracy: your U is 3 x the difference, not the case's goal."),
+    ] = None,
+    variant: Annotated[str | None, typer.Option(help="Variant to be held against; by default the first.")] = None,
+    engine: Annotated[str, typer.Option(help="Engine that gives the reference.")] = "native",
+    template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
+) -> None:
+    """
+    Hold a CSV of your own code against a case, without an adapter.
+
+    **Format**: one header line, one line a sample time of the case. Columns: `t` (s); for a marker `tip`
+    `tip.px tip.py tip.pz` (m), `tip.qw tip.qx tip.qy tip.qz`, `tip.vx tip.vy tip.vz` (m/s), `tip.wx tip.wy tip.wz`
+    (rad/s); for a hinge `elbow` `elbow.tx elbow.ty elbow.tz` (Nm) and `elbow.fx elbow.fy elbow.fz` (N), the load on the
+    outboard body about the hinge point. World axes; quaternions scalar-first, body to World. Only whole groups count,
+    any subset of groups will do; `--template` writes a file with the times and all columns to fill in. flexmb's own
+    `trajectory.csv` will do as it is: it is compared in whatever the case sets a goal for.
+
+    **Shows** each channel's distance E, uncertainty U, the time at which it is worst, and what is wrong where that can
+    be guessed: thousandths, degrees, a sign, exchanged components, quaternions conjugate or scalar-last, body axes,
+    another origin, shifted times.
+
+    **Exit code**: 0 every channel in the file agrees; 1 some do not; 2 the file cannot be compared.
+    """
+    with in_one_line():
+        cases = found((case,))
+        if len(cases) > 1:
+            refuse(f'"{case}" is {len(cases)} cases: name one of {", ".join(each.name for each in cases)}')
+        (chosen,) = cases
+        if template:
+            if csv.exists():
+                refuse(f"{csv} is there already: a template would take its place; name another file")
+            csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
+            console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
+            return
+        outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
+    console.print(channels_table(outcome))
+    if outcome.left_out:
+        console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
+    raise typer.Exit(print_outcome(console, outcome))

@@ -1,0 +1,63 @@
+"""How the reference of a case is made: the table `[reference]` of run.toml, by which `crosscheck regenerate` goes.
+
+For example::
+
+    [reference]
+    variant = "rigid"
+    samples = 101                     # [the variant's]
+    horizon_s = 8.0                   # [the whole run] how long the motion is known: a chaotic one only so far
+    channels = ["marker", "load"]     # [all that two routes offer]
+
+    [[reference.route]]               # the first route that offers a channel gives its values
+    exact = "exact.py"                # a closed form, in the case's folder
+    relative_uncertainty = 1e-13
+
+    [[reference.route]]
+    engine = "native"                 # efforts [the variant's or the engine's own]
+    efforts = [{ engine = "native", kind = "tolerance", method = "dop853", values = [1e-10, 1e-11, 1e-12] }]
+
+    [[reference.route]]
+    engine = "native-frisch"
+
+Every channel comes by two routes at least, which must agree within their uncertainties.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import msgspec
+
+
+class EffortLadder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """Efforts that replace an engine's own ladder for a variant: `values` from coarse to fine, at least two."""
+
+    engine: str
+    kind: Literal["tolerance", "step"]
+    method: str
+    values: tuple[float, ...]
+
+
+class Route(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """One way to the numbers: an `engine` with its `efforts`, or a closed form.
+
+    `exact` names a Python file in the case's folder with a function `exact(times)` that returns channels (T, k) by
+    name; `relative_uncertainty` says how well it is evaluated, relative to each channel's range. `variant` replaces the
+    reference's variant, by another model of the same physics.
+    """
+
+    engine: str = ""
+    exact: str = ""
+    variant: str | None = None
+    efforts: tuple[EffortLadder, ...] = ()
+    relative_uncertainty: float = 1e-13
+
+
+class ReferenceRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What `reference.csv` holds and by which routes it is made."""
+
+    variant: str
+    samples: int | None = None
+    horizon_s: float | None = None
+    channels: tuple[str, ...] = ()
+    routes: tuple[Route, ...] = msgspec.field(name="route", default=())

@@ -1,0 +1,165 @@
+"""A case's stored reference: `reference.csv` with the numbers, `reference.toml` with what is known of each channel.
+
+`reference.csv` is in SI and World axes, time first, one quoted header line, 17 digits::
+
+    "t [s]","marker:tip.position.x [m]","marker:tip.position.y [m]",...
+
+`reference.toml` gives every channel its uncertainty, and says which routes made the numbers, of which scene, until when
+they hold, and which csv and which provenance it belongs to. `crosscheck regenerate` writes both; nobody edits them.
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import io
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from crosscheck.library.case import CaseError
+from flexmb.run.channels import unit
+from flexmb.scene.convert import to_struct
+from flexmb.scene.problems import SceneError
+from flexmb.scene.reading import MIB, Unreadable, parse_toml, read_text
+from flexmb.typing import Real
+
+VALUES, KNOWLEDGE = "reference.csv", "reference.toml"
+LIMIT = 64 * MIB
+TIME = "t [s]"
+
+
+class Known(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """What is known of one channel: `uncertainty` (its SI unit, rad for orientations) of every sample up to the
+    horizon, the channel's range `scale`, and in `how` the routes and the estimate that say so."""
+
+    uncertainty: float
+    scale: float
+    how: str
+
+
+class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+    """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of the
+    variant's scene with the sample times; `routes` say in words how the numbers were made, `made_with` by what."""
+
+    variant: str
+    horizon_s: float
+    values: str
+    provenance: str
+    scene: str
+    routes: tuple[str, ...]
+    made_with: tuple[str, ...]
+    channels: dict[str, Known]
+
+
+@dataclass(frozen=True)
+class Reference:
+    """A reference that was read and checked: channels (T, k) at `times` (T,), in SI and World axes."""
+
+    times: Real
+    channels: dict[str, Real]
+    knowledge: Knowledge
+
+
+def load_reference(folder: Path) -> Reference:
+    """The reference of the case in `folder`; CaseError where there is none, or where its files belie each other."""
+    values, knowledge = _text(folder / VALUES), _knowledge(folder / KNOWLEDGE)
+    if digest(values) != knowledge.values:
+        raise CaseError(f"{folder / VALUES} was changed after {KNOWLEDGE} was written: run `crosscheck regenerate`")
+    times, channels = parse_values(values, str(folder / VALUES))
+    if set(channels) != set(knowledge.channels):
+        raise CaseError(f"{folder / KNOWLEDGE} names other channels than {VALUES}: run `crosscheck regenerate`")
+    return Reference(times, channels, knowledge)
+
+
+def has_reference(folder: Path) -> bool:
+    """Whether the case in `folder` has a stored reference."""
+    return (folder / VALUES).exists() or (folder / KNOWLEDGE).exists()
+
+
+def digest(text: str) -> str:
+    """What a text is recognised by."""
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def column_names(channel: str, width: int) -> list[str]:
+    """Names of a channel's columns, with its unit: "marker:tip.position.x [m]"; a quaternion has no unit."""
+    symbol = "1" if channel.endswith(".orientation") else unit(channel)
+    letters = {1: [""], 3: [".x", ".y", ".z"], 4: [".w", ".x", ".y", ".z"]}
+    endings = [f".{i}" for i in range(width)] if channel.startswith("drive:") else letters[width]
+    return [f"{channel}{ending} [{symbol}]" for ending in endings]
+
+
+def values_text(times: Real, channels: dict[str, Real]) -> str:
+    """The text of reference.csv."""
+    header = [TIME, *(name for channel, rows in channels.items() for name in column_names(channel, rows.shape[1]))]
+    text = io.StringIO()
+    csv.writer(text, quoting=csv.QUOTE_ALL, lineterminator="\n").writerow(header)
+    np.savetxt(text, np.column_stack([times, *channels.values()]), fmt="%.17g", delimiter=",")
+    return text.getvalue()
+
+
+def parse_values(text: str, file: str) -> tuple[Real, dict[str, Real]]:
+    """Times (T,) and channels (T, k) of a reference.csv; CaseError names the line or the column that is wrong."""
+    rows = list(csv.reader(io.StringIO(text, newline=""), strict=True))
+    if len(rows) < 3 or rows[0][:1] != [TIME]:
+        raise CaseError(f'{file}: it must begin with a header whose first column is "{TIME}", and hold two samples')
+    header = rows[0]
+    for number, row in enumerate(rows[1:], start=2):
+        if len(row) != len(header):
+            raise CaseError(f"{file}: line {number} has {len(row)} cells, the header has {len(header)}")
+    try:
+        table = np.array(rows[1:], float)
+    except ValueError as error:
+        raise CaseError(f"{file}: {error}") from None
+    if not (np.all(np.isfinite(table)) and np.all(np.diff(table[:, 0]) > 0.0)):
+        raise CaseError(f"{file}: it holds numbers that are not finite, or times that do not rise")
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(header[1:], start=1):
+        places.setdefault(_channel_of(name), []).append(place)
+    channels = {channel: table[:, columns] for channel, columns in places.items()}
+    expected = [TIME, *(name for channel, values in channels.items() for name in _names(channel, values, file))]
+    if expected != header:
+        wrong = next((one for one, other in zip(header, expected, strict=False) if one != other), header[-1])
+        raise CaseError(f'{file}: column "{wrong}" is not where or what it should be')
+    return table[:, 0], channels
+
+
+def _names(channel: str, values: Real, file: str) -> list[str]:
+    try:
+        return column_names(channel, values.shape[1])
+    except KeyError:
+        raise CaseError(f"{file}: {channel} has {values.shape[1]} columns: none of its kind has") from None
+
+
+def _channel_of(column: str) -> str:
+    """The channel of a column: what stands before the component, if it has one, and the unit."""
+    name = column.rpartition(" [")[0]
+    head, _, last = name.rpartition(".")
+    return head if last in ("w", "x", "y", "z") or last.isdigit() else name
+
+
+def _knowledge(file: Path) -> Knowledge:
+    try:
+        found = to_struct(parse_toml(_text(file)), Knowledge, str(file))
+    except SceneError as error:
+        raise CaseError(f"{file}: {'; '.join(map(str, error.problems))}") from None
+    except Unreadable as error:
+        raise CaseError(f"{file}: {error}") from None
+    for channel, known in found.channels.items():
+        if not (0.0 < known.uncertainty < np.inf and 0.0 <= known.scale < np.inf):
+            raise CaseError(f"{file}: the uncertainty and scale of {channel} are no numbers that can be judged by")
+    if not 0.0 < found.horizon_s < np.inf:
+        raise CaseError(f"{file}: a horizon of {found.horizon_s:g} s is none")
+    return found
+
+
+def _text(file: Path) -> str:
+    try:
+        return read_text(file, LIMIT)
+    except Unreadable as error:
+        raise CaseError(f"{file}: {error}") from None
+    except OSError as error:
+        raise CaseError(f"{file}: {error.strerror}: `crosscheck regenerate` makes it") from None
