@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from crosscheck.cli.app import app, console, found
+from crosscheck.cli.common import app, console, found
 from crosscheck.running.installed import describe_engines
 from crosscheck.terminal.listings import cases_table, engines_table
 

@@ -8,7 +8,19 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.app import Jobs, Open, Out, Strict, TimeLimit, app, check_limit, console, found, refuse, sole_writer
+from crosscheck.cli.common import (
+    Jobs,
+    Open,
+    Out,
+    Strict,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    refuse,
+    sole_writer,
+)
 from crosscheck.judging.accept import NotAccepted, accept_figures
 from crosscheck.library import find
 from crosscheck.library.selection import without_part

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.app import app, console, found, in_one_line, refuse
+from crosscheck.cli.common import app, console, found, in_one_line, refuse
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome

@@ -298,7 +298,7 @@ class RunFile(_CasePart, frozen=True, kw_only=True):
         raise CaseError(f'no variant "{name}"; the variants are {known}')
 
 
-class Anchor(_CasePart, frozen=True, kw_only=True):
+class PublishedNumber(_CasePart, frozen=True, kw_only=True):
     """A number from outside: `value` (SI) of a component of a channel at time `t_s`, known to `uncertainty` (SI).
 
     `component` is "x", "y", "z", for orientations also "w", "" where the channel has only one.
@@ -324,7 +324,7 @@ class Provenance(_CasePart, frozen=True, kw_only=True):
     sources: tuple[str, ...]
     uncertainty: str
     notes: str = ""
-    anchors: tuple[Anchor, ...] = msgspec.field(name="anchor", default=())
+    anchors: tuple[PublishedNumber, ...] = msgspec.field(name="anchor", default=())
 
     @property
     def family(self) -> Family:

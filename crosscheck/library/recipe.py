@@ -38,7 +38,7 @@ class EffortLadder(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_o
     values: tuple[float, ...]
 
 
-class Route(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
+class ReferenceRoute(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
     """One way to the numbers: an `engine` with its `efforts`, or a closed form.
 
     `exact` names a Python file in the case's folder with a function `exact(times)` that returns channels (T, k) by
@@ -60,4 +60,4 @@ class ReferenceRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, k
     samples: int | None = None
     horizon_s: float | None = None
     channels: tuple[str, ...] = ()
-    routes: tuple[Route, ...] = msgspec.field(name="route", default=())
+    routes: tuple[ReferenceRoute, ...] = msgspec.field(name="route", default=())

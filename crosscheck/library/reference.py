@@ -55,7 +55,7 @@ class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only
 
 
 @dataclass(frozen=True)
-class Reference:
+class StoredReference:
     """A reference that was read and checked: channels (T, k) at `times` (T,), in SI and World axes."""
 
     times: Real
@@ -63,7 +63,7 @@ class Reference:
     knowledge: Knowledge
 
 
-def load_reference(folder: Path) -> Reference:
+def load_reference(folder: Path) -> StoredReference:
     """The reference of the case in `folder`; CaseError where there is none, or where its files belie each other."""
     values, knowledge = _text(folder / VALUES), _knowledge(folder / KNOWLEDGE)
     if digest(values) != knowledge.values:
@@ -71,7 +71,7 @@ def load_reference(folder: Path) -> Reference:
     times, channels = parse_values(values, str(folder / VALUES))
     if set(channels) != set(knowledge.channels):
         raise CaseError(f"{folder / KNOWLEDGE} names other channels than {VALUES}: run `crosscheck regenerate`")
-    return Reference(times, channels, knowledge)
+    return StoredReference(times, channels, knowledge)
 
 
 def has_reference(folder: Path) -> bool:
