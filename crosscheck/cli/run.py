@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -23,6 +24,7 @@ from crosscheck.cli.common import (
 )
 from crosscheck.judging.accept import NotAccepted, accept_figures
 from crosscheck.library import find
+from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
@@ -43,6 +45,9 @@ def run(
         list[str] | None,
         typer.Option("--engine", "-e", help="Only these engines (repeat it). One alone is compared with its partners."),
     ] = None,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Hold the engines against the stored references only; no partners run.")
+    ] = False,
     out: Out = Path("out"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Jobs = None,
@@ -74,11 +79,13 @@ def run(
     sense. With `--strict` also 1 where figures are worse than recorded or missing. `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
-    `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case --accept` ·
+    `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
     `crosscheck run all --strict --time-limit 600`
     """
     check_limit(time_limit)
     chosen = found(tuple(cases))
+    if alone:
+        chosen = _alone(chosen)
     idle = without_part((case.run for case in chosen), tuple(engine or ()))
     if idle:
         refuse(idle)
@@ -106,6 +113,16 @@ def report(
         refuse(f"{records} is no file")
     with sole_writer(out):
         _conclude(records, out, open_report, strict, standing)
+
+
+def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
+    """The cases, to be run without partners; those without a stored reference are named and left out."""
+    without = [case.name for case in cases if case.run.reference is None or not has_reference(case.folder)]
+    if len(without) == len(cases):
+        refuse(f"no stored reference: {', '.join(without)}. `crosscheck regenerate` makes them; or leave --alone out")
+    if without:
+        console.print(words(f"Left out, as there is no stored reference: {', '.join(without)}", "yellow"))
+    return tuple(replace(case, alone=True) for case in cases if case.name not in without)
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
