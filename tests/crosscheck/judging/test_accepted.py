@@ -137,14 +137,14 @@ def test_accepting_and_being_strict_on_the_command_line(
     own: None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """Accept, pass strictly; loosen an effort by three digits, warn, fail strictly; break a thing, accept nothing."""
-    monkeypatch.setattr(cli, "sweep", functools.partial(sweep, provider=PROVIDER))
-    monkeypatch.setattr(cli.console, "_width", 200)
+    monkeypatch.setattr(cli.run, "sweep", functools.partial(sweep, provider=PROVIDER))
+    monkeypatch.setattr(cli.common.console, "_width", 200)
     folder = copy_case(tmp_path)
     file, run = folder / "accepted.toml", folder / "run.toml"
 
     def crosscheck(*words: str) -> tuple[int, str]:
         out = ["--out", str(tmp_path / "out"), "--jobs", "2"]
-        result = CliRunner().invoke(cli.app, ["run", str(folder), *words, *out], env=WIDE)
+        result = CliRunner().invoke(cli.common.app, ["run", str(folder), *words, *out], env=WIDE)
         return result.exit_code, result.output
 
     code, output = crosscheck("--strict")
