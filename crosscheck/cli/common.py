@@ -15,7 +15,7 @@ from rich.console import Console
 from crosscheck.library import find
 from crosscheck.library.case import CaseError
 from crosscheck.records.lock import FolderInUseError, locked
-from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
 from flexmb.output.writing import in_words
 

@@ -26,7 +26,7 @@ from crosscheck.library import find
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from crosscheck.cli.common import Jobs, Out, app, check_limit, console, refuse, sole_writer
-from crosscheck.running.pool import TIME_LIMIT_S, Limits
+from crosscheck.running.scheduler import TIME_LIMIT_S, Limits
 from crosscheck.terminal.listings import maps_table
 from flexmb.scene.problems import closest
 

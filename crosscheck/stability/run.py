@@ -14,7 +14,8 @@ from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.records.archive import Archive
 from crosscheck.records.machine import environment
-from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler
 from crosscheck.stability.boundary import MapVerdict, judge, label
 from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
@@ -22,7 +23,6 @@ from crosscheck.stability.refine import Cell, CellMesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"
 Listener = Callable[[StabilityMap, int, int], None]
-Scheduler = Callable[..., Iterator[Event]]
 
 
 class CellJob(NamedTuple):

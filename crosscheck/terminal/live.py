@@ -12,7 +12,7 @@ from rich.text import Text
 
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.plan import Job
-from crosscheck.running.pool import Event
+from crosscheck.running.scheduler import Event
 from flexmb.output.printable import printable
 
 MARKS = {

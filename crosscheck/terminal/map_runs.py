@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 from rich.text import Text
 
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map

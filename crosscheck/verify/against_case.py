@@ -19,7 +19,7 @@ from crosscheck.library.case import RunFile, Variant
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.running.plan import MAIN, sample_times, variant_scene
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, sweep
 from crosscheck.verify.causes import likely_cause
 from crosscheck.verify.columns import LOAD_GROUPS, MARKER_GROUPS, Columns, VerifyError, read_columns

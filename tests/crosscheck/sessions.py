@@ -11,7 +11,7 @@ from crosscheck.judging.verdict import Verdict
 from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
 from crosscheck.records.session import last_session
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"

@@ -15,7 +15,7 @@ from crosscheck import cli
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.installed import describe_engines
-from crosscheck.running.pool import Event, Limits
+from crosscheck.running.scheduler import Event, Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.engines.bad_engines import (
     ANSWERS,

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.records import made_by
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.stability import run
 from crosscheck.stability.boundary import judge
 from crosscheck.stability.catalogue import stability_maps
