@@ -232,7 +232,7 @@ def _require_same_sources(client: Client, address: str) -> None:
     others = sorted(worker for worker, code in found.items() if code != code_here())
     if others:
         raise ClusterError(
-            f"workers run other sources than this machine: {', '.join(others)}; install the same there, and restart them"
+            f"workers run other sources than this process: {', '.join(others)}; install them, and restart"
         )
 
 

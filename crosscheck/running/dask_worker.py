@@ -105,6 +105,7 @@ def do_job(
     if code != code_here():  # a worker that came after the session had looked at all
         return [Event(number, "crashed", "this Dask worker runs other sources: install the same, and restart it")]
     current_process().daemon = False  # Dask's workers are daemons, which may not start processes; ours end with them
-    crew: Crew = get_worker().plugins[session]
+    crew = get_worker().plugins[session]
+    assert isinstance(crew, Crew)
     crew.has_begun(number)
     return list(crew.events(number, function, job, kind, limit_s, memory_bytes))

@@ -6,6 +6,7 @@ import os
 import signal
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import psutil
@@ -19,17 +20,37 @@ from distributed import LocalCluster
 from crosscheck.running import dask_cluster
 from crosscheck.running.dask_cluster import ClusterError, DaskCluster
 from crosscheck.running.scheduler import Event
+from tests.crosscheck.running.interrupted import install_plugs, interrupt_and_go_on
 
 TRIES = 2
 
 
 @pytest.fixture(scope="module")
-def address() -> Iterator[str]:
+def plugs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("plugs")
+
+
+@pytest.fixture(scope="module")
+def gate(plugs: Path) -> Path:
+    return install_plugs(plugs)
+
+
+@pytest.fixture(scope="module")
+def address(plugs: Path, gate: Path) -> Iterator[str]:
     with (
+        pytest.MonkeyPatch.context() as patch,
         dask.config.set({"distributed.scheduler.allowed-failures": TRIES - 1}),
+        _on_the_path(patch, plugs),
         LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
     ):
         yield cluster.scheduler_address
+
+
+@contextmanager
+def _on_the_path(patch: pytest.MonkeyPatch, plugs: Path) -> Iterator[None]:
+    """Workers, which start with the path of this process, find the plug-ins."""
+    patch.syspath_prepend(plugs)
+    yield
 
 
 def work(job: tuple[str, str], emit: Callable[[object], None]) -> None:
@@ -109,7 +130,7 @@ def test_a_job_that_kills_every_worker_crashes_and_no_process_is_left(address: s
 
 def test_workers_with_other_sources_are_refused(address: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(dask_cluster, "code_here", os.getpid)
-    with pytest.raises(ClusterError, match="other sources than this machine: tcp://"):
+    with pytest.raises(ClusterError, match="other sources than this process: tcp://"):
         DaskCluster(address).check()
 
 
@@ -117,3 +138,10 @@ def test_nobody_at_the_address_is_said_with_the_remedy(monkeypatch: pytest.Monke
     monkeypatch.setattr(dask_cluster, "ANSWER_S", 0.5)
     with pytest.raises(ClusterError, match=r"no Dask scheduler answers at tcp://127.0.0.1:1 .*--scheduler local"):
         DaskCluster("tcp://127.0.0.1:1").check()
+
+
+@pytest.mark.slow
+def test_an_interrupted_session_leaves_whole_records_and_goes_on(
+    address: str, plugs: Path, gate: Path, tmp_path: Path
+) -> None:
+    interrupt_and_go_on(plugs, gate, tmp_path, "--scheduler", address)
