@@ -43,7 +43,8 @@ class Job:
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
     channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
     name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
-    `time_limit_s` it is stopped; `expected_s` is what it took the last time, None where nobody knows.
+    `time_limit_s` it is stopped; `expected_s` is what it took the last time, None where nobody knows. A `lean` one is
+    run once, where short runs are repeated for the clock, and stores nothing but `kept`.
     """
 
     case: str
@@ -61,6 +62,7 @@ class Job:
     error: str = ""
     time_limit_s: float = TIME_LIMIT_S
     expected_s: float | None = None
+    lean: bool = False
 
     @property
     def work(self) -> tuple[str, str, str, str]:
