@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
@@ -54,22 +55,33 @@ def print_summary(console: Console, summary: SweepSummary) -> None:
 
 
 def _table(summary: SweepSummary) -> Table:
-    texts = ("quantity", "engine")
-    numbers = ("samples", "mean", "sd", "5 %", "median", "95 %", "lowest", "highest")
-    table = Table(*texts, *(Column(name, justify="right") for name in numbers), header_style="bold")
+    several = len({each.engine for each in summary.distributions}) > 1
+    numbers = ("samples", "mean", "standard deviation", "5 % to 95 %", "lowest to highest")
+    table = Table("quantity", *(Column(name, justify="right") for name in numbers), header_style="bold")
     for each in summary.distributions:
-        table.add_row(words(each.quantity), words(each.engine), *map(words, _cells(each)))
+        name = f"{each.quantity} · {each.engine}" if several else each.quantity
+        table.add_row(words(name), *map(words, _cells(each)))
     return table
 
 
 def _cells(each: Distribution) -> list[str]:
-    estimates = (each.mean, each.sd, *(each.quantiles.get(p) for p in ("0.05", "0.5", "0.95")))
-    return [str(each.count), *map(_cell, estimates), f"{each.lowest:.6g}", f"{each.highest:.6g}"]
+    quantiles = [_digits(quantile) for p, quantile in each.quantiles.items() if p != "0.5"]
+    extremes = f"{each.lowest:.5g} to {each.highest:.5g}"
+    return [str(each.count), _cell(each.mean), _cell(each.sd), " to ".join(quantiles) or "-", extremes]
 
 
 def _cell(estimate: Estimated | None) -> str:
+    """An estimate with its standard error."""
     if estimate is None:
         return "-"
-    if estimate.standard_error is None:
-        return f"{estimate.value:.6g}"
-    return f"{estimate.value:.6g} ± {estimate.standard_error:.2g}"
+    error = "" if estimate.standard_error is None else f" ± {estimate.standard_error:.2g}"
+    return _digits(estimate) + error
+
+
+def _digits(estimate: Estimated) -> str:
+    """An estimate in the digits that its standard error leaves it."""
+    value, error = estimate.value, estimate.standard_error
+    if not error or not value:
+        return f"{value:.5g}"
+    count = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    return f"{value:.{min(max(count, 2), 15)}g}"
