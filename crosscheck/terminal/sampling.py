@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.progress import (
     BarColumn,
@@ -21,6 +22,7 @@ from rich.table import Column, Table
 from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
 from crosscheck.terminal.text import marked, words
 
+QUANTILES = {"0.05": "5 %", "0.5": "median", "0.95": "95 %"}
 SHOWN = 5  # failures; summary.json has all
 
 
@@ -55,33 +57,34 @@ def print_summary(console: Console, summary: SweepSummary) -> None:
 
 
 def _table(summary: SweepSummary) -> Table:
+    value, error = Column("value", justify="right"), Column("standard error", justify="right")
+    table = Table("quantity", "in", value, error, box=SIMPLE_HEAD, header_style="bold")
     several = len({each.engine for each in summary.distributions}) > 1
-    numbers = ("samples", "mean", "standard deviation", "5 % to 95 %", "lowest to highest")
-    table = Table("quantity", *(Column(name, justify="right") for name in numbers), header_style="bold")
     for each in summary.distributions:
         name = f"{each.quantity} · {each.engine}" if several else each.quantity
-        table.add_row(words(name), *map(words, _cells(each)))
+        for statistic, number, its_error in _lines(each):
+            table.add_row(words(name), words(statistic), words(number), words(its_error))
+            name = ""
+        table.add_section()
     return table
 
 
-def _cells(each: Distribution) -> list[str]:
-    quantiles = [_digits(quantile) for p, quantile in each.quantiles.items() if p != "0.5"]
-    extremes = f"{each.lowest:.5g} to {each.highest:.5g}"
-    return [str(each.count), _cell(each.mean), _cell(each.sd), " to ".join(quantiles) or "-", extremes]
-
-
-def _cell(estimate: Estimated | None) -> str:
-    """An estimate with its standard error."""
-    if estimate is None:
-        return "-"
-    error = "" if estimate.standard_error is None else f" ± {estimate.standard_error:.2g}"
-    return _digits(estimate) + error
+def _lines(each: Distribution) -> Iterator[tuple[str, str, str]]:
+    """Statistic, value, standard error."""
+    estimates = [("mean", each.mean), ("standard deviation", each.sd)]
+    estimates += [(QUANTILES.get(p, p), quantile) for p, quantile in each.quantiles.items()]
+    for name, estimate in estimates:
+        if estimate is not None:
+            error = estimate.standard_error
+            yield name, _digits(estimate), "" if error is None else f"{error:.2g}"
+    yield f"lowest, sample {each.lowest_at}", f"{each.lowest:.7g}", ""
+    yield f"highest, sample {each.highest_at}", f"{each.highest:.7g}", ""
 
 
 def _digits(estimate: Estimated) -> str:
     """An estimate in the digits that its standard error leaves it."""
     value, error = estimate.value, estimate.standard_error
     if not error or not value:
-        return f"{value:.5g}"
+        return f"{value:.7g}"
     count = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
     return f"{value:.{min(max(count, 2), 15)}g}"
