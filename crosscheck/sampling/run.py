@@ -28,7 +28,7 @@ from crosscheck.sampling.file import SweepFile, load_sweep
 from crosscheck.sampling.points import sample_values
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
 from crosscheck.sampling.scenes import with_values
-from crosscheck.sampling.table import Table
+from crosscheck.sampling.table import SamplesTable
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
@@ -83,7 +83,7 @@ def run_sweep(
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
-        closing(Table(out / TABLE, sweep)) as table,
+        closing(SamplesTable(out / TABLE, sweep)) as table,
         closing(
             scheduler(
                 run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes

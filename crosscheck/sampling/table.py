@@ -13,7 +13,7 @@ from crosscheck.sampling.sample import SampleRecord
 from flexmb.output.writing import writing
 
 
-class Table:
+class SamplesTable:
     """A CSV file: sample, engine, status, parameters, quantities (empty where there is no result), message."""
 
     def __init__(self, file: Path, sweep: SweepFile) -> None:
