@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -16,6 +16,7 @@ from flexmb.typing import Real
 
 Key = tuple[str, str, str]  # variant, engine, role
 RUNGS = 3
+Measure = Callable[[str, Real], float]  # of a channel's signal: its largest magnitude, its range
 
 
 @dataclass
@@ -36,6 +37,7 @@ class Result:
     refinement: tuple[float, float] = (2.0, 2.0)
     _unpacked: dict[int, Real] = field(default_factory=dict, repr=False)
     _estimates: dict[str, Uncertainty] = field(default_factory=dict, repr=False)
+    _sizes: dict[tuple[Measure, str], float] = field(default_factory=dict, repr=False)
 
     @property
     def finest(self) -> RunRecord:
@@ -82,7 +84,7 @@ class Result:
         if _without_effect(ladder):
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run)) for run in ladder]
-        size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
+        size = max(self._size(magnitude, name) for name in self._relatives(channel))
         return estimate(channel, finest.effort_kind, rungs, finest.evaluations, size)
 
     def _ladder(self) -> list[RunRecord]:
@@ -137,15 +139,22 @@ class Result:
         return self._signal(channel, like.doubt(channel, across))
 
     def _signal(self, channel: str, doubt: Uncertainty) -> Signal:
-        sizes = [max(signal_range(name, self.values(name)) for name in self._relatives(channel))]
+        sizes = [max(self._size(signal_range, name) for name in self._relatives(channel))]
         if channel.endswith(".torque"):
             sizes.append(self._largest(".force") * self._largest(".position"))
         return Signal(self.values(channel), doubt, tuple(sizes))
 
     def _largest(self, ending: str) -> float:
         """Largest magnitude (SI) among the channels with that ending; 0 if there is none."""
-        sizes = (magnitude(name, self.values(name)) for name in self.finest.channels if name.endswith(ending))
+        sizes = (self._size(magnitude, name) for name in self.finest.channels if name.endswith(ending))
         return max(sizes, default=0.0)
+
+    def _size(self, measure: Measure, channel: str) -> float:
+        """A measure of a channel of the finest run, found once: each pair of engines asks for it."""
+        key = (measure, channel)
+        if key not in self._sizes:
+            self._sizes[key] = measure(channel, self.values(channel))
+        return self._sizes[key]
 
     def _relatives(self, channel: str) -> list[str]:
         kin = family(channel)
