@@ -42,7 +42,7 @@ from typing import Literal
 
 import msgspec
 import numpy as np
-from scipy import stats
+from scipy.special import ndtri
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import part_of
@@ -97,7 +97,7 @@ class Normal(_Parameter, frozen=True, kw_only=True, tag="normal"):
     sd: float
 
     def at(self, u: Real) -> Real:
-        return self.mean + self.sd * stats.norm.ppf(u)
+        return self.mean + self.sd * ndtri(u)
 
     def faults(self) -> Iterator[str]:
         if not (math.isfinite(self.mean) and 0.0 < self.sd < math.inf):
@@ -109,7 +109,7 @@ class LogNormal(_Parameter, frozen=True, kw_only=True, tag="lognormal"):
     sigma: float
 
     def at(self, u: Real) -> Real:
-        return self.median * np.exp(self.sigma * stats.norm.ppf(u))
+        return self.median * np.exp(self.sigma * ndtri(u))
 
     def faults(self) -> Iterator[str]:
         if not (0.0 < self.median < math.inf and 0.0 < self.sigma < math.inf):
@@ -122,8 +122,9 @@ class Triangular(_Parameter, frozen=True, kw_only=True, tag="triangular"):
     high: float
 
     def at(self, u: Real) -> Real:
-        width = self.high - self.low
-        return stats.triang.ppf(u, (self.mode - self.low) / width, loc=self.low, scale=width)
+        width, rise, fall = self.high - self.low, self.mode - self.low, self.high - self.mode
+        upward, downward = self.low + np.sqrt(u * width * rise), self.high - np.sqrt((1.0 - u) * width * fall)
+        return np.where(u * width < rise, upward, downward)
 
     def faults(self) -> Iterator[str]:
         if not (-math.inf < self.low <= self.mode <= self.high < math.inf and self.low < self.high):

@@ -7,7 +7,6 @@ from collections import Counter
 
 import msgspec
 import numpy as np
-from scipy.stats import mstats
 
 from crosscheck.sampling.run import Sampled
 from flexmb.typing import Real
@@ -126,6 +125,8 @@ def _standard_deviation(values: Real) -> Estimated | None:
 
 def _quantile(values: Real, p: float) -> Estimated:
     """A quantile, with the standard error by Maritz and Jarrett."""
+    from scipy.stats import mstats  # it takes a third of a second, and most commands do without
+
     error = float(mstats.mjci(values, [p])[0]) if len(values) > 2 else math.nan
     return _estimated(float(np.quantile(values, p)), error)
 
