@@ -15,11 +15,12 @@ from rich.console import Console
 from crosscheck.library import find
 from crosscheck.library.case import CaseError
 from crosscheck.records.lock import FolderInUseError, locked
-from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
 from flexmb.output.writing import in_words
 
 EXIT_USAGE = 2
+EXIT_INTERRUPTED = 130  # as shells have it
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -41,7 +42,15 @@ TimeLimit = Annotated[
         "--time-limit", metavar="SECONDS", help=f"Stop what takes longer; default the case's limit or {TIME_LIMIT_S:g}."
     ),
 ]
-Jobs = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Worker processes; by default one per core.")]
+Jobs = Annotated[int | None, typer.Option("--jobs", "-j", min=1, help="Jobs at a time; by default one per core.")]
+SchedulerAddress = Annotated[
+    str,
+    typer.Option(
+        "--scheduler",
+        metavar="ADDRESS",
+        help="`local`, or the address of a Dask scheduler such as tcp://10.0.0.1:8786; docs/sweeps.md tells more.",
+    ),
+]
 Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
@@ -73,6 +82,9 @@ def in_one_line() -> Iterator[None]:
         warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
         try:
             yield
+        except KeyboardInterrupt:
+            console.print(words("interrupted: what was done is recorded, and the same command goes on from there"))
+            raise typer.Exit(EXIT_INTERRUPTED) from None
         except BrokenPipeError:  # the reader of the output has closed it
             raise
         except OSError as error:

@@ -8,7 +8,7 @@ import typer
 
 from crosscheck.cli.common import Jobs, TimeLimit, app, check_limit, console, found, in_one_line
 from crosscheck.library.case import CaseError
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import marked, words
 

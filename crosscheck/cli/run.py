@@ -13,6 +13,7 @@ from crosscheck.cli.common import (
     Jobs,
     Open,
     Out,
+    SchedulerAddress,
     Strict,
     TimeLimit,
     app,
@@ -28,7 +29,8 @@ from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import Choice, write_all
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
+from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.running.sweep import sweep
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
@@ -52,6 +54,7 @@ def run(
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
+    scheduler: SchedulerAddress = LOCAL,
     accept: Annotated[
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
     ] = False,
@@ -90,9 +93,12 @@ def run(
     if idle:
         refuse(idle)
     with sole_writer(out):
+        runs_on = scheduler_at(scheduler)
         with LiveProgress(console) as live:
-            limits = Limits(jobs, time_limit)
-            sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear)
+            sweep(
+                chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=Limits(jobs, time_limit),
+                scheduler=runs_on, listener=live.hear,
+            )  # fmt: skip
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
         _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
 

@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, Out, app, check_limit, console, refuse, sole_writer
-from crosscheck.running.pool import TIME_LIMIT_S, Limits
+from crosscheck.cli.common import Jobs, Out, SchedulerAddress, app, check_limit, console, refuse, sole_writer
+from crosscheck.running.scheduler import TIME_LIMIT_S, Limits
+from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.listings import maps_table
 from flexmb.scene.problems import closest
 
@@ -27,6 +28,7 @@ def stability(
         float | None,
         typer.Option("--time-limit", metavar="SECONDS", help=f"Stop a longer cell; default {TIME_LIMIT_S:g}."),
     ] = None,
+    scheduler: SchedulerAddress = LOCAL,
 ) -> None:
     """
     Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
@@ -54,5 +56,8 @@ def stability(
             refuse(f'no map "{name}": {closest(name, known)}; `crosscheck stability list` shows them')
     with sole_writer(out):
         limits = Limits(jobs, time_limit)
-        code = run_and_draw(console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits)
+        runs_on = scheduler_at(scheduler)
+        code = run_and_draw(
+            console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits, scheduler=runs_on
+        )
     raise typer.Exit(code)

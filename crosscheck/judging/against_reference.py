@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.sizes import sizes
+from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import ComparisonSide
@@ -37,11 +38,15 @@ class ReferenceSignals:
     channels: Mapping[str, Real]
     uncertainties: Mapping[str, float]
 
+    @cached_property
+    def _sizes(self) -> Sizes:
+        return Sizes(tuple(self.channels), self.channels.__getitem__)
+
     def signal(self, channel: str) -> Signal:
         """The channel as a verdict needs it."""
         rows, known = self.channels[channel], self.uncertainties.get(channel, np.inf)
         doubt = Uncertainty(np.full(len(rows), known), known, "stated by the reference")
-        return Signal(rows, doubt, sizes(channel, self.channels))
+        return Signal(rows, doubt, self._sizes.of(channel))
 
 
 def of_stored(reference: StoredReference) -> ReferenceSignals:

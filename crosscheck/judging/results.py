@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
-from crosscheck.judging.sizes import sizes
+from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
-from flexmb.run.channels import family, magnitude
 from flexmb.typing import Real
 
 Key = tuple[str, str, str]  # variant, engine, role
@@ -37,6 +37,11 @@ class Result:
     refinement: tuple[float, float] = (2.0, 2.0)
     _unpacked: dict[int, Real] = field(default_factory=dict, repr=False)
     _estimates: dict[str, Uncertainty] = field(default_factory=dict, repr=False)
+
+    @cached_property
+    def _sizes(self) -> Sizes:
+        """Sizes of the finest run's channels."""
+        return Sizes(tuple(self.finest.channels), self.values)
 
     @property
     def finest(self) -> RunRecord:
@@ -83,8 +88,7 @@ class Result:
         if _without_effect(ladder):
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run)) for run in ladder]
-        size = max(magnitude(name, self.values(name)) for name in self._relatives(channel))
-        return estimate(channel, finest.effort_kind, rungs, finest.evaluations, size)
+        return estimate(channel, finest.effort_kind, rungs, finest.evaluations, self._sizes.magnitude(channel))
 
     def _ladder(self) -> list[RunRecord]:
         """The last efforts of the finest run's method."""
@@ -138,12 +142,7 @@ class Result:
         return self._signal(channel, like.doubt(channel, across))
 
     def _signal(self, channel: str, doubt: Uncertainty) -> Signal:
-        everything = {name: self.values(name) for name in self.finest.channels}
-        return Signal(everything[channel], doubt, sizes(channel, everything))
-
-    def _relatives(self, channel: str) -> list[str]:
-        kin = family(channel)
-        return [name for name in self.finest.channels if family(name) == kin]
+        return Signal(self.values(channel), doubt, self._sizes.of(channel))
 
     def _array(self, packed: Packed) -> Real:
         if id(packed) not in self._unpacked:

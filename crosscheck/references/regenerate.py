@@ -27,7 +27,7 @@ from crosscheck.references.change import beyond_uncertainty, largest_share
 from crosscheck.references.files import knowledge_text, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.plan import sample_times
-from crosscheck.running.pool import BY_DEFAULT, Limits
+from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener
 from flexmb.scene.reading import read_text
 from flexmb.typing import Real

@@ -23,7 +23,7 @@ from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.plan import MAIN
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import Listener, sweep
 from flexmb.run.channels import family, magnitude
 from flexmb.typing import Real

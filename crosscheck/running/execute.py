@@ -116,7 +116,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
     compile_s = time.perf_counter() - start
     for rung, effort in waiting:
         emit(effort.label)
-        full = rung >= rungs - FULLY_STORED
+        full = rung >= rungs - FULLY_STORED and not job.lean
         record = msgspec.structs.replace(
             blank,
             made_by=key,
@@ -134,7 +134,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
 def _key(engine: Engine, version: str, job: Job, rungs: int) -> str:
     """The key of everything that the results depend on, but for scene and effort; see `made_by`."""
     code = made_by({type(engine).__module__, home(job.engine)} - {""})
-    kept = job.kept if rungs > FULLY_STORED else ()
+    kept = job.kept if rungs > FULLY_STORED or job.lean else ()
     return hashlib.sha256(f"{code} {version} {kept}".encode()).hexdigest()[:16]
 
 
@@ -145,7 +145,7 @@ def _run(
     try:
         run = _solved(model, job, scene, effort)
         wall = run.wall_s
-        if run.status == "finished" and wall < SHORT_S:
+        if run.status == "finished" and wall < SHORT_S and not job.lean:
             for _ in range(REPEATS - 1):
                 again = _solved(model, job, scene, effort)
                 _require_the_same(run, again)

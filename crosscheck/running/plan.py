@@ -18,7 +18,7 @@ from crosscheck.library.selection import alone, select
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
 from crosscheck.running.held import held_reference
-from crosscheck.running.pool import TIME_LIMIT_S
+from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
@@ -44,7 +44,8 @@ class Job:
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
     channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
     name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
-    `time_limit_s` it is stopped.
+    `time_limit_s` it is stopped; `expected_s` is what it took the last time, None where nobody knows. A `lean` one is
+    run once, where short runs are repeated for the clock, and stores nothing but `kept`.
     """
 
     case: str
@@ -61,6 +62,13 @@ class Job:
     done: frozenset[Done] = field(default_factory=frozenset)
     error: str = ""
     time_limit_s: float = TIME_LIMIT_S
+    expected_s: float | None = None
+    lean: bool = False
+
+    @property
+    def work(self) -> tuple[str, str, str, str]:
+        """What it is about, whatever its scene and its efforts are."""
+        return (self.case, self.variant, self.role, self.engine)
 
     @property
     def title(self) -> str:

@@ -1,11 +1,9 @@
-"""Running many jobs: plan them, leave out what is already recorded, run the rest in a pool, record as results come.
-
-`run_jobs` of `pool` is the local scheduler; any function with its signature can take its place.
-"""
+"""Running cases: plan their jobs, leave out what is already recorded, run the rest, record as results come."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,8 +14,10 @@ from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
+from crosscheck.running.expected import expected_seconds
 from crosscheck.running.plan import Done, Job, plan
-from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import BY_DEFAULT, Event, Limits, Scheduler
 
 PROVIDER = "crosscheck.engines.registry:engines"
 Listener = Callable[[Sequence[Job], Event], None]
@@ -31,27 +31,34 @@ def sweep(
     fresh: bool = False,
     provider: str = PROVIDER,
     limits: Limits = BY_DEFAULT,
+    scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
     """Run cases and append to the file `records`; what it already holds is confirmed, not run again, unless `fresh`.
 
     What it holds counts where scene, effort and all that made it are the same (`made_by`). `asked` are the engines
     (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own limit of
-    time. `listener` hears every event, with the list of jobs.
+    time. `listener` hears every event, with the list of jobs. However this ends, by Ctrl-C or by an error of the
+    scheduler, the records are whole, and the next call goes on from there.
     """
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
     plans = [plan(case, asked, provider, limits.time_s) for case in cases]
-    jobs = [replace(job, done=_done(known, job)) for _, planned in plans for job in planned]
-    archive = Archive(records)
-    try:
+    took = expected_seconds(known)
+    jobs = [
+        replace(job, done=_done(known, job), expected_s=took.get(job.work)) for _, planned in plans for job in planned
+    ]
+    log = str(records.with_suffix(".log"))
+    doing: dict[int, str] = {}
+    with (
+        closing(Archive(records)) as archive,
+        closing(scheduler(execute, jobs, limits.workers, log, _engine, _time_limit, limits.memory_bytes)) as events,
+    ):
         archive.write(environment(tuple(record.case for record, _ in plans), asked, confirms=True))
         for record, _ in plans:
             archive.write(record)
-        log = str(records.with_suffix(".log"))
-        doing: dict[int, str] = {}
-        for event in run_jobs(execute, jobs, limits.processes, log, _engine, _time_limit, limits.memory_bytes):
+        for event in events:
             if isinstance(event.content, RunRecord | Confirmed):
                 archive.write(event.content)
             elif event.kind == "emitted":
@@ -60,8 +67,6 @@ def sweep(
                 event = replace(event, content=f"{event.content}, while at {doing.get(event.job, 'its start')}")
                 archive.write(_cut_short(jobs[event.job], event))
             listener(jobs, event)
-    finally:
-        archive.close()
 
 
 def _engine(job: Job) -> str:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
+from contextlib import closing
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -14,7 +15,18 @@ from crosscheck.engines.answers import clean
 from crosscheck.engines.contract import EngineMissing
 from crosscheck.records.archive import Archive
 from crosscheck.records.machine import environment
-from crosscheck.running.pool import BY_DEFAULT, Event, Limits, run_jobs
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import (
+    BY_DEFAULT,
+    TIME_LIMIT_S,
+    Event,
+    Events,
+    Function,
+    Limits,
+    Scheduler,
+    one_kind,
+    usual_limit,
+)
 from crosscheck.stability.boundary import MapVerdict, judge, label
 from crosscheck.stability.map import Measurement, StabilityMap
 from crosscheck.stability.map_records import CellRecord, MapRecord, Written, cells_of, identity, read
@@ -22,7 +34,6 @@ from crosscheck.stability.refine import Cell, CellMesh
 
 PROVIDER = "crosscheck.stability.catalogue:stability_maps"
 Listener = Callable[[StabilityMap, int, int], None]
-Scheduler = Callable[..., Iterator[Event]]
 
 
 class CellJob(NamedTuple):
@@ -89,14 +100,16 @@ def run_map(
             return mesh.settle((record.cell, label(what, record)) for record in found)
 
         ask(sorted(mesh.waiting))
-        time_s = limits.time_s
-        limit = {} if time_s is None else {"time_limit_s": lambda job: time_s}
+        time_s = TIME_LIMIT_S if limits.time_s is None else limits.time_s
         log = str(records.with_suffix(".log"))
-        for event in scheduler(run_cell, jobs, limits.processes, log, **limit):
-            if event.kind in ("emitted", "crashed", "stopped"):
-                record = event.content if event.kind == "emitted" else _cut_short(jobs[event.job], event)
-                archive.write(record)
-                ask(take([record]))
+        with closing(
+            scheduler(run_cell, jobs, limits.workers, log, one_kind, lambda job: time_s, limits.memory_bytes)
+        ) as events:
+            for event in events:
+                if event.kind in ("emitted", "crashed", "stopped"):
+                    record = event.content if event.kind == "emitted" else _cut_short(jobs[event.job], event)
+                    archive.write(record)
+                    ask(take([record]))
     finally:
         archive.close()
     return Finished(what, mesh, used, judge(what, mesh, used))
@@ -141,9 +154,15 @@ def _cut_short(job: CellJob, event: Event) -> CellRecord:
 
 
 def run_here(
-    function: Callable[..., None], jobs: Sequence[Any], workers: int, log: str
-) -> Iterator[Event]:
-    """A scheduler without processes: one job after the other, here."""
+    function: Function,
+    jobs: Sequence[Any],
+    workers: int | None,
+    log: str,
+    kind: Callable[[Any], str] = one_kind,
+    time_limit_s: Callable[[Any], float] = usual_limit,
+    memory_limit_bytes: float | None = None,
+) -> Events:
+    """A scheduler without processes and limits: one job after the other, here."""
     number = 0
     while number < len(jobs):
         found: list[Any] = []

@@ -11,8 +11,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn
 from rich.text import Text
 
 from crosscheck.records.kinds import RunRecord
+from crosscheck.running.expected import Remaining
 from crosscheck.running.plan import Job
-from crosscheck.running.pool import Event
+from crosscheck.running.scheduler import Event
+from crosscheck.terminal.time_left import TimeLeft
 from flexmb.output.printable import printable
 
 MARKS = {
@@ -36,10 +38,13 @@ class LiveProgress:
             BarColumn(bar_width=24),
             MofNCompleteColumn(),
             TimeElapsedColumn(),
+            TimeLeft(),
             console=console,
             transient=True,
         )
         self._overall: TaskID | None = None
+        self._remaining = Remaining()
+        self._begin = 0.0
         self._lines: dict[int, TaskID] = {}
         self._records: dict[int, list[RunRecord]] = {}
         self._started: dict[int, float] = {}
@@ -55,6 +60,8 @@ class LiveProgress:
         """Show one event."""
         if self._overall is None:
             self._overall = self._progress.add_task("all runs", total=len(jobs))
+            self._remaining.expect((number, job.expected_s) for number, job in enumerate(jobs))
+            self._begin = time.monotonic()
         title = printable(jobs[event.job].title)
         if event.kind == "started":
             self._started[event.job] = time.perf_counter()
@@ -66,7 +73,10 @@ class LiveProgress:
             self._progress.update(self._lines[event.job], description=f"{title}: {printable(event.content)}")
         elif event.kind != "emitted":
             self._progress.remove_task(self._lines.pop(event.job))
-            self._progress.advance(self._overall)
+            self._remaining.ended(event.job)
+            now = time.monotonic()
+            seconds = self._remaining.seconds(now - self._begin)
+            self._progress.update(self._overall, advance=1, ends_at=None if seconds is None else now + seconds)
             self._progress.console.print(self._ending(title, event))
 
     def _ending(self, title: str, event: Event) -> Text:

@@ -6,10 +6,18 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, MofNCompleteColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 from rich.text import Text
 
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
@@ -20,13 +28,13 @@ from flexmb.output.writing import folder, writing
 
 def run_and_draw(
     console: Console, names: Sequence[str], out: Path, pictures: Path, *, depth: int | None, fresh: bool,
-    limits: Limits,
+    limits: Limits, scheduler: Scheduler,
 ) -> int:  # fmt: skip
     """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
     verdicts = []
     folder(pictures)
     for name in names:
-        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, limits)
+        done = _run(console, name, out / f"{name}.jsonl", depth, fresh, limits, scheduler)
         with writing(pictures):
             picture = draw(done, pictures / f"{name}.svg")
             verdicts.append(done.verdict)
@@ -39,18 +47,20 @@ def run_and_draw(
 
 
 def _run(
-    console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits
+    console: Console, name: str, records: Path, depth: int | None, fresh: bool, limits: Limits, scheduler: Scheduler
 ) -> Finished:
     with Progress(
         SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), MofNCompleteColumn(),
-        TimeElapsedColumn(), console=console, transient=True,
+        TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True,
     ) as progress:  # fmt: skip
         task = progress.add_task(name, total=None)
 
         def hear(what: StabilityMap, done: int, known: int) -> None:
             progress.update(task, completed=done, total=known, description=f"{name}: cells known so far")
 
-        return run_map(name, records, depth=depth, fresh=fresh, limits=limits, listener=hear)
+        return run_map(
+            name, records, depth=depth, fresh=fresh, limits=limits, scheduler=scheduler, listener=hear
+        )
 
 
 def _line(done: Finished, picture: Path) -> Text:

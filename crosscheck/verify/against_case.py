@@ -26,7 +26,7 @@ from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import current_reference, has_reference
 from crosscheck.records.archive import read
 from crosscheck.running.plan import MAIN, sample_times, variant_scene
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, sweep
 from crosscheck.verify.causes import likely_cause
 from crosscheck.verify.columns import Columns, VerifyError, read_columns, short_names

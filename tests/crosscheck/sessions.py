@@ -16,7 +16,7 @@ from crosscheck.records.machine import environment
 from crosscheck.records.session import last_session
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 
 CASE = Path(__file__).parent / "data" / "pendulum" / "single"

@@ -32,7 +32,7 @@ from crosscheck.report.ci import write_junit, write_summary
 from crosscheck.report.html import embedded
 from crosscheck.running.installed import EngineState
 from crosscheck.running.plan import plan
-from crosscheck.running.pool import Event
+from crosscheck.running.scheduler import Event
 from crosscheck.terminal.listings import cases_table, engines_table
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.verdicts import print_outcome

@@ -25,7 +25,7 @@ from crosscheck.records.session import last_session, standing
 from crosscheck.records.sources import sources
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, scene_identity
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, sweep
 from tests.crosscheck.sessions import CASE, copy_case
 
@@ -43,7 +43,7 @@ WITHOUT_PART = {
     "crosscheck.records.held": "holds the stored reference, which is made of other runs",
     "crosscheck.running.held": "holds the stored reference, which is made of other runs",
     "flexmb.output.writing": "says what is wrong with a folder",
-    "crosscheck.running.pool": "hands out jobs",
+    "crosscheck.running.scheduler": "says what a scheduler is",
     "crosscheck.running.processes": "ends processes",
     "crosscheck.records.made_by": "makes the key",
     "crosscheck.records.sources": "makes the key",

@@ -14,7 +14,7 @@ from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES, current_reference, load_reference
 from crosscheck.references.regenerate import Regenerated
 from crosscheck.references.regenerate import regenerate as make_again
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here
 

@@ -18,7 +18,7 @@ from crosscheck.report import SessionOutcome, write_all
 from crosscheck.report.html import _code, _transformation
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
 

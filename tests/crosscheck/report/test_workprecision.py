@@ -12,7 +12,7 @@ from crosscheck.library.find import load_case
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record, RunRecord
 from crosscheck.report.workprecision import WorkPrecision, work_precision
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import PROVIDER, copy_case
 

@@ -11,8 +11,10 @@ from pathlib import Path
 import psutil
 import pytest
 
-from crosscheck.running.pool import LOG_LIMIT_BYTES, TICK_S, Event, run_jobs
+from crosscheck.running.pool import run_jobs
 from crosscheck.running.processes import memory_limit
+from crosscheck.running.scheduler import Event
+from crosscheck.running.worker import LOG_LIMIT_BYTES, TICK_S
 
 
 def work(job: str, emit: Callable[[object], None]) -> None:

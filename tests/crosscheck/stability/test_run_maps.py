@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from crosscheck import cli
 from crosscheck.records import made_by
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.stability import run
 from crosscheck.stability.boundary import judge
 from crosscheck.stability.catalogue import stability_maps
@@ -129,8 +129,8 @@ def test_a_run_that_was_killed_goes_on_where_it_was(tmp_path: Path, monkeypatch:
         seen.append(1)
         run.run_cell(job, emit)
 
-    def scheduler(function, jobs, workers, log):
-        return run_here(counting, jobs, workers, log)
+    def scheduler(function, *words):
+        return run_here(counting, *words)
 
     again = run_map("circle", tmp_path / "cut.jsonl", provider=PROVIDER, scheduler=scheduler)
     assert len(seen) == len(whole.records) - known > 0

@@ -9,7 +9,7 @@ from rich.console import Console
 
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.plan import MAIN, Job
-from crosscheck.running.pool import Event
+from crosscheck.running.scheduler import Event
 from crosscheck.terminal.live import LiveProgress
 
 

@@ -1,0 +1,184 @@
+"""A worker: a process that does one job after the other, told over a pipe, and watched from outside.
+
+It is a fresh ("spawn") process in a session of its own. It serves one kind of jobs, so that nothing which an engine
+leaves behind in its process (folder, environment, warnings, threads) reaches another engine. A job that exceeds its
+time or its worker its memory is stopped, and whatever the worker started ends with it.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from math import inf
+from multiprocessing import get_context
+from multiprocessing.connection import Connection
+from multiprocessing.process import BaseProcess
+from typing import Any
+
+from crosscheck.running.processes import end
+from crosscheck.running.scheduler import Event, Function
+
+START_LIMIT_S = 120.0  # for a worker to start and to read its job
+TICK_S = 0.25
+LOG_LIMIT_BYTES = 64 * 2**20
+THREAD_LIMITS = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS")
+KERNELS = "FLEXMB_KERNELS"  # flexmb's, which compiles for what a scene contains unless it is "general"
+STDIN, STDOUT, STDERR = 0, 1, 2
+_environment = threading.Lock()  # held while it is changed for a process that is started
+
+
+class Worker:
+    """A place for a process, which it gets with its first job and again when it has lost it.
+
+    `job` is the number of the job at work, None when idle, and `kind` the kind that the process serves.
+    """
+
+    def __init__(self) -> None:
+        self.job: int | None = None
+        self.kind = ""
+        self.pipe: Connection | None = None
+        self._process: BaseProcess | None = None
+        self._deadline = inf
+        self._limit_s = inf
+
+    @property
+    def pid(self) -> int:
+        """Of its process, 0 where it has none."""
+        return 0 if self._process is None else self._process.pid or 0
+
+    def hand_out(self, number: int, job: Any, kind: str, function: Function, log: str, limit_s: float) -> None:
+        """Send it a job; it gets a new process if it has none alive, or one that served another kind."""
+        if self._process is None or self.kind != kind or not self._process.is_alive():
+            self.dismiss()
+            self._start(function, log)
+        self.job, self.kind, self._limit_s = number, kind, limit_s
+        self._deadline = time.monotonic() + START_LIMIT_S
+        assert self.pipe is not None
+        with suppress(BrokenPipeError):  # a worker that died before its first job is reported when it is read
+            self.pipe.send(job)
+
+    def news(self, ready: bool, held: Mapping[int, int], memory_bytes: float) -> Event | None:
+        """What happened, None where it is just at work; `ready` says that its pipe has something to read.
+
+        `held` is the memory of processes by pid, as far as it was measured. After the last event of its job the worker
+        is free, and without its process where that did not end well.
+        """
+        event = self._receive() if ready else self._watch(held, memory_bytes)
+        if event is not None and event.kind != "emitted":
+            self.job = None
+            if event.kind != "ended":
+                self.dismiss()
+        return event
+
+    def kill(self) -> None:
+        """End its process and all that this started, from another thread than the one that listens: it hears of it."""
+        if self._process is not None:
+            end(self._process)
+
+    def dismiss(self) -> None:
+        """End its process and all that this started."""
+        if self._process is not None and self.pipe is not None:
+            self.pipe.close()
+            end(self._process)
+        self._process = self.pipe = None
+
+    def _start(self, function: Function, log: str) -> None:
+        """Get a process; the thread limits are set in the environment it inherits, before it imports anything."""
+        context = get_context("spawn")
+        here, there = context.Pipe()
+        process = context.Process(target=_serve, args=(there, function, log), daemon=True)
+        with _environment:
+            its_own = dict.fromkeys(THREAD_LIMITS, "1") | {KERNELS: os.environ.get(KERNELS, "general")}
+            before = {name: os.environ.get(name) for name in its_own}
+            os.environ.update(its_own)
+            try:
+                process.start()
+            finally:
+                for name, value in before.items():
+                    if value is None:
+                        del os.environ[name]
+                    else:
+                        os.environ[name] = value
+        there.close()
+        self._process, self.pipe = process, here
+
+    def _receive(self) -> Event | None:
+        """What it says; None where it says that it has begun, from when its time counts."""
+        assert self.job is not None and self.pipe is not None
+        try:
+            kind, content = self.pipe.recv()
+        except (EOFError, OSError):
+            return self._death()
+        except Exception as error:  # what an engine wrote into the pipe, or an object that cannot be made here
+            return Event(self.job, "crashed", f"the worker process sent what cannot be read ({type(error).__name__})")
+        if kind == "begun":
+            self._deadline = time.monotonic() + self._limit_s
+            return None
+        return Event(self.job, kind, content)
+
+    def _watch(self, held: Mapping[int, int], memory_bytes: float) -> Event | None:
+        """The event that ends its job where it is silent because it is dead, or exceeds a limit."""
+        assert self.job is not None and self._process is not None and self.pipe is not None
+        if time.monotonic() > self._deadline:
+            return Event(self.job, "stopped", f"it was stopped at its limit of {self._limit_s:g} s")
+        memory = held.get(self.pid, 0)
+        if memory > memory_bytes:
+            sizes = f"{memory / 1e9:.3g} GB of memory where {memory_bytes / 1e9:.3g} GB are its part"
+            return Event(self.job, "stopped", f"it was stopped when it held {sizes}; fewer --jobs leave more to each")
+        if not self._process.is_alive() and not self.pipe.poll():  # what it started may hold its pipe open
+            return self._death()
+        return None
+
+    def _death(self) -> Event:
+        assert self.job is not None and self._process is not None
+        patience = time.monotonic() + TICK_S
+        while self._process.exitcode is None and time.monotonic() < patience:  # `join` waits for ever if it lives on
+            time.sleep(0.01)
+        code = self._process.exitcode
+        how = "closed its pipe" if code is None else f"died (exit code {code})"
+        return Event(self.job, "crashed", f"the worker process {how}")
+
+
+def keep_short(log: str) -> None:
+    """Empty a log that has become too long; workers append, so they go on at its new end."""
+    with suppress(OSError):
+        if os.path.getsize(log) > LOG_LIMIT_BYTES:
+            os.truncate(log, 0)
+
+
+def _serve(pipe: Connection, function: Function, log: str) -> None:
+    """A worker's life: jobs in, events out, until the pipe closes or the parent is gone."""
+    if hasattr(os, "setsid"):
+        os.setsid()  # Ctrl-C is for the parent, which ends its workers; and a group can be ended as a whole
+    with open(log, "ab", buffering=0) as stream, open(os.devnull, "rb") as nothing:
+        os.dup2(nothing.fileno(), STDIN)
+        os.dup2(stream.fileno(), STDOUT)
+        os.dup2(stream.fileno(), STDERR)
+    me = os.getpid()
+    threading.Thread(target=_end_with, args=(os.getppid(),), daemon=True).start()
+
+    def send(kind: str, content: Any = None) -> None:
+        if os.getpid() != me:  # a process that a job forked and that came back out of it
+            os._exit(1)
+        pipe.send((kind, content))
+
+    with suppress(EOFError):
+        while True:
+            job = pipe.recv()
+            send("begun")
+            try:
+                function(job, lambda content: send("emitted", content))
+            except BaseException as error:
+                send("crashed", f"{type(error).__name__} ended the worker process: {error}")
+                raise
+            send("ended")
+
+
+def _end_with(parent: int) -> None:
+    """End this process when the parent is gone: who is killed cannot dismiss its workers."""
+    while os.getppid() == parent:
+        time.sleep(1.0)
+    os._exit(1)

@@ -1,0 +1,203 @@
+"""Running a sweep: samples become jobs of a scheduler; each outcome is recorded as it comes, and none counts twice."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Callable
+from contextlib import closing
+from dataclasses import dataclass
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from crosscheck.engines.answers import clean
+from crosscheck.engines.contract import Effort
+from crosscheck.engines.registry import COMPILED_LIKE
+from crosscheck.library.case import CaseError, Variant
+from crosscheck.library.find import resolve
+from crosscheck.records.archive import Archive, decoded_lines
+from crosscheck.records.kinds import Confirmed
+from crosscheck.records.machine import environment
+from crosscheck.records.made_by import made_by
+from crosscheck.running.plan import MAIN, Done, Job, sample_times, scene_identity
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import BY_DEFAULT, TIME_LIMIT_S, Event, Limits, Scheduler
+from crosscheck.running.sweep import PROVIDER
+from crosscheck.sampling.file import SweepFile, load_sweep
+from crosscheck.sampling.points import sample_values
+from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
+from crosscheck.sampling.scenes import with_values
+from crosscheck.sampling.table import SamplesTable
+from flexmb.scene.files import load_scene
+from flexmb.scene.problems import closest
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+RECORDS, TABLE = "samples.jsonl", "samples.csv"
+REDUCING = ("crosscheck.sampling.quantities",)
+Listener = Callable[[int, int, int], None]  # how many samples are done, of how many, and how many have no result
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What is varied: a scene before its variant's transformation, and when it is sampled (s)."""
+
+    base: Scene
+    variant: Variant
+    times: Real
+
+
+@dataclass(frozen=True)
+class Sampled:
+    """A sweep that was run: the outcome of every sample in every engine, in order."""
+
+    sweep: SweepFile
+    records: tuple[SampleRecord, ...]
+
+
+def run_sweep(
+    file: Path,
+    out: Path,
+    *,
+    fresh: bool = False,
+    provider: str = PROVIDER,
+    limits: Limits = BY_DEFAULT,
+    scheduler: Scheduler = run_jobs,
+    listener: Listener = lambda done, known, lost: None,
+) -> Sampled:
+    """Run the sweep of a file; records go to `samples.jsonl` in the folder `out`, and a table to `samples.csv`.
+
+    Samples that are recorded with the same values, quantities, sources and machine are not run again unless `fresh`.
+    Raises CaseError where the file, or a path or a channel in it, makes no sense, before anything runs.
+    """
+    sweep = load_sweep(file)
+    subject = _subject(sweep, file.parent)
+    values = sample_values(sweep)
+    _require_sense(sweep, subject, values)
+    records = out / RECORDS
+    if fresh:
+        records.unlink(missing_ok=True)
+    known = _known(records)
+    jobs = _jobs(sweep, subject, values, known, provider, limits.time_s or TIME_LIMIT_S)
+    used: dict[int, SampleRecord] = {}
+    with (
+        closing(Archive(records, Written)) as archive,
+        closing(SamplesTable(out / TABLE, sweep)) as table,
+        closing(
+            scheduler(
+                run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes
+            )
+        ) as events,
+    ):
+        archive.write(environment())
+        for event in events:
+            record = _outcome(jobs[event.job], event, known)
+            if record is None:
+                continue
+            if not isinstance(event.content, Confirmed):
+                archive.write(record)
+            table.add(record)
+            used[event.job] = record
+            listener(len(used), len(jobs), sum(each.status != "finished" for each in used.values()))
+    return Sampled(sweep, tuple(used.get(number, job.blank) for number, job in enumerate(jobs)))
+
+
+def _subject(sweep: SweepFile, folder: Path) -> Subject:
+    if sweep.scene:
+        assert sweep.duration_s is not None and sweep.samples is not None  # as the rules of the file demand
+        times = np.linspace(0.0, sweep.duration_s, sweep.samples)
+        return Subject(load_scene(folder / sweep.scene), Variant(name="scene", engines=sweep.engines), times)
+    beside = folder / sweep.case
+    cases = resolve((str(beside) if (beside / "run.toml").is_file() else sweep.case,))
+    if len(cases) != 1:
+        raise CaseError(f'"{sweep.case}" names {len(cases)} cases: name one')
+    run = cases[0].run
+    names = [variant.name for variant in run.variants]
+    if sweep.variant and sweep.variant not in names:
+        raise CaseError(f'case {cases[0].name} has no variant "{sweep.variant}": {closest(sweep.variant, names)}')
+    variant = run.variant(sweep.variant or names[0])
+    timed = msgspec.structs.replace(
+        variant, duration_s=sweep.duration_s or variant.duration_s, samples=sweep.samples or variant.samples
+    )
+    return Subject(cases[0].scene(variant), variant, sample_times(run, timed))
+
+
+def _require_sense(sweep: SweepFile, subject: Subject, values: Real) -> None:
+    """Every path leads to a number, and every marker that a quantity names is there."""
+    with_values(subject.base, sweep, values[0])
+    markers = [marker.name for marker in subject.base.markers]
+    for quantity in sweep.quantities:
+        kind, _, rest = quantity.channel.partition(":")
+        marker = rest.rpartition(".")[0]
+        if kind == "marker" and marker not in markers:
+            raise CaseError(f'quantity "{quantity.name}": no marker "{marker}": {closest(marker, markers)}')
+
+
+def _jobs(
+    sweep: SweepFile, subject: Subject, values: Real, known: dict[tuple[str, ...], SampleRecord], provider: str,
+    time_limit_s: float,
+) -> list[SampleJob]:  # fmt: skip
+    asked = _digest(msgspec.json.encode(sweep.quantities), made_by((), REDUCING))
+    what = [(parameter.paths, parameter.relative) for parameter in sweep.parameters]
+    base = _digest(scene_identity(subject.base, subject.times), msgspec.json.encode(subject.variant), what)
+    found = []
+    for sample, row in enumerate(values):
+        scene_id = _digest(base, row.tolist())
+        for engine in sweep.engines:
+            done = known.get((engine, scene_id, asked))
+            job = Job(
+                case=sweep.title, variant=subject.variant.name, role=MAIN, engine=engine, scene=None, scene_id=scene_id,
+                times=subject.times, provider=provider, efforts=_effort(sweep, engine), finest_only=True,
+                kept=tuple(quantity.channel for quantity in sweep.quantities), done=_done(done),
+                time_limit_s=time_limit_s, lean=True,
+            )  # fmt: skip
+            found.append(SampleJob(job, sample, tuple(row.tolist()), sweep, subject.base, subject.variant, asked))
+    return found
+
+
+def _effort(sweep: SweepFile, engine: str) -> tuple[Effort, ...]:
+    return tuple(Effort(each.kind, each.value, each.method) for each in sweep.efforts if each.engine == engine)
+
+
+def _known(records: Path) -> dict[tuple[str, ...], SampleRecord]:
+    """The latest recorded outcome by engine, scene and quantities."""
+    found = decoded_lines(records, Written) if records.exists() else []
+    return {
+        (record.engine, record.scene, record.asked): record for record in found if isinstance(record, SampleRecord)
+    }
+
+
+def _done(record: SampleRecord | None) -> frozenset[Done]:
+    """What lets a job be confirmed: only a run that went as far as it goes."""
+    if record is None or record.status not in ("finished", "diverged"):
+        return frozenset()
+    return frozenset((Done(record.effort, record.made_by, record.rungs - 1, record.rungs),))
+
+
+def _outcome(
+    job: SampleJob, event: Event, known: dict[tuple[str, ...], SampleRecord]
+) -> SampleRecord | None:
+    """The record of a sample, if the event is its outcome."""
+    if isinstance(event.content, SampleRecord):
+        return event.content
+    if isinstance(event.content, Confirmed):
+        record = known[job.job.engine, job.job.scene_id, job.asked]
+        return msgspec.structs.replace(record, sample=job.sample, parameters=job.blank.parameters)
+    if event.kind in ("crashed", "stopped"):
+        status = "crashed" if event.kind == "crashed" else "did not finish"
+        return msgspec.structs.replace(job.blank, status=status, message=clean(event.content))
+    return None
+
+
+def _kind(job: SampleJob) -> str:
+    """A worker stays with one engine."""
+    return COMPILED_LIKE.get(job.job.engine, job.job.engine)
+
+
+def _time_limit(job: SampleJob) -> float:
+    return job.job.time_limit_s
+
+
+def _digest(*parts: object) -> str:
+    return hashlib.sha256(repr(parts).encode()).hexdigest()[:16]

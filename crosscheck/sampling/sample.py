@@ -1,0 +1,108 @@
+"""One sample in a worker: its scene is made, run by one engine, and reduced to the quantities."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import msgspec
+
+from crosscheck.library.case import Variant
+from crosscheck.records.kinds import BrokenLine, Confirmed, Environment, RunRecord, RunStatus
+from crosscheck.records.packing import unpack
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import Job, variant_scene
+from crosscheck.sampling.file import SweepFile
+from crosscheck.sampling.quantities import reduce
+from crosscheck.sampling.scenes import with_values
+from flexmb.scene.check import check_scene
+from flexmb.scene.schema import Scene
+
+
+class SampleRecord(
+    msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True, tag_field="record", tag="sample"
+):
+    """The outcome of one sample in one engine; `quantities` are there when it is "finished".
+
+    `scene` identifies the scene with its values and the sample times, `asked` the quantities and how they are found,
+    `made_by` everything else that the result depends on, as of a RunRecord.
+    """
+
+    sample: int
+    engine: str
+    scene: str
+    asked: str
+    status: RunStatus
+    version: str = ""
+    made_by: str = ""
+    effort: str = ""
+    rungs: int = 0
+    message: str = ""
+    parameters: dict[str, float]
+    quantities: dict[str, float] = {}
+    compile_s: float = 0.0
+    wall_s: float = 0.0
+
+
+Written = Environment | SampleRecord
+Read = Written | BrokenLine
+
+
+@dataclass(frozen=True)
+class SampleJob:
+    """A sample as it is sent to a worker: `job` without its scene, which is made of `base` there."""
+
+    job: Job
+    sample: int
+    values: tuple[float, ...]
+    sweep: SweepFile
+    base: Scene
+    variant: Variant
+    asked: str
+
+    @property
+    def blank(self) -> SampleRecord:
+        """The record of a sample without a result."""
+        names = [parameter.title for parameter in self.sweep.parameters]
+        return SampleRecord(
+            sample=self.sample, engine=self.job.engine, scene=self.job.scene_id, asked=self.asked,
+            status="did not run", parameters=dict(zip(names, self.values, strict=True)),
+        )  # fmt: skip
+
+
+def run_sample(sample: SampleJob, emit: Callable[[Any], None]) -> None:
+    """The work of a worker: a SampleRecord, or a Confirmed where the recorded one stands."""
+
+    def reduced(found: RunRecord | Confirmed | str) -> None:
+        if isinstance(found, RunRecord):
+            emit(_reduced(sample, found))
+        elif isinstance(found, Confirmed):
+            emit(found)
+
+    execute(_with_scene(sample), reduced)
+
+
+def _with_scene(sample: SampleJob) -> Job:
+    """The job with its scene, or with the reason why there is none: values can make a scene impossible."""
+    try:
+        scene = variant_scene(with_values(sample.base, sample.sweep, sample.values), sample.variant)
+        check_scene(scene, t_end=float(sample.job.times[-1]))
+    except (ValueError, NotImplementedError, OSError) as error:
+        return replace(sample.job, error=str(error))
+    return replace(sample.job, scene=scene)
+
+
+def _reduced(sample: SampleJob, run: RunRecord) -> SampleRecord:
+    record = msgspec.structs.replace(
+        sample.blank, status=run.status, message=run.message, version=run.version, made_by=run.made_by,
+        effort=run.effort, rungs=run.rungs, compile_s=run.compile_s, wall_s=run.wall_s,
+    )  # fmt: skip
+    if run.status != "finished":
+        return record
+    channels = {name: unpack(packed) for name, packed in run.channels.items()}
+    try:
+        found = {quantity.name: reduce(quantity, channels) for quantity in sample.sweep.quantities}
+    except ValueError as error:
+        return msgspec.structs.replace(record, status="failed", message=str(error))
+    return msgspec.structs.replace(record, quantities=found)

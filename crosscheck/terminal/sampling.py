@@ -1,0 +1,90 @@
+"""A sweep on the terminal: a bar while it runs, a table of its statistics, and what gave no result."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Column, Table
+
+from crosscheck.sampling.statistics import Distribution, Estimated, SweepSummary
+from crosscheck.terminal.text import marked, words
+
+QUANTILES = {"0.05": "5 %", "0.5": "median", "0.95": "95 %"}
+SHOWN = 5  # failures; summary.json has all
+
+
+@contextmanager
+def sampling_bar(console: Console) -> Iterator[Callable[[int, int, int], None]]:
+    """A listener that moves a bar."""
+    with Progress(
+        SpinnerColumn(), TextColumn("{task.description}", markup=False), BarColumn(bar_width=24), MofNCompleteColumn(),
+        TimeElapsedColumn(), TimeRemainingColumn(), console=console, transient=True,
+    ) as progress:  # fmt: skip
+        task = progress.add_task("samples", total=None)
+
+        def hear(done: int, known: int, lost: int) -> None:
+            without = f", {lost} without a result" if lost else ""
+            progress.update(task, completed=done, total=known, description=f"samples{without}")
+
+        yield hear
+
+
+def print_summary(console: Console, summary: SweepSummary) -> None:
+    """Statistics with their standard errors, and failures."""
+    console.print(_table(summary))
+    for failure in summary.failures[:SHOWN]:
+        place = ", ".join(f"{name} = {value:g}" for name, value in failure.parameters.items())
+        what = " ".join(failure.message.split())
+        text = f"sample {failure.sample} in {failure.engine} ({place}): {failure.status}: {what}"
+        console.print(marked("✕", "red", text), soft_wrap=True)
+    if len(summary.failures) > SHOWN:
+        console.print(words(f"... and {len(summary.failures) - SHOWN} more without a result"))
+    counts = ", ".join(f"{count} {status}" for status, count in summary.statuses.items())
+    console.print(words(f"{summary.samples} samples: {counts}", "bold green" if summary.ok else "bold red"))
+
+
+def _table(summary: SweepSummary) -> Table:
+    value, error = Column("value", justify="right"), Column("standard error", justify="right")
+    table = Table("quantity", "in", value, error, box=SIMPLE_HEAD, header_style="bold")
+    several = len({each.engine for each in summary.distributions}) > 1
+    for each in summary.distributions:
+        name = f"{each.quantity} · {each.engine}" if several else each.quantity
+        for statistic, number, its_error in _lines(each):
+            table.add_row(words(name), words(statistic), words(number), words(its_error))
+            name = ""
+        table.add_section()
+    return table
+
+
+def _lines(each: Distribution) -> Iterator[tuple[str, str, str]]:
+    """Statistic, value, standard error."""
+    estimates = [("mean", each.mean), ("standard deviation", each.sd)]
+    estimates += [(QUANTILES.get(p, p), quantile) for p, quantile in each.quantiles.items()]
+    for name, estimate in estimates:
+        if estimate is not None:
+            error = estimate.standard_error
+            yield name, _digits(estimate), "" if error is None else f"{error:.2g}"
+    yield f"lowest, sample {each.lowest_at}", f"{each.lowest:.7g}", ""
+    yield f"highest, sample {each.highest_at}", f"{each.highest:.7g}", ""
+
+
+def _digits(estimate: Estimated) -> str:
+    """An estimate in the digits that its standard error leaves it."""
+    value, error = estimate.value, estimate.standard_error
+    if not error or not value:
+        return f"{value:.7g}"
+    count = math.floor(math.log10(abs(value))) - math.floor(math.log10(error)) + 2
+    return f"{value:.{min(max(count, 2), 15)}g}"

@@ -1,0 +1,27 @@
+"""A column of a progress bar: about how long it will still take."""
+
+from __future__ import annotations
+
+import time
+
+from rich.progress import ProgressColumn, Task
+from rich.text import Text
+
+
+class TimeLeft(ProgressColumn):
+    """Time to the moment in a task's field `ends_at` (s, of `time.monotonic`); nothing where it has none."""
+
+    max_refresh = 0.5
+
+    def render(self, task: Task) -> Text:
+        ends_at: float | None = task.fields.get("ends_at")
+        return Text("" if ends_at is None else f"about {in_words(ends_at - time.monotonic())} left", "cyan")
+
+
+def in_words(seconds: float) -> str:
+    """A duration, as roughly as an estimate deserves; the least is a second."""
+    seconds = max(seconds, 1.0)
+    for unit, size in (("h", 3600.0), ("min", 60.0)):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.1f} {unit}" if seconds < 9.5 * size else f"{seconds / size:.0f} {unit}"
+    return f"{seconds:.0f} s"
