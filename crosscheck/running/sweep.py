@@ -13,7 +13,7 @@ from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import COMPILED_LIKE
 from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
-from crosscheck.records.kinds import Confirmed, Record, RunRecord
+from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import Done, Job, plan
@@ -39,10 +39,23 @@ def sweep(
     (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own limit of
     time. `listener` hears every event, with the list of jobs.
     """
+    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
+    run_planned(plans, asked, records, fresh=fresh, limits=limits, listener=listener)
+
+
+def run_planned(
+    plans: Sequence[tuple[CaseRecord, list[Job]]],
+    asked: tuple[str, ...],
+    records: Path,
+    *,
+    fresh: bool = False,
+    limits: Limits = BY_DEFAULT,
+    listener: Listener = lambda jobs, event: None,
+) -> None:
+    """Run cases that are planned already, as `sweep` does: what is recorded is confirmed, the rest run and appended."""
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
-    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
     jobs = [replace(job, done=_done(known, job)) for _, planned in plans for job in planned]
     archive = Archive(records)
     try:

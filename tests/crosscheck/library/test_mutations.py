@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 from crosscheck.library.case import CaseError, MutationKind
-from crosscheck.library.controls import mutate
+from crosscheck.library.mutations import mutate
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
 from flexmb.scene.schema import Scene, Wheel

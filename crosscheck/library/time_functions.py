@@ -1,0 +1,62 @@
+"""Functions of time changed: their values scaled, their clock scaled or moved."""
+
+from __future__ import annotations
+
+import msgspec
+
+from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+
+VALUES: dict[type, tuple[str, ...]] = {
+    Constant: ("value",),
+    Ramp: ("value", "rate"),
+    Sine: ("amplitude", "offset"),
+    SmoothStep: ("start_value", "end_value"),
+    SpinUp: ("rate",),
+    Pulse: ("value",),
+    Table: ("values",),
+}
+TIMES: dict[type, tuple[str, ...]] = {
+    Ramp: ("start_s",),
+    SmoothStep: ("start_s", "duration_s"),
+    SpinUp: ("duration_s",),
+    Pulse: ("start_s", "duration_s"),
+    Table: ("times_s",),
+}
+FREQUENCIES: dict[type, tuple[str, ...]] = {
+    Ramp: ("rate",),
+    Sine: ("angular_frequency_rad_s",),
+    SpinUp: ("rate",),
+}
+
+
+def scaled(function: Function, factor: float) -> Function:
+    """The function factor * f(t)."""
+    return _multiplied(function, VALUES, factor)
+
+
+def slowed(function: Function, factor: float) -> Function:
+    """The function f(t / factor): the same course on a clock that shows `factor` times as much."""
+    return _multiplied(_multiplied(function, TIMES, factor), FREQUENCIES, 1.0 / factor)
+
+
+def delayed(function: Function, delay: float) -> Function:
+    """The function f(t - delay), `delay` in seconds; a spin-up, which always begins at zero, as it is."""
+    match function:
+        case Ramp() | SmoothStep() | Pulse():
+            return msgspec.structs.replace(function, start_s=function.start_s + delay)
+        case Sine():
+            phase = function.phase_rad - function.angular_frequency_rad_s * delay
+            return msgspec.structs.replace(function, phase_rad=phase)
+        case Table():
+            return msgspec.structs.replace(function, times_s=tuple(time + delay for time in function.times_s))
+    return function
+
+
+def _multiplied(function: Function, keys: dict[type, tuple[str, ...]], factor: float) -> Function:
+    return msgspec.structs.replace(
+        function, **{key: _times(getattr(function, key), factor) for key in keys.get(type(function), ())}
+    )
+
+
+def _times(value: float | tuple[float, ...], factor: float) -> float | tuple[float, ...]:
+    return tuple(factor * each for each in value) if isinstance(value, tuple) else factor * value
