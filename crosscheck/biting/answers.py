@@ -135,7 +135,8 @@ def _late(run: Trajectory, scene: Scene) -> Trajectory:
         return None if output is None else output[at]  # type: ignore[index]
 
     paths = {
-        name: MarkerPath(path.position[at], path.quaternion[at], path.velocity[at]) for name, path in run.markers.items()
+        name: MarkerPath(path.position[at], path.quaternion[at], path.velocity[at])
+        for name, path in run.markers.items()
     }
     return replace(run, markers=paths, **{name: before(getattr(run, name)) for name in OUTPUTS})
 

@@ -61,9 +61,7 @@ def run_campaign(
     plans = [plan(each.case, (), provider, limits.time_s) for each in litters]
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
-    bites = tuple(
-        scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True)
-    )
+    bites = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True))
     ordered = tuple(sorted(bites, key=lambda each: each.case))
     text = msgspec.json.format(msgspec.json.encode(MutationFile(cases=ordered)), indent=1)
     (out / SCORES).write_bytes(text + b"\n")
@@ -75,9 +73,7 @@ def scored(what: Subject, mutants: Litter, results: CaseResults) -> CaseBite:
     verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
     for verdict in judge(results):
         verdicts[verdict.comparison].append(verdict)
-    of_scene = [
-        _mutant(control.mutation, control.target, verdicts[name]) for name, control in mutants.mutants.items()
-    ]
+    of_scene = [_mutant(control.mutation, control.target, verdicts[name]) for name, control in mutants.mutants.items()]
     true = results.get(what.variant.name, what.engine)
     of_answer, not_asked = _answers(what, true)
     return bite(
@@ -135,9 +131,7 @@ def _answers(what: Subject, true: Result) -> tuple[list[Mutant], list[PassedOver
     return found, passed
 
 
-def _falsified(
-    what: Subject, true: Result, scene: Scene, fault: AnswerFault
-) -> tuple[dict[str, ShownIn], list[str]]:
+def _falsified(what: Subject, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
     """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))

@@ -78,7 +78,9 @@ def outcome(channels: dict[str, ShownIn], reason: str) -> tuple[Outcome, bool]:
     """What came of a mutant with these verdicts, and whether beyond a goal. Without any verdict it is not judged."""
     found = {each.status for each in channels.values()}
     if "differ" in found:
-        beyond = any(each.status == "differ" and each.E is not None and each.E > each.goal for each in channels.values())
+        beyond = any(
+            each.status == "differ" and each.E is not None and each.E > each.goal for each in channels.values()
+        )
         return "noticed", beyond
     if found == {"diverged"}:
         return "noticed", True

@@ -50,7 +50,7 @@ def mutate(
     check_limit(time_limit)
     chosen = found(tuple(cases))
     with sole_writer(out):
-        with LiveProgress(console) as live:
+        with LiveProgress(console, only_faults=True) as live:
             limits = Limits(jobs, time_limit)
             bites = run_campaign(
                 chosen, out, engine=engine, all_targets=all_targets, fresh=fresh, limits=limits, listener=live.hear

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 import msgspec
 
+from flexmb.scene.columns import struct_keys
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 
 VALUES: dict[type, tuple[str, ...]] = {
@@ -60,3 +64,20 @@ def _multiplied(function: Function, keys: dict[type, tuple[str, ...]], factor: f
 
 def _times(value: float | tuple[float, ...], factor: float) -> float | tuple[float, ...]:
     return tuple(factor * each for each in value) if isinstance(value, tuple) else factor * value
+
+
+def in_functions(item: Any, change: Callable[[Function], Function]) -> Any:
+    """A struct with every function of time inside it changed."""
+    if isinstance(item, Function):
+        return change(item)
+    if isinstance(item, tuple):
+        return tuple(in_functions(each, change) for each in item) if item and _holds_structs(item) else item
+    if not isinstance(item, msgspec.Struct):
+        return item
+    return msgspec.structs.replace(
+        item, **{key: in_functions(getattr(item, key), change) for key in struct_keys(type(item))}
+    )
+
+
+def _holds_structs(items: tuple) -> bool:
+    return isinstance(items[0], msgspec.Struct)

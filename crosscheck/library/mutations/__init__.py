@@ -12,7 +12,9 @@ from crosscheck.library.mutations.mutation import Mutation, Target
 from flexmb.scene.schema import Scene
 
 CATALOGUE: dict[MutationKind, Mutation] = {
-    each.name: each for room in (inertia, frames, hinges, wheels, gravity, loads, modes, time_courses) for each in room.MUTATIONS
+    each.name: each
+    for room in (inertia, frames, hinges, wheels, gravity, loads, modes, time_courses)
+    for each in room.MUTATIONS
 }
 
 

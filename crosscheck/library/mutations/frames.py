@@ -122,5 +122,7 @@ MUTATIONS = (
         closures,
         _closure_frame,
     ),
-    Mutation("closure_position", "+1 % offsets of a closure from its nodes", "a wrong figure", closures, _closure_position),
+    Mutation(
+        "closure_position", "+1 % offsets of a closure from its nodes", "a wrong figure", closures, _closure_position
+    ),
 )

@@ -31,6 +31,8 @@ def _dropped(scene: Scene, target: str) -> Scene:
 MUTATIONS = (
     Mutation("gravity_sign", "opposite gravity", "acceleration of the frame taken for that of the fall", whole, _sign),
     Mutation("gravity_size", "gravity times 9.80665/9.81", "another value of g", whole, _size),
-    Mutation("gravity_axis", "y and z of gravity exchanged", "the vertical is y in one code and z in another", whole, _axis),
+    Mutation(
+        "gravity_axis", "y and z of gravity exchanged", "the vertical is y in one code and z in another", whole, _axis
+    ),
     Mutation("gravity_dropped", "no gravity", "a switch that is off by default", whole, _dropped),
 )

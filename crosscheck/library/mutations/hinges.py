@@ -47,7 +47,10 @@ def _reversal_is_a_name(scene: Scene, target: str) -> str:
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
     for _, coordinate in coordinates(hinge):
         functions = (getattr(coordinate, motor_key(coordinate)), getattr(coordinate, key_of(coordinate, "prescribed")))
-        values = [getattr(coordinate, key) for key in (place_key(coordinate), *(key_of(coordinate, k) for k in ("rate", "rest")))]
+        values = [
+            getattr(coordinate, key)
+            for key in (place_key(coordinate), *(key_of(coordinate, k) for k in ("rate", "rest")))
+        ]
         if any(function is not None for function in functions) or any(values):
             return ""
     return "it starts at rest at zero, its spring too, without motor: the sign of the axis only names the coordinate"
@@ -207,13 +210,22 @@ def _damped(scene: Scene) -> list[Target]:
 
 
 MUTATIONS = (
-    Mutation("hinge_axis", "opposite hinge axis", "a sign: left-hand for right-hand", hinges, _hinge_axis, _reversal_is_a_name),
+    Mutation(
+        "hinge_axis",
+        "opposite hinge axis",
+        "a sign: left-hand for right-hand",
+        hinges,
+        _hinge_axis,
+        _reversal_is_a_name,
+    ),
     Mutation("gimbal_order", "rotations of a gimbal in the opposite order", "xyz for zyx", hinges, _gimbal_order),
     Mutation("stiffness", "+1 % stiffness of a body or of a hinge's springs", "a wrong figure", _sprung, _stiffness),
     Mutation("spring_rest", "springs at rest at zero", "the rest value left out", hinges, _rest, _slack),
     Mutation("damping_sign", "opposite damping", "a sign: energy is pumped in", _damped, _damping(OPPOSITE)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),
-    Mutation("initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)),
+    Mutation(
+        "initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)
+    ),
     Mutation("initial_unit", "initial angle times pi/180", "degrees expected, radians given", hinges, _initial_unit),
     Mutation("initial_rate", "+1 % initial rate", "a wrong figure", hinges, _initial("rate", FACTOR)),
     Mutation("initial_speed_sign", "opposite initial rotation or rate", "a sign", hinges, _initial_speed_sign),
@@ -224,5 +236,7 @@ MUTATIONS = (
         hinges,
         _speed_axes,
     ),
-    Mutation("initial_attitude", "conjugate initial quaternion", "body to World taken for World to body", hinges, _attitude),
+    Mutation(
+        "initial_attitude", "conjugate initial quaternion", "body to World taken for World to body", hinges, _attitude
+    ),
 )

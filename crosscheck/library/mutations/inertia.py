@@ -120,7 +120,9 @@ def _scaled_points(body: ModalBody) -> ModalBody:
 
 
 MUTATIONS = (
-    Mutation("mass", "+1 % mass of a body, its inertia as it was", "a wrong figure, or a lump forgotten", bodies, _mass),
+    Mutation(
+        "mass", "+1 % mass of a body, its inertia as it was", "a wrong figure, or a lump forgotten", bodies, _mass
+    ),
     Mutation("inertia", "+1 % inertia about the mass centre", "a wrong figure", bodies, _inertia),
     Mutation(
         "inertia_swapped",

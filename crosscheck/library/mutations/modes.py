@@ -54,7 +54,9 @@ def _sign(body: ModalBody) -> ModalBody:
 
     def spoilt(node: msgspec.Struct) -> msgspec.Struct:
         return msgspec.structs.replace(
-            node, translation_modes=_first_opposite(node.translation_modes), rotation_modes=_first_opposite(node.rotation_modes)
+            node,
+            translation_modes=_first_opposite(node.translation_modes),
+            rotation_modes=_first_opposite(node.rotation_modes),
         )
 
     return msgspec.structs.replace(body, nodes=tuple(map(spoilt, body.nodes)))

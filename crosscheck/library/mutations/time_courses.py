@@ -63,7 +63,9 @@ def _on_item(scene: Scene, target: str, change: Change, prescribed: bool) -> Sce
         return on_wheel(
             scene,
             target,
-            lambda wheel: msgspec.structs.replace(wheel, **{key: _changed(getattr(wheel, key), change) for key in keys}),
+            lambda wheel: msgspec.structs.replace(
+                wheel, **{key: _changed(getattr(wheel, key), change) for key in keys}
+            ),
         )
     if any(load.name == target for load in scene.loads):
         return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
@@ -107,7 +109,13 @@ def _kind(function: Function) -> str:
 
 
 MUTATIONS = (
-    Mutation("motor_sign", "opposite torque or force of a motor", "motor on the wrong one of two bodies", _motors, _motor_sign),
+    Mutation(
+        "motor_sign",
+        "opposite torque or force of a motor",
+        "motor on the wrong one of two bodies",
+        _motors,
+        _motor_sign,
+    ),
     Mutation("function_size", "+1 % of a function of time", "a wrong figure", _driven, _size),
     Mutation(
         "function_phase",

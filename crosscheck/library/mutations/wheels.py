@@ -48,7 +48,9 @@ def _reversal_is_a_name(scene: Scene, target: str) -> str:
 
 MUTATIONS = (
     Mutation("wheel_axis", "opposite spin axis", "a sign", wheels, _of_wheel(_axis), _reversal_is_a_name),
-    Mutation("wheel_momentum", "wheel at rest at the start", "the wheel's momentum left out", wheels, _of_wheel(_dropped)),
+    Mutation(
+        "wheel_momentum", "wheel at rest at the start", "the wheel's momentum left out", wheels, _of_wheel(_dropped)
+    ),
     Mutation("wheel_inertia", "+1 % axial inertia", "a wrong figure", wheels, _of_wheel(_inertia)),
     Mutation(
         "wheel_inertia_swapped",
