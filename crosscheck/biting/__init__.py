@@ -1,1 +1,1 @@
-"""Proof that cases bite: deliberate faults that their goals must notice, and changes of no meaning that they must not."""
+"""Proof that cases bite: faults that their goals must notice, and changes without meaning that they must not."""

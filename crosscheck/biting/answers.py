@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -129,10 +130,10 @@ def _late(run: Trajectory, scene: Scene) -> Trajectory:
     """Every sample is the one before it."""
     at = np.maximum(np.arange(len(run.times)) - 1, 0)
 
-    def before(output: object) -> object:
+    def before(output: Any) -> Any:
         if isinstance(output, dict):
             return {name: values[at] for name, values in output.items()}
-        return None if output is None else output[at]  # type: ignore[index]
+        return None if output is None else output[at]
 
     paths = {
         name: MarkerPath(path.position[at], path.quaternion[at], path.velocity[at])
@@ -148,25 +149,38 @@ def _in_axes(path: MarkerPath, spatial: Real) -> Real:
 
 
 FAULTS = (
-    AnswerFault("load_reaction", "hinge loads negated", "load on the inboard body for that on the outboard", _loads_reversed),
+    AnswerFault(
+        "load_reaction", "hinge loads negated", "load on the inboard body for that on the outboard", _loads_reversed
+    ),
     AnswerFault("load_reference", "hinge torques about another point", "another reference point", _load_point),
     AnswerFault("load_axes", "hinge loads in body axes", "axes of the outboard body for World axes", _load_axes),
-    AnswerFault("wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _wheel_loads_reversed),
+    AnswerFault(
+        "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _wheel_loads_reversed
+    ),
     AnswerFault("drive_reaction", "drive loads negated", "load of the motion for load of the drive", _drives_reversed),
-    AnswerFault("orientation_transposed", "conjugate quaternions", "World to body for body to World", _on_paths(_transposed)),
-    AnswerFault("orientation_order", "quaternions scalar last", "another order of the components", _on_paths(_scalar_last)),
+    AnswerFault(
+        "orientation_transposed", "conjugate quaternions", "World to body for body to World", _on_paths(_transposed)
+    ),
+    AnswerFault(
+        "orientation_order", "quaternions scalar last", "another order of the components", _on_paths(_scalar_last)
+    ),
     AnswerFault("velocity_axes", "velocities in body axes", "body axes for World axes", _on_paths(_body_velocity)),
     AnswerFault("rate_axes", "angular velocities in body axes", "body rates for space rates", _on_paths(_body_rates)),
     AnswerFault("rate_unit", "angular velocities in degrees", "degrees for radians", _on_paths(_degrees)),
     AnswerFault("position_unit", "positions in millimetres", "another unit", _on_paths(_millimetres)),
-    AnswerFault("momentum_of_wheels", "momentum without the wheels' spin", "wheels taken for part of their bodies", _wheels_left_out),
+    AnswerFault(
+        "momentum_of_wheels",
+        "momentum without the wheels' spin",
+        "wheels taken for part of their bodies",
+        _wheels_left_out,
+    ),
     *(
         AnswerFault(f"energy_{kind}", f"{kind} energy zero", "a kind of energy left out", _energy_left_out(kind))
         for kind in ENERGIES
     ),
     AnswerFault("work_sign", "work negated", "work done by the system for work done on it", _work_reversed),
     AnswerFault("late", "every sample is the one before it", "state before the step for that after it", _late),
-)  # fmt: skip
+)
 
 
 def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:

@@ -29,8 +29,6 @@ from crosscheck.running.pool import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
 from flexmb.run.channels import magnitude
 from flexmb.scene.check import check_scene
-from flexmb.scene.schema import Scene
-from flexmb.typing import Real
 
 RECORDS = "invariances.jsonl"
 VERDICTS = "invariance.json"
@@ -109,7 +107,10 @@ def _planned(what: Subject, provider: str, limits: Limits) -> _Set:
     counterparts: dict[str, Counterpart] = {}
     without: dict[str, str] = {}
     jobs = [true]
-    for invariance in INVARIANCES if true.scene is not None else ():
+    for invariance in INVARIANCES:
+        if true.scene is None:
+            without[invariance.name] = f"the case's own scene cannot be made: {true.error}"
+            continue
         try:
             counterpart = invariance.of(true.scene)
         except NotApplicable as error:

@@ -79,7 +79,7 @@ def outcome(channels: dict[str, ShownIn], reason: str) -> tuple[Outcome, bool]:
     found = {each.status for each in channels.values()}
     if "differ" in found:
         beyond = any(
-            each.status == "differ" and each.E is not None and each.E > each.goal for each in channels.values()
+            each.status == "differ" and each.E is not None and each.goal < each.E for each in channels.values()
         )
         return "noticed", beyond
     if found == {"diverged"}:

@@ -8,7 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Scene
+from flexmb.scene.tree import Coordinate
 from flexmb.typing import Real
 
 Channels = dict[str, Real]
@@ -75,6 +77,13 @@ def product(a: Real, b: Real) -> Real:
     scalar = w * b[:, 0] - b[:, 1:] @ v
     vector = w * b[:, 1:] + b[:, :1] * v + np.cross(v, b[:, 1:])
     return np.column_stack([scalar, vector])
+
+
+def is_prescribed(coordinate: Coordinate) -> bool:
+    """Whether a function of time says what the coordinate does."""
+    if isinstance(coordinate, LinearCoordinate):
+        return coordinate.prescribed_m is not None
+    return coordinate.prescribed_rad is not None
 
 
 def vector(values: Real) -> Vector:

@@ -11,7 +11,14 @@ from typing import Any
 import msgspec
 import numpy as np
 
-from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, by_kind
+from crosscheck.biting.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    NotApplicable,
+    by_kind,
+    is_prescribed,
+)
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
 from flexmb.scene.functions import Function
@@ -143,9 +150,9 @@ def _opposite(turn: AngularCoordinate) -> AngularCoordinate:
 def _drive_signs(hinge: Hinge) -> Real:
     """The signs of a hinge's drive loads, one for each prescribed coordinate."""
     found = []
-    for name, each in coordinates(hinge):
+    for place, (_, each) in enumerate(coordinates(hinge)):
         angular = isinstance(each, AngularCoordinate)
-        if (each.prescribed_rad if angular else each.prescribed_m) is None:
+        if not is_prescribed(each):
             continue
         match hinge:
             case Universal():
@@ -153,7 +160,7 @@ def _drive_signs(hinge: Hinge) -> Real:
             case Cylindrical():
                 opposite = angular
             case Gimbal():
-                opposite = hinge.sequence[int(name.strip("rotations[]"))] != "z"
+                opposite = hinge.sequence[place] != "z"
             case _:
                 opposite = False
         found.append(-1.0 if opposite else 1.0)

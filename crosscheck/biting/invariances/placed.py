@@ -1,4 +1,4 @@
-"""The World turned, and the World moved: everything that stands on the ground, gravity and loads in World axes with it."""
+"""The World turned, and the World moved: what stands on the ground with it, gravity and loads in World axes too."""
 
 from __future__ import annotations
 

@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.functions import Function
@@ -80,17 +80,12 @@ def _drives(scene: Scene) -> dict[str, Any]:
     """Of each hinge and wheel with prescribed motion, the factors of its drive loads."""
     found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for hinge in scene.hinges:
-        prescribed = [each for _, each in coordinates(hinge) if _is_prescribed(each)]
+        prescribed = [each for _, each in coordinates(hinge) if is_prescribed(each)]
         if prescribed:
             found[hinge.name] = [
                 (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
             ]
     return found
-
-
-def _is_prescribed(coordinate: msgspec.Struct) -> bool:
-    key = "prescribed_m" if isinstance(coordinate, LinearCoordinate) else "prescribed_rad"
-    return getattr(coordinate, key) is not None
 
 
 def _in_units(item: Any) -> Any:

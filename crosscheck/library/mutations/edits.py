@@ -9,11 +9,12 @@ import msgspec
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.mutation import FACTOR, Target
-from flexmb.scene.bodies import Body, Quaternion, SidBody, Vector
+from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
 from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
+AnyNode = Node | BeamNode | ModalNode
 Named = TypeVar("Named", Body, Hinge, Wheel, Load, Closure, PointMass)
 
 
@@ -37,7 +38,7 @@ def on_closure(scene: Scene, target: str, change: Callable[[Closure], Closure]) 
     return msgspec.structs.replace(scene, closures=replaced(scene.closures, target, change))
 
 
-def on_node(scene: Scene, target: str, change: Callable[[msgspec.Struct], msgspec.Struct]) -> Scene:
+def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> Scene:
     """Node "body.node" replaced (body names may hold dots, node names may not here)."""
     body_name, _, node_name = target.rpartition(".")
 

@@ -6,6 +6,7 @@ import msgspec
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
+    AnyNode,
     closures,
     conjugate,
     hinges,
@@ -18,8 +19,9 @@ from crosscheck.library.mutations.edits import (
 from crosscheck.library.mutations.mutation import FACTOR, Mutation
 from flexmb.scene.bodies import BeamNode
 from flexmb.scene.hinges import Closure, Hinge
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 
+Mounted = Wheel | PointMass | Load | Marker
 LESS = 2.0 - FACTOR  # a station of a beam moves inwards, where there is beam
 
 
@@ -46,14 +48,14 @@ def _hinge_position(scene: Scene, target: str) -> Scene:
 
 
 def _node_rotation(scene: Scene, target: str) -> Scene:
-    def transposed(node: msgspec.Struct) -> msgspec.Struct:
+    def transposed(node: AnyNode) -> AnyNode:
         return msgspec.structs.replace(node, quaternion=conjugate(node.quaternion))
 
     return on_node(scene, target, transposed)
 
 
 def _node_position(scene: Scene, target: str) -> Scene:
-    def moved(node: msgspec.Struct) -> msgspec.Struct:
+    def moved(node: AnyNode) -> AnyNode:
         if isinstance(node, BeamNode):
             return msgspec.structs.replace(node, x_m=LESS * node.x_m)
         return msgspec.structs.replace(node, position_m=scaled(node.position_m))
@@ -64,7 +66,8 @@ def _node_position(scene: Scene, target: str) -> Scene:
 def _node_idle(scene: Scene, target: str) -> str:
     """Nothing is mounted at the node: neither a hinge, a closure, a wheel, a mass, a load nor a marker."""
     body, _, node = target.rpartition(".")
-    used = [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses, *scene.loads, *scene.markers)]
+    mounted: tuple[Mounted, ...] = (*scene.wheels, *scene.point_masses, *scene.loads, *scene.markers)
+    used = [(item.body, item.node) for item in mounted]
     used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
     used += [end for each in scene.closures for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
     return "" if (body, node) in used else "nothing is mounted at the node, and no marker shows it"

@@ -9,7 +9,7 @@ import msgspec
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import bodies, on_body, whole
 from crosscheck.library.mutations.mutation import Mutation
-from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode, RigidBody
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
 
@@ -52,7 +52,7 @@ def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> Callable[[
 def _sign(body: ModalBody) -> ModalBody:
     """The first mode with opposite sign in the nodes, as it was in the points."""
 
-    def spoilt(node: msgspec.Struct) -> msgspec.Struct:
+    def spoilt(node: ModalNode) -> ModalNode:
         return msgspec.structs.replace(
             node,
             translation_modes=_first_opposite(node.translation_modes),
@@ -78,7 +78,7 @@ def _order(body: ModalBody) -> ModalBody:
 def _no_rotation(body: ModalBody) -> ModalBody:
     """Slopes of the modes left out at the nodes."""
 
-    def flat(node: msgspec.Struct) -> msgspec.Struct:
+    def flat(node: ModalNode) -> ModalNode:
         return msgspec.structs.replace(node, rotation_modes=tuple((0.0, 0.0, 0.0) for _ in node.rotation_modes))
 
     return msgspec.structs.replace(body, nodes=tuple(map(flat, body.nodes)))
