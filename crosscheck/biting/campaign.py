@@ -7,6 +7,7 @@ and takes its uncertainty from the true one. Faults of an answer are planted in 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import msgspec
@@ -18,19 +19,24 @@ from crosscheck.biting.score import CaseBite, Mutant, ShownIn, bite, outcome
 from crosscheck.biting.subject import Subject, subject
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.uncertainty import roundoff_floor
 from crosscheck.judging.verdict import Signal, Verdict, compare
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
+from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
-from crosscheck.running.plan import plan, variant_scene
+from crosscheck.running.plan import MAIN, Job, plan, variant_scene
 from crosscheck.running.pool import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
-from flexmb.run.channels import channels_of
+from flexmb.run.channels import channels_of, distance, family, magnitude
 from flexmb.scene.schema import Scene
+from flexmb.typing import Real
 
 RECORDS = "mutants.jsonl"
 SCORES = "mutation.json"
+MUTANT_LIMIT_S = 120.0
+PATIENCE = 20.0  # times the true run's time: a mutant that does not end by then has not the same motion
 
 
 class MutationFile(msgspec.Struct, frozen=True, kw_only=True):
@@ -58,7 +64,7 @@ def run_campaign(
     """
     subjects = [subject(case, engine) for case in cases]
     litters = [litter(each, all_targets) for each in subjects]
-    plans = [plan(each.case, (), provider, limits.time_s) for each in litters]
+    plans = [_plan(each.case, provider, limits) for each in litters]
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
     bites = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True))
@@ -68,13 +74,26 @@ def run_campaign(
     return bites
 
 
+def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[Job]]:
+    """The true run with the case's time, mutants with `MUTANT_LIMIT_S`, unless the limits have their own."""
+    record, jobs = plan(case, (), provider, limits.time_s)
+    if limits.time_s is not None:
+        return record, jobs
+    return record, [
+        job if job.role == MAIN else replace(job, time_limit_s=min(job.time_limit_s, MUTANT_LIMIT_S)) for job in jobs
+    ]
+
+
 def scored(what: Subject, mutants: Litter, results: CaseResults) -> CaseBite:
     """The scores of one case from the results of its mutants."""
     verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
     for verdict in judge(results):
         verdicts[verdict.comparison].append(verdict)
-    of_scene = [_mutant(control.mutation, control.target, verdicts[name]) for name, control in mutants.mutants.items()]
     true = results.get(what.variant.name, what.engine)
+    patient = true.status == "finished" and PATIENCE * true.finest.wall_s <= MUTANT_LIMIT_S
+    of_scene = [
+        _mutant(control.mutation, control.target, verdicts[name], patient) for name, control in mutants.mutants.items()
+    ]
     of_answer, not_asked = _answers(what, true)
     return bite(
         what.case.name,
@@ -85,10 +104,10 @@ def scored(what: Subject, mutants: Litter, results: CaseResults) -> CaseBite:
     )
 
 
-def _mutant(mutation: str, target: str, verdicts: Sequence[Verdict]) -> Mutant:
+def _mutant(mutation: str, target: str, verdicts: Sequence[Verdict], patient: bool) -> Mutant:
     channels = {each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts}
     reason = max(verdicts, key=lambda each: each.E or 0.0).reason if verdicts else "no verdict"
-    what, beyond = outcome(channels, reason)
+    what, beyond = outcome(channels, patient)
     return Mutant(
         mutation=mutation,
         target=target,
@@ -115,7 +134,7 @@ def _answers(what: Subject, true: Result) -> tuple[list[Mutant], list[PassedOver
             reason = f"the case sets no goal for what it changes: {', '.join(changed)}"
             passed.append(PassedOver(mutation=fault.name, target="", reason=reason))
         else:
-            verdict, beyond = outcome(channels, "")
+            verdict, beyond = outcome(channels)
             worst = max(channels, key=lambda name: channels[name].E or 0.0)
             found.append(
                 Mutant(
@@ -131,11 +150,18 @@ def _answers(what: Subject, true: Result) -> tuple[list[Mutant], list[PassedOver
     return found, passed
 
 
+def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int) -> bool:
+    """Whether a channel differs by more than the rounding of its family: an axis may be the same in body and World."""
+    size = max(magnitude(each, rows) for each, rows in right.items() if family(each) == family(name))
+    floor = roundoff_floor(size, max(evaluations, len(values)))
+    return bool(np.max(distance(name, values, right[name])) > floor)
+
+
 def _falsified(what: Subject, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
     """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
-    changed = [name for name, values in wrong.items() if not np.array_equal(values, right[name])]
+    changed = [name for name, values in wrong.items() if _is_other(name, values, right, true.finest.evaluations)]
     channels: dict[str, ShownIn] = {}
     for name in changed:
         pattern = most_specific(what.goals, name)

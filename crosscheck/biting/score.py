@@ -26,9 +26,10 @@ class ShownIn(msgspec.Struct, frozen=True, kw_only=True):
 class Mutant(msgspec.Struct, frozen=True, kw_only=True):
     """One deliberate fault, of the scene or planted in the engine's answer, and what came of it.
 
-    "noticed": a channel differs, or the run diverged. "missed": it ran, and nothing differs. "no mutant": the engine
-    refuses or cannot run the faulty scene. "not judged": it crashed, was stopped or did not run. `beyond_goal` says
-    whether it would be noticed also in a code that just meets the goals: a channel differs by more than its goal.
+    "noticed": a channel differs, or the run diverged, or was stopped after many times the true run's time. "missed": it
+    ran, and nothing differs. "no mutant": the engine refuses or cannot run the faulty scene. "not judged": it crashed,
+    was stopped too soon to tell, or did not run. `beyond_goal` says whether it would be noticed also in a code that
+    just meets the goals: a channel differs by more than its goal.
     """
 
     mutation: str
@@ -74,15 +75,18 @@ class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
         return tuple(each for each in self.mutants if each.outcome == "not judged")
 
 
-def outcome(channels: dict[str, ShownIn], reason: str) -> tuple[Outcome, bool]:
-    """What came of a mutant with these verdicts, and whether beyond a goal. Without any verdict it is not judged."""
+def outcome(channels: dict[str, ShownIn], patient: bool = False) -> tuple[Outcome, bool]:
+    """What came of a mutant with these verdicts, and whether beyond a goal. Without any verdict it is not judged.
+
+    `patient`: one that did not finish had many times the true run's time, and so has another motion: noticed.
+    """
     found = {each.status for each in channels.values()}
     if "differ" in found:
         beyond = any(
             each.status == "differ" and each.E is not None and each.goal < each.E for each in channels.values()
         )
         return "noticed", beyond
-    if found == {"diverged"}:
+    if found == {"diverged"} or (patient and found == {"did not finish"}):
         return "noticed", True
     if found and found <= {"refused", "failed"}:
         return "no mutant", False

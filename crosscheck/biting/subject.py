@@ -71,12 +71,10 @@ def _variants(comparison: Comparison) -> list[str]:
 
 
 def _asked(case: Case, variant: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales of the comparisons of a variant; of those across variants only where there are no others."""
-    about = [each for each in _agreeing(case) if variant in _variants(each)]
-    within = [each for each in about if set(_variants(each)) == {variant}]
+    """Goals and scales of the comparisons that a variant takes part in."""
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
-    for comparison in within or about:
+    for comparison in (each for each in _agreeing(case) if variant in _variants(each)):
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales

@@ -42,9 +42,11 @@ def _table(bites: Sequence[CaseBite]) -> Table:
 
 
 def _weakest(each: CaseBite) -> str:
-    if not each.channels:
+    """Of the channels that notice anything: those of quantities that the case does not have notice nothing."""
+    seeing = {name: score for name, score in each.channels.items() if score.noticed}
+    if not seeing:
         return ""
-    name, score = min(each.channels.items(), key=lambda item: item[1].noticed / item[1].mutants)
+    name, score = min(seeing.items(), key=lambda item: item[1].noticed / item[1].mutants)
     return f"{name} {score.noticed}/{score.mutants}"
 
 

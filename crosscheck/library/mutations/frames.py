@@ -17,11 +17,12 @@ from crosscheck.library.mutations.edits import (
     scaled,
 )
 from crosscheck.library.mutations.mutation import FACTOR, Mutation
-from flexmb.scene.bodies import BeamNode
+from flexmb.scene.bodies import BeamNode, Quaternion
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 
 Mounted = Wheel | PointMass | Load | Marker
+EPS = 1e-15
 LESS = 2.0 - FACTOR  # a station of a beam moves inwards, where there is beam
 
 
@@ -34,6 +35,23 @@ def _hinge_rotation(scene: Scene, target: str) -> Scene:
         )
 
     return on_hinge(scene, target, transposed)
+
+
+def _half_turn(*quaternions: Quaternion) -> str:
+    """A half-turn is its own inverse."""
+    if all(abs(q[0]) <= EPS or max(map(abs, q[1:])) <= EPS for q in quaternions):
+        return "a half-turn transposed is itself"
+    return ""
+
+
+def _hinge_idle(scene: Scene, target: str) -> str:
+    hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
+    return _half_turn(hinge.parent_quaternion, hinge.child_quaternion)
+
+
+def _closure_idle(scene: Scene, target: str) -> str:
+    closure = next(closure for closure in scene.closures if closure.name == target)
+    return _half_turn(closure.quaternion_a, closure.quaternion_b)
 
 
 def _hinge_position(scene: Scene, target: str) -> Scene:
@@ -100,6 +118,7 @@ MUTATIONS = (
         "a matrix from A to B taken for that from B to A",
         hinges,
         _hinge_rotation,
+        _hinge_idle,
     ),
     Mutation("hinge_position", "+1 % offsets of the hinge from its nodes", "a wrong figure", hinges, _hinge_position),
     Mutation(
@@ -124,6 +143,7 @@ MUTATIONS = (
         "a matrix from A to B taken for that from B to A",
         closures,
         _closure_frame,
+        _closure_idle,
     ),
     Mutation(
         "closure_position", "+1 % offsets of a closure from its nodes", "a wrong figure", closures, _closure_position
