@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
+from typing import Any
 
 import msgspec
 
@@ -13,6 +15,8 @@ from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from crosscheck.running.plan import at_level, variant_scene
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+
+ROUNDING = 1e-12  # what an eigenproblem and sums over its modes leave
 
 
 class PassedOver(msgspec.Struct, frozen=True, kw_only=True):
@@ -67,9 +71,31 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
         check_scene(mutant, t_end=variant.duration_s or what.case.run.duration_s)
     except (ValueError, NotImplementedError, OSError) as error:
         return f"it makes no scene: {' '.join(str(error).split())}"
-    if mutant == true:
+    if same_to_rounding(mutant, true):
         return f'variant "{variant.name}" does not model what it changes'
     return ""
+
+
+def same_to_rounding(one: Any, other: Any) -> bool:
+    """Whether two scenes, or parts of them, differ by rounding at most: modes that come by another way are others.
+
+    Numbers of a vector, or of a row, are held against the largest of them: a zero may come out as a small number.
+    """
+    if isinstance(one, msgspec.Struct):
+        keys = one.__struct_fields__
+        return type(one) is type(other) and all(same_to_rounding(getattr(one, k), getattr(other, k)) for k in keys)
+    if not (isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other)):
+        return _near(one, other, 0.0)
+    if all(isinstance(each, float) for each in (*one, *other)):
+        largest = max(map(abs, one), default=0.0)
+        return all(_near(a, b, largest) for a, b in zip(one, other, strict=True))
+    return all(map(same_to_rounding, one, other))
+
+
+def _near(one: Any, other: Any, size: float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=ROUNDING, abs_tol=ROUNDING * size)
+    return bool(one == other)
 
 
 def _control(what: Subject, kind: MutationKind, target: str) -> Control:

@@ -14,8 +14,8 @@ from crosscheck.library.find import Case
 class Subject:
     """A case reduced to one variant and one engine.
 
-    `goals` and `scales` are those of all comparisons of the variant that must agree; of two goals for one pattern the
-    stricter counts.
+    `goals` and `scales` are those of all comparisons of the variant that must agree (of all, where none must); of two
+    goals for one pattern the stricter counts.
     """
 
     case: Case
@@ -71,10 +71,11 @@ def _variants(comparison: Comparison) -> list[str]:
 
 
 def _asked(case: Case, variant: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales of the comparisons that a variant takes part in."""
+    """Goals and scales of the comparisons of a variant that must agree; where it has none, of all."""
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
-    for comparison in (each for each in _agreeing(case) if variant in _variants(each)):
+    about = [each for each in case.run.comparisons if variant in _variants(each)]
+    for comparison in [each for each in about if each.expect == "agree"] or about:
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales

@@ -122,7 +122,7 @@ MutationKind = Literal[
     "mass", "inertia", "com", "inertia_swapped", "inertia_products", "inertia_about_origin", "gyroscopic",
     "com_sign", "com_unit", "point_mass", "hinge_axis", "hinge_rotation", "hinge_position", "node_rotation",
     "node_position", "closure_rotation", "closure_position", "gimbal_order", "stiffness", "spring_rest",
-    "damping_sign", "damping_dropped", "initial_place", "initial_unit", "initial_rate", "initial_speed_sign",
+    "damping", "damping_dropped", "initial_place", "initial_unit", "initial_rate", "initial_speed_sign",
     "speed_axes", "initial_attitude", "wheel_axis", "wheel_momentum", "wheel_inertia", "wheel_inertia_swapped",
     "wheel_offset", "gravity_sign", "gravity_size", "gravity_axis", "gravity_dropped", "load_sign", "load_point",
     "load_frame", "dropped_stiffening", "dropped_deformation", "mode_sign", "mode_order", "mode_rotation",

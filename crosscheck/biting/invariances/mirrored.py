@@ -6,7 +6,7 @@ rotation R is S R S. A vector's components become S v where it is polar, -S v wh
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -29,15 +29,17 @@ from flexmb.scene.hinges import (
     Cylindrical,
     Gimbal,
     Hinge,
+    LinearCoordinate,
     Prismatic,
     Revolute,
     Universal,
 )
-from flexmb.scene.schema import Load, Scene, Wheel
+from flexmb.scene.schema import Load, PointMass, Scene, Wheel
 from flexmb.scene.tree import coordinates
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
+C = TypeVar("C", AngularCoordinate, LinearCoordinate)
 POLAR_SIGNS = (1.0, 1.0, -1.0)
 AXIAL_SIGNS = (-1.0, -1.0, 1.0)
 QUATERNION_SIGNS = (1.0, *AXIAL_SIGNS)
@@ -86,6 +88,11 @@ def _reflected(item: Any) -> Any:
             turns = zip(item.sequence, item.rotations, strict=True)
             rotations = tuple(each if letter == "z" else _opposite(each) for letter, each in turns)
             return msgspec.structs.replace(item, rotations=rotations)
+        case PointMass() if len(item.directions) == 3:  # three are right-handed: all point the other way
+            opposite = _signed(item.directions, (-1.0, -1.0, -1.0))
+            return msgspec.structs.replace(
+                item, directions=opposite, coordinates=tuple(map(_opposite, item.coordinates))
+            )
         case Load():
             signs = POLAR_SIGNS if item.type == "force" else AXIAL_SIGNS
             return msgspec.structs.replace(item, direction=_signed(item.direction, signs))
@@ -135,16 +142,16 @@ def _times(matrix: Any, sign: float) -> Any:
     return tuple(tuple(sign * number for number in row) for row in matrix)
 
 
-def _opposite(turn: AngularCoordinate) -> AngularCoordinate:
-    """An angle with the opposite sign, its motor and its prescribed motion too."""
-    return msgspec.structs.replace(
-        turn,
-        angle_rad=-turn.angle_rad,
-        rate_rad_s=-turn.rate_rad_s,
-        rest_rad=-turn.rest_rad,
-        torque_Nm=None if turn.torque_Nm is None else scaled(turn.torque_Nm, -1.0),
-        prescribed_rad=None if turn.prescribed_rad is None else scaled(turn.prescribed_rad, -1.0),
-    )
+def _opposite(coordinate: C) -> C:
+    """A coordinate with the opposite sign: where it starts and rests, its motor and its prescribed motion."""
+    changes: dict[str, Any] = {}
+    for key in coordinate.__struct_fields__:
+        value = getattr(coordinate, key)
+        if key.startswith(("angle", "position", "rate", "rest")):
+            changes[key] = -value
+        elif isinstance(value, Function):
+            changes[key] = scaled(value, -1.0)
+    return msgspec.structs.replace(coordinate, **changes)
 
 
 def _drive_signs(hinge: Hinge) -> Real:

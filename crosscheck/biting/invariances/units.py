@@ -17,7 +17,7 @@ from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
-LENGTH, MASS, TIME = 4.0, 0.5, 2.0
+LENGTH, MASS, TIME = 2.0, 4.0, 0.5  # so that speeds, accelerations, forces, energies all have another factor than 1
 
 
 class Dimension(NamedTuple):

@@ -91,7 +91,7 @@ def _damping(factor: float) -> Callable[[Scene, str], Scene]:
 
     def of_body(body: Body) -> Body:
         match body:
-            case BeamBody() if factor > 0.0 or factor == DROPPED:
+            case BeamBody():
                 ratio = body.modes.damping_ratio
                 less = tuple(factor * each for each in ratio) if isinstance(ratio, tuple) else factor * ratio
                 return msgspec.structs.replace(body, modes=msgspec.structs.replace(body.modes, damping_ratio=less))
@@ -221,7 +221,7 @@ MUTATIONS = (
     Mutation("gimbal_order", "rotations of a gimbal in the opposite order", "xyz for zyx", hinges, _gimbal_order),
     Mutation("stiffness", "+1 % stiffness of a body or of a hinge's springs", "a wrong figure", _sprung, _stiffness),
     Mutation("spring_rest", "springs at rest at zero", "the rest value left out", hinges, _rest, _slack),
-    Mutation("damping_sign", "opposite damping", "a sign: energy is pumped in", _damped, _damping(OPPOSITE)),
+    Mutation("damping", "+1 % damping", "a wrong figure", _damped, _damping(FACTOR)),
     Mutation("damping_dropped", "no damping", "dissipation left out", _damped, _damping(DROPPED)),
     Mutation(
         "initial_place", "+1 % initial angle or displacement", "a wrong figure", hinges, _initial("place", FACTOR)

@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import bodies, on_body, opposite, point_masses, replaced, scaled
 from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.turning import EPS, only_axis
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody
 from flexmb.scene.schema import PointMass, Scene
 
@@ -106,6 +107,21 @@ def _matrix(J: np.ndarray) -> Matrix3:
     return (a, b, c)  # type: ignore[return-value]  # rows of three
 
 
+def _same_about_its_axis(change: Callable[[RigidBody], RigidBody]) -> Callable[[Scene, str], str]:
+    """Of a body that turns about one axis e only, the inertia enters as J e."""
+
+    def idle(scene: Scene, target: str) -> str:
+        body = next(body for body in scene.bodies if body.name == target)
+        axis = only_axis(scene, target)
+        if axis is None or not isinstance(body, RigidBody):
+            return ""
+        J, other = np.asarray(body.inertia_kg_m2), np.asarray(change(body).inertia_kg_m2)
+        same = np.max(np.abs((other - J) @ axis)) <= EPS * np.max(np.abs(J))
+        return "the body turns about one axis only, and the inertia about that is the same" if same else ""
+
+    return idle
+
+
 def _scaled_stations(body: BeamBody, keys: tuple[str, ...]) -> BeamBody:
     stations = tuple(
         msgspec.structs.replace(station, **{key: FACTOR * getattr(station, key) for key in keys})
@@ -130,6 +146,7 @@ MUTATIONS = (
         "another order of the axes",
         bodies,
         _of_rigid("inertia_swapped", _swapped),
+        _same_about_its_axis(_swapped),
     ),
     Mutation(
         "inertia_products",
@@ -137,6 +154,7 @@ MUTATIONS = (
         "J_xy taken for its negative, as half of all textbooks define it",
         bodies,
         _of_rigid("inertia_products", _products),
+        _same_about_its_axis(_products),
     ),
     Mutation(
         "inertia_about_origin",
@@ -144,6 +162,7 @@ MUTATIONS = (
         "inertia about the mass centre taken for that about the body origin, or the part counted twice",
         bodies,
         _of_rigid("inertia_about_origin", _about_origin),
+        _same_about_its_axis(_about_origin),
     ),
     Mutation(
         "gyroscopic",
@@ -151,6 +170,7 @@ MUTATIONS = (
         "the gyroscopic moment w x J w left out",
         bodies,
         _of_rigid("gyroscopic", _spherical),
+        _same_about_its_axis(_spherical),
     ),
     Mutation("com", "+1 % offset of the mass centre", "a wrong figure", bodies, _of_rigid("com", _com)),
     Mutation(

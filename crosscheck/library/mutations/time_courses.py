@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 
 import msgspec
@@ -18,7 +19,7 @@ from crosscheck.library.mutations.edits import (
 from crosscheck.library.mutations.mutation import FACTOR, Mutation, Target
 from crosscheck.library.time_functions import delayed, scaled
 from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
 Change = Callable[[Function], Function]
@@ -49,43 +50,63 @@ def _driven(scene: Scene) -> Iterator[Target]:
     yield from (Target(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
 
 
-def _on_item(scene: Scene, target: str, change: Change, prescribed: bool) -> Scene:
-    """The functions of the hinge, wheel or load called `target` changed; prescribed motions only where wanted."""
+def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
+    """The hinge, wheel or load called `target` with motors and loads by `change`, prescribed motions by `motion`."""
 
     def of_coordinate(coordinate: Coordinate) -> Coordinate:
-        keys = [motor_key(coordinate), *([key_of(coordinate, "prescribed")] if prescribed else [])]
-        return msgspec.structs.replace(coordinate, **{key: _changed(getattr(coordinate, key), change) for key in keys})
+        motor, prescribed = motor_key(coordinate), key_of(coordinate, "prescribed")
+        return msgspec.structs.replace(
+            coordinate,
+            **{motor: _changed(getattr(coordinate, motor), change)},
+            **{prescribed: _changed(getattr(coordinate, prescribed), motion)},
+        )
+
+    def of_wheel(wheel: Wheel) -> Wheel:
+        return msgspec.structs.replace(
+            wheel,
+            torque_Nm=_changed(wheel.torque_Nm, change),
+            prescribed_rad=_changed(wheel.prescribed_rad, motion),
+        )
 
     if any(hinge.name == target for hinge in scene.hinges):
         return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, of_coordinate))
     if any(wheel.name == target for wheel in scene.wheels):
-        keys = ("torque_Nm", "prescribed_rad") if prescribed else ("torque_Nm",)
-        return on_wheel(
-            scene,
-            target,
-            lambda wheel: msgspec.structs.replace(
-                wheel, **{key: _changed(getattr(wheel, key), change) for key in keys}
-            ),
-        )
+        return on_wheel(scene, target, of_wheel)
     if any(load.name == target for load in scene.loads):
         return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
     raise CaseError(f'no hinge, wheel or load is called "{target}"')
 
 
-def _changed(function: Function | None, change: Change) -> Function | None:
-    return None if function is None else change(function)
+def _changed(function: Function | None, change: Change | None) -> Function | None:
+    return function if function is None or change is None else change(function)
 
 
 def _motor_sign(scene: Scene, target: str) -> Scene:
-    return _on_item(scene, target, lambda function: scaled(function, -1.0), prescribed=False)
+    return _on_item(scene, target, lambda function: scaled(function, -1.0))
 
 
 def _size(scene: Scene, target: str) -> Scene:
-    return _on_item(scene, target, lambda function: scaled(function, FACTOR), prescribed=True)
+    return _on_item(scene, target, lambda function: scaled(function, FACTOR), _farther)
 
 
 def _late(scene: Scene, target: str) -> Scene:
-    return _on_item(scene, target, _a_little_late, prescribed=True)
+    return _on_item(scene, target, _a_little_late, _a_little_late)
+
+
+def _farther(motion: Function) -> Function:
+    """A prescribed motion that goes farther from where it begins, which the initial state fits."""
+    match motion:
+        case Ramp():
+            start = motion.value - motion.rate * motion.start_s
+            return msgspec.structs.replace(motion, value=start, rate=FACTOR * motion.rate, start_s=0.0)
+        case Sine():
+            start = motion.amplitude * math.sin(motion.phase_rad)
+            offset = motion.offset + (1.0 - FACTOR) * start
+            return msgspec.structs.replace(motion, amplitude=FACTOR * motion.amplitude, offset=offset)
+        case SmoothStep():
+            end = motion.start_value + FACTOR * (motion.end_value - motion.start_value)
+            return msgspec.structs.replace(motion, end_value=end)
+    return scaled(motion, FACTOR)
 
 
 def _a_little_late(function: Function) -> Function:
