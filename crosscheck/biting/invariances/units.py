@@ -17,7 +17,9 @@ from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
-LENGTH, MASS, TIME = 2.0, 4.0, 0.5  # so that speeds, accelerations, forces, energies all have another factor than 1
+# Speeds, accelerations, forces, energies and all else have another factor than 1, and speeds one that leaves a material
+# one that exists, as the checks of a scene demand.
+LENGTH, MASS, TIME = 0.5, 8.0, 0.25
 
 
 class Dimension(NamedTuple):
