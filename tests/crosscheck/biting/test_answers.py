@@ -24,7 +24,8 @@ from tests.crosscheck.sessions import copy_case
 
 TIMES = np.linspace(0.0, 1.0, 5)
 ARM = RigidBody(
-    name="arm", mass_kg=1.0, inertia_kg_m2=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)), nodes=(Node(name="tip"),)
+    name="arm", mass_kg=1.0, inertia_kg_m2=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    nodes=(Node(name="tip"),),
 )  # fmt: skip
 SCENE = Scene(
     name="arm with a wheel",
