@@ -32,6 +32,7 @@ from flexmb.scene.check import check_scene
 
 RECORDS = "invariances.jsonl"
 VERDICTS = "invariance.json"
+BOTH = 2.0  # uncertainties of the engine are summed here, where a goal is for one of it and one of a partner
 ANY = 1.0  # the goal where the case sets none: the two must differ by no more than they are uncertain
 
 
@@ -118,6 +119,8 @@ def _planned(what: Subject, provider: str, limits: Limits) -> _Set:
             continue
         counterparts[invariance.name] = counterpart
         jobs.append(_job(true, invariance.name, counterpart))
+    bare = msgspec.structs.replace(what.variant, efforts=())  # its jobs have them, those on another clock other steps
+    record = msgspec.structs.replace(record, run=msgspec.structs.replace(record.run, variants=(bare,)))
     return _Set(what, counterparts, without, record, jobs)
 
 
@@ -185,7 +188,7 @@ def _findings(what: Subject, true: Result, other: Result, counterpart: Counterpa
             name,
             _with_rounding(name, told, other),
             true.signal(name, across=False),
-            ANY if pattern is None else what.goals[pattern],
+            ANY if pattern is None else min(BOTH * what.goals[pattern], ANY),
             None if scale is None else what.scales[scale],
         )
         if pattern is not None or finding.status != "unresolved":  # what the case does not ask for may be all rounding

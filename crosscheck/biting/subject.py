@@ -14,8 +14,8 @@ from crosscheck.library.find import Case
 class Subject:
     """A case reduced to one variant and one engine.
 
-    `goals` and `scales` are those of all comparisons of the variant that must agree (of all, where none must); of two
-    goals for one pattern the stricter counts.
+    `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others, where it has
+    none); of two goals for one pattern the stricter counts.
     """
 
     case: Case
@@ -37,7 +37,7 @@ def subject(case: Case, engine: str) -> Subject:
     named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):
         variant = case.run.variant(name)
-        goals, scales = _asked(case, name)
+        goals, scales = _asked(case, name, engine)
         if goals and (engine not in named or engine in (*variant.engines, *variant.also)):
             alone = msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None)
             efforts = tuple(ladder for ladder in variant.efforts if ladder.engine == engine)
@@ -70,12 +70,19 @@ def _variants(comparison: Comparison) -> list[str]:
     return [side.variant for side in (comparison.a, comparison.b) if side is not None]
 
 
-def _asked(case: Case, variant: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales of the comparisons of a variant that must agree; where it has none, of all."""
+def _engines(case: Case, comparison: Comparison) -> tuple[str, ...]:
+    if comparison.variant is not None:
+        return comparison.engines or case.run.variant(comparison.variant).engines
+    return tuple(side.engine for side in (comparison.a, comparison.b) if side is not None)
+
+
+def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Goals and scales of a variant's comparisons: of those with the engine that must agree, where there are such."""
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
     about = [each for each in case.run.comparisons if variant in _variants(each)]
-    for comparison in [each for each in about if each.expect == "agree"] or about:
+    agreeing = [each for each in about if each.expect == "agree"] or about
+    for comparison in [each for each in agreeing if engine in _engines(case, each)] or agreeing:
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 
@@ -31,7 +32,15 @@ def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = Fal
 
 def _table(bites: Sequence[CaseBite]) -> Table:
     numbers = [Column(name, justify="right") for name in ("mutants", "noticed", "score", "at goals")]
-    table = Table("case", "variant", *numbers, "weakest channel", header_style="bold")
+    table = Table(
+        Column("case", no_wrap=True),
+        "variant",
+        *numbers,
+        "weakest channel",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        header_style="bold",
+    )
     for each in bites:
         counted = each.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)

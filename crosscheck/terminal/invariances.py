@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 from rich.text import Text
 
 from crosscheck.biting.invariance_runs import InvarianceVerdict
@@ -18,7 +19,13 @@ STYLES = {"agree": "green", "not applicable": "dim"}
 
 def print_invariances(console: Console, verdicts: Sequence[InvarianceVerdict], verbose: bool = False) -> int:
     """Print the verdicts; the exit code: 1 where one is neither *agree* nor *not applicable*."""
-    table = Table("case", *(each.name for each in INVARIANCES), header_style="bold")
+    table = Table(
+        Column("case", no_wrap=True),
+        *(each.name for each in INVARIANCES),
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        header_style="bold",
+    )
     for case in dict.fromkeys(verdict.case for verdict in verdicts):
         row = {verdict.invariance: verdict.status for verdict in verdicts if verdict.case == case}
         table.add_row(words(case), *(_cell(row[each.name]) for each in INVARIANCES))
