@@ -26,13 +26,13 @@ class Subject:
 
 
 def subject(case: Case, engine: str) -> Subject:
-    """The variant of the case's reference, else the first that a comparison judges and the engine runs.
+    """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
     """
     judged = [_variants(each) for each in _agreeing(case)]
     names = [name for group in judged for name in group]
-    if case.run.reference is not None:
+    if case.run.reference is not None and case.run.reference.variant in names:
         names.insert(0, case.run.reference.variant)
     named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):
