@@ -119,17 +119,15 @@ Band = tuple[float, float]  # lowest and highest that is as expected
 Transform = Literal["none", "rigidify", "modal_points", "segments", "substructures"]
 TAKES_APART: tuple[Transform, ...] = ("segments", "substructures")
 MutationKind = Literal[
-    "mass",
-    "inertia",
-    "com",
-    "hinge_axis",
-    "hinge_rotation",
-    "node_rotation",
-    "gravity_sign",
-    "wheel_axis",
-    "stiffness",
-    "dropped_stiffening",
-]
+    "mass", "inertia", "com", "inertia_swapped", "inertia_products", "inertia_about_origin", "gyroscopic",
+    "com_sign", "com_unit", "point_mass", "hinge_axis", "hinge_rotation", "hinge_position", "node_rotation",
+    "node_position", "closure_rotation", "closure_position", "gimbal_order", "stiffness", "spring_rest",
+    "damping", "damping_dropped", "initial_place", "initial_unit", "initial_rate", "initial_speed_sign",
+    "speed_axes", "initial_attitude", "wheel_axis", "wheel_momentum", "wheel_inertia", "wheel_inertia_swapped",
+    "wheel_offset", "gravity_sign", "gravity_size", "gravity_axis", "gravity_dropped", "load_sign", "load_point",
+    "load_frame", "dropped_stiffening", "dropped_deformation", "mode_sign", "mode_order", "mode_rotation",
+    "section_axes", "motor_sign", "function_size", "function_phase",
+]  # fmt: skip
 Family = Literal["closed_form", "published", "converged", "agreed"]
 FAMILIES: dict[str, Family] = {
     "closed form": "closed_form",
@@ -226,10 +224,9 @@ class Comparison(_CasePart, frozen=True, kw_only=True):
 class Control(_CasePart, frozen=True, kw_only=True):
     """A negative control: `a` runs the scene with a deliberate fault, `b` the true one; they must come out *differ*.
 
-    Mutations: "mass" and "inertia" (+1 % of body `target`), "com" (+1 % of the body's mass-centre offset),
-    "hinge_axis" (sign of hinge `target`), "hinge_rotation" and "node_rotation" (conjugated quaternion of hinge or
-    "body.node" `target`), "gravity_sign", "wheel_axis" (sign of wheel `target`), "stiffness" (+1 % of the springs of
-    hinge or of body `target`), "dropped_stiffening" (level stiffened becomes full).
+    Mutations, what they do and which slip each stands for: `crosscheck.library.mutations` and docs/mutations.md. For
+    example "mass" (+1 % of body `target`), "hinge_axis" (sign of hinge `target`), "node_rotation" (conjugated
+    quaternion of "body.node" `target`), "gravity_sign" of the scene.
     """
 
     name: str

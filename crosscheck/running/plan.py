@@ -12,8 +12,8 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
-from crosscheck.library.controls import mutate
 from crosscheck.library.find import Case
+from crosscheck.library.mutations import mutate
 from crosscheck.library.selection import alone, select
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw

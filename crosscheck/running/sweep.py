@@ -11,7 +11,7 @@ from crosscheck.engines.answers import clean
 from crosscheck.engines.registry import COMPILED_LIKE
 from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
-from crosscheck.records.kinds import Confirmed, Record, RunRecord
+from crosscheck.records.kinds import CaseRecord, Confirmed, Record, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.running.execute import execute
 from crosscheck.running.expected import expected_seconds
@@ -41,10 +41,24 @@ def sweep(
     time. `listener` hears every event, with the list of jobs. However this ends, by Ctrl-C or by an error of the
     scheduler, the records are whole, and the next call goes on from there.
     """
+    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
+    run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
+
+
+def run_planned(
+    plans: Sequence[tuple[CaseRecord, list[Job]]],
+    asked: tuple[str, ...],
+    records: Path,
+    *,
+    fresh: bool = False,
+    limits: Limits = BY_DEFAULT,
+    scheduler: Scheduler = run_jobs,
+    listener: Listener = lambda jobs, event: None,
+) -> None:
+    """Run cases that are planned already, as `sweep` does: what is recorded is confirmed, the rest run and appended."""
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []
-    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
     took = expected_seconds(known)
     jobs = [
         replace(job, done=_done(known, job), expected_s=took.get(job.work)) for _, planned in plans for job in planned

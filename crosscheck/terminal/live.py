@@ -29,9 +29,13 @@ MARKS = {
 
 
 class LiveProgress:
-    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear."""
+    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear.
 
-    def __init__(self, console: Console) -> None:
+    Of what has hundreds of runs, `only_faults` leaves lasting lines of those that did not finish.
+    """
+
+    def __init__(self, console: Console, only_faults: bool = False) -> None:
+        self._only_faults = only_faults
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),  # names stand in it
@@ -77,7 +81,11 @@ class LiveProgress:
             now = time.monotonic()
             seconds = self._remaining.seconds(now - self._begin)
             self._progress.update(self._overall, advance=1, ends_at=None if seconds is None else now + seconds)
-            self._progress.console.print(self._ending(title, event))
+            if not self._only_faults or self._is_fault(event):
+                self._progress.console.print(self._ending(title, event))
+
+    def _is_fault(self, event: Event) -> bool:
+        return event.kind != "ended" or any(each.status != "finished" for each in self._records[event.job])
 
     def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""

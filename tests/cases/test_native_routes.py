@@ -13,8 +13,8 @@ import pytest
 
 from crosscheck.engines.contract import Effort, Run, Trajectory
 from crosscheck.engines.registry import engine
-from crosscheck.library.controls import mutate
 from crosscheck.library.find import load_case
+from crosscheck.library.mutations import mutate
 from crosscheck.running.plan import variant_scene
 from flexmb.scene.schema import Scene
 

@@ -1,0 +1,215 @@
+"""Faults planted in an engine's answer: what an adapter does to right numbers when it converts them wrongly.
+
+Each takes a run as an engine hands it out and gives it back falsified. They stand beside the mutations of scenes: those
+are slips in the data, these in conventions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from crosscheck.engines.contract import ENERGIES, OUTPUTS, MarkerPath, Trajectory
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import rest_frames
+from flexmb.typing import Real
+
+MILLI = 1e3
+SHIFT = 0.01  # of the scene's extent
+
+
+@dataclass(frozen=True)
+class AnswerFault:
+    """One fault of an adapter: what it does, the slip that it stands for, and the falsified run."""
+
+    name: str
+    what: str
+    slip: str
+    falsify: Callable[[Trajectory, Scene], Trajectory]
+
+
+def _loads_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, loads={name: -load for name, load in run.loads.items()})
+
+
+def _wheel_loads_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, wheel_loads={name: -load for name, load in run.wheel_loads.items()})
+
+
+def _drives_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, drives={name: -drive for name, drive in run.drives.items()})
+
+
+def _load_point(run: Trajectory, scene: Scene) -> Trajectory:
+    """Torques about a point that is off by `SHIFT` of the scene's extent along (1, 1, 1)."""
+    extent = max((float(np.max(np.abs(path.position))) for path in run.markers.values()), default=1.0) or 1.0
+    arm = np.full(3, SHIFT * extent)
+
+    def shifted(load: Real) -> Real:
+        return np.hstack([load[:, :3] + np.cross(arm, load[:, 3:]), load[:, 3:]])
+
+    return replace(run, loads={name: shifted(load) for name, load in run.loads.items()})
+
+
+def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
+    """Loads in the axes of a marker on the outboard body, where there is one."""
+    shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
+    loads = dict(run.loads)
+    for hinge in scene.hinges:
+        if hinge.child in shown and hinge.name in loads:
+            loads[hinge.name] = _in_axes(shown[hinge.child], loads[hinge.name])
+    return replace(run, loads=loads)
+
+
+def _on_paths(change: Callable[[MarkerPath], MarkerPath]) -> Callable[[Trajectory, Scene], Trajectory]:
+    return lambda run, scene: replace(run, markers={name: change(path) for name, path in run.markers.items()})
+
+
+def _transposed(path: MarkerPath) -> MarkerPath:
+    return replace(path, quaternion=path.quaternion * np.array([1.0, -1.0, -1.0, -1.0]))
+
+
+def _scalar_last(path: MarkerPath) -> MarkerPath:
+    return replace(path, quaternion=np.roll(path.quaternion, -1, axis=1))
+
+
+def _body_velocity(path: MarkerPath) -> MarkerPath:
+    turned = _in_axes(path, path.velocity)
+    return replace(path, velocity=np.hstack([path.velocity[:, :3], turned[:, 3:]]))
+
+
+def _body_rates(path: MarkerPath) -> MarkerPath:
+    turned = _in_axes(path, path.velocity)
+    return replace(path, velocity=np.hstack([turned[:, :3], path.velocity[:, 3:]]))
+
+
+def _degrees(path: MarkerPath) -> MarkerPath:
+    return replace(path, velocity=np.hstack([np.degrees(path.velocity[:, :3]), path.velocity[:, 3:]]))
+
+
+def _millimetres(path: MarkerPath) -> MarkerPath:
+    return replace(path, position=MILLI * path.position)
+
+
+def _wheels_left_out(run: Trajectory, scene: Scene) -> Trajectory:
+    """The angular momentum less that of the wheels' initial spin, along their axes as markers of their bodies show."""
+    if run.momentum is None:
+        return run
+    momentum = run.momentum.copy()
+    bodies = {body.name: body for body in scene.bodies}
+    for wheel in scene.wheels:
+        path = next((run.markers[each.name] for each in scene.markers if each.body == wheel.body), None)
+        marker = next((each for each in scene.markers if each.body == wheel.body), None)
+        if path is None or marker is None:
+            continue
+        frames = rest_frames(bodies[wheel.body])
+        to_marker = rotation_matrix(frames[marker.node].quaternion).T @ rotation_matrix(frames[wheel.node].quaternion)
+        axis = np.asarray(wheel.axis) / np.linalg.norm(wheel.axis)
+        spin = wheel.axial_inertia_kg_m2 * wheel.speed_rad_s * (to_marker @ axis)
+        momentum[:, :3] -= rotation_matrix(path.quaternion) @ spin
+    return replace(run, momentum=momentum)
+
+
+def _energy_left_out(kind: str) -> Callable[[Trajectory, Scene], Trajectory]:
+    def falsify(run: Trajectory, scene: Scene) -> Trajectory:
+        energy = {name: 0.0 * values if name == kind else values for name, values in run.energy.items()}
+        return replace(run, energy=energy)
+
+    return falsify
+
+
+def _work_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, work=None if run.work is None else -run.work)
+
+
+def _late(run: Trajectory, scene: Scene) -> Trajectory:
+    """Every sample is the one before it."""
+    at = np.maximum(np.arange(len(run.times)) - 1, 0)
+
+    def before(output: Any) -> Any:
+        if isinstance(output, dict):
+            return {name: values[at] for name, values in output.items()}
+        return None if output is None else output[at]
+
+    paths = {
+        name: MarkerPath(path.position[at], path.quaternion[at], path.velocity[at])
+        for name, path in run.markers.items()
+    }
+    return replace(run, markers=paths, **{name: before(getattr(run, name)) for name in OUTPUTS})
+
+
+def _in_axes(path: MarkerPath, spatial: Real) -> Real:
+    """Two World vectors a row (T,6) in the axes of a marker."""
+    R = rotation_matrix(path.quaternion)
+    return np.hstack([np.einsum("tji,tj->ti", R, part) for part in (spatial[:, :3], spatial[:, 3:])])
+
+
+FAULTS = (
+    AnswerFault(
+        "load_reaction", "hinge loads negated", "load on the inboard body for that on the outboard", _loads_reversed
+    ),
+    AnswerFault("load_reference", "hinge torques about another point", "another reference point", _load_point),
+    AnswerFault("load_axes", "hinge loads in body axes", "axes of the outboard body for World axes", _load_axes),
+    AnswerFault(
+        "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _wheel_loads_reversed
+    ),
+    AnswerFault("drive_reaction", "drive loads negated", "load of the motion for load of the drive", _drives_reversed),
+    AnswerFault(
+        "orientation_transposed", "conjugate quaternions", "World to body for body to World", _on_paths(_transposed)
+    ),
+    AnswerFault(
+        "orientation_order", "quaternions scalar last", "another order of the components", _on_paths(_scalar_last)
+    ),
+    AnswerFault("velocity_axes", "velocities in body axes", "body axes for World axes", _on_paths(_body_velocity)),
+    AnswerFault("rate_axes", "angular velocities in body axes", "body rates for space rates", _on_paths(_body_rates)),
+    AnswerFault("rate_unit", "angular velocities in degrees", "degrees for radians", _on_paths(_degrees)),
+    AnswerFault("position_unit", "positions in millimetres", "another unit", _on_paths(_millimetres)),
+    AnswerFault(
+        "momentum_of_wheels",
+        "momentum without the wheels' spin",
+        "wheels taken for part of their bodies",
+        _wheels_left_out,
+    ),
+    *(
+        AnswerFault(f"energy_{kind}", f"{kind} energy zero", "a kind of energy left out", _energy_left_out(kind))
+        for kind in ENERGIES
+    ),
+    AnswerFault("work_sign", "work negated", "work done by the system for work done on it", _work_reversed),
+    AnswerFault("late", "every sample is the one before it", "state before the step for that after it", _late),
+)
+
+
+def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
+    """The run whose channels (T, k) these are: `channels_of` the other way."""
+    names: dict[str, dict[str, None]] = {kind: {} for kind in ("marker", "load", "wheel_load", "drive")}
+    for channel in channels:
+        kind, of_item, rest = channel.partition(":")
+        if of_item:
+            names[kind][rest if kind == "drive" else rest.rpartition(".")[0]] = None
+
+    def pair(prefix: str, first: str, second: str) -> Real:
+        return np.hstack([channels[f"{prefix}.{first}"], channels[f"{prefix}.{second}"]])
+
+    return Trajectory(
+        status="finished",
+        message="",
+        times=times,
+        markers={
+            name: MarkerPath(
+                channels[f"marker:{name}.position"],
+                channels[f"marker:{name}.orientation"],
+                pair(f"marker:{name}", "angular_velocity", "velocity"),
+            )
+            for name in names["marker"]
+        },
+        loads={name: pair(f"load:{name}", "torque", "force") for name in names["load"]},
+        wheel_loads={name: pair(f"wheel_load:{name}", "torque", "force") for name in names["wheel_load"]},
+        drives={name: channels[f"drive:{name}"] for name in names["drive"]},
+        energy={kind: channels[f"energy.{kind}"][:, 0] for kind in ENERGIES if f"energy.{kind}" in channels},
+        momentum=pair("momentum", "angular", "linear") if "momentum.linear" in channels else None,
+        work=channels["work"][:, 0] if "work" in channels else None,
+    )

@@ -1,0 +1,175 @@
+"""A mutation campaign: the mutants of cases run by the usual workers, judged like negative controls, and scored.
+
+The true run takes the engine's whole ladder of efforts, which gives its uncertainty; every mutant runs at the finest,
+and takes its uncertainty from the true one. Faults of an answer are planted in the true run: no engine has to run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
+from crosscheck.biting.mutants import Litter, PassedOver, litter
+from crosscheck.biting.score import CaseBite, Mutant, ShownIn, bite, outcome
+from crosscheck.biting.subject import Subject, subject
+from crosscheck.judging.case_verdicts import judge
+from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.uncertainty import roundoff_floor
+from crosscheck.judging.verdict import Signal, Verdict, compare
+from crosscheck.library.find import Case
+from crosscheck.library.patterns import most_specific
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import CaseRecord
+from crosscheck.records.session import last_session
+from crosscheck.running.plan import MAIN, Job, plan, variant_scene
+from crosscheck.running.scheduler import BY_DEFAULT, Limits
+from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from flexmb.run.channels import channels_of, distance, family, magnitude
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+RECORDS = "mutants.jsonl"
+SCORES = "mutation.json"
+MUTANT_LIMIT_S = 120.0
+PATIENCE = 20.0  # times the true run's time: a mutant that does not end by then has not the same motion
+
+
+class MutationFile(msgspec.Struct, frozen=True, kw_only=True):
+    """mutation.json: the scores of the cases, sorted by name. docs/mutations.md explains every key."""
+
+    format: int = 1
+    cases: tuple[CaseBite, ...] = ()
+
+
+def run_campaign(
+    cases: Sequence[Case],
+    out: Path,
+    *,
+    engine: str = "native",
+    all_targets: bool = False,
+    fresh: bool = False,
+    provider: str = PROVIDER,
+    limits: Limits = BY_DEFAULT,
+    listener: Listener = lambda jobs, event: None,
+) -> tuple[CaseBite, ...]:
+    """Run all mutants of the cases in one engine and score them; `mutation.json` in `out` has the result.
+
+    What `mutants.jsonl` in `out` holds already, of the same scenes and sources, is not run again unless `fresh`.
+    CaseError where a case judges nothing that the engine runs.
+    """
+    subjects = [subject(case, engine) for case in cases]
+    litters = [litter(each, all_targets) for each in subjects]
+    plans = [_plan(each.case, provider, limits) for each in litters]
+    run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
+    found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
+    bites = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True))
+    ordered = tuple(sorted(bites, key=lambda each: each.case))
+    text = msgspec.json.format(msgspec.json.encode(MutationFile(cases=ordered)), indent=1)
+    (out / SCORES).write_bytes(text + b"\n")
+    return bites
+
+
+def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[Job]]:
+    """The true run with the case's time, mutants with `MUTANT_LIMIT_S`, unless the limits have their own."""
+    record, jobs = plan(case, (), provider, limits.time_s)
+    if limits.time_s is not None:
+        return record, jobs
+    return record, [
+        job if job.role == MAIN else replace(job, time_limit_s=min(job.time_limit_s, MUTANT_LIMIT_S)) for job in jobs
+    ]
+
+
+def scored(what: Subject, mutants: Litter, results: CaseResults) -> CaseBite:
+    """The scores of one case from the results of its mutants."""
+    verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
+    for verdict in judge(results):
+        verdicts[verdict.comparison].append(verdict)
+    true = results.get(what.variant.name, what.engine)
+    patient = true.status == "finished" and PATIENCE * true.finest.wall_s <= MUTANT_LIMIT_S
+    of_scene = [
+        _mutant(control.mutation, control.target, verdicts[name], patient) for name, control in mutants.mutants.items()
+    ]
+    of_answer, not_asked = _answers(what, true)
+    return bite(
+        what.case.name,
+        what.variant.name,
+        what.engine,
+        [*of_scene, *of_answer],
+        [*mutants.passed_over, *not_asked],
+    )
+
+
+def _mutant(mutation: str, target: str, verdicts: Sequence[Verdict], patient: bool) -> Mutant:
+    channels = {each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts}
+    reason = max(verdicts, key=lambda each: each.E or 0.0).reason if verdicts else "no verdict"
+    what, beyond = outcome(channels, patient)
+    return Mutant(
+        mutation=mutation,
+        target=target,
+        of="scene",
+        outcome=what,
+        beyond_goal=beyond,
+        reason=reason,
+        channels=channels,
+    )
+
+
+def _answers(what: Subject, true: Result) -> tuple[list[Mutant], list[PassedOver]]:
+    """Faults planted in the true run; passed over are those that change nothing, or nothing that the case judges."""
+    found: list[Mutant] = []
+    passed: list[PassedOver] = []
+    if true.status != "finished":
+        return found, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
+    scene = variant_scene(what.case.scene(what.variant), what.variant)
+    for fault in FAULTS:
+        channels, changed = _falsified(what, true, scene, fault)
+        if not changed:
+            passed.append(PassedOver(mutation=fault.name, target="", reason="it changes nothing in this run"))
+        elif not channels:
+            reason = f"the case sets no goal for what it changes: {', '.join(changed)}"
+            passed.append(PassedOver(mutation=fault.name, target="", reason=reason))
+        else:
+            verdict, beyond = outcome(channels)
+            worst = max(channels, key=lambda name: channels[name].E or 0.0)
+            found.append(
+                Mutant(
+                    mutation=fault.name,
+                    target="",
+                    of="answer",
+                    outcome=verdict,
+                    beyond_goal=beyond,
+                    reason=f"{fault.what}: {worst}",
+                    channels=channels,
+                )
+            )
+    return found, passed
+
+
+def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int) -> bool:
+    """Whether a channel differs by more than the rounding of its family: an axis may be the same in body and World."""
+    size = max(magnitude(each, rows) for each, rows in right.items() if family(each) == family(name))
+    floor = roundoff_floor(size, max(evaluations, len(values)))
+    return bool(np.max(distance(name, values, right[name])) > floor)
+
+
+def _falsified(what: Subject, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
+    """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
+    right = {name: true.values(name) for name in true.channels}
+    wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
+    changed = [name for name, values in wrong.items() if _is_other(name, values, right, true.finest.evaluations)]
+    channels: dict[str, ShownIn] = {}
+    for name in changed:
+        pattern = most_specific(what.goals, name)
+        if pattern is None:
+            continue
+        signal = true.signal(name, across=False)
+        false = Signal(wrong[name], signal.uncertainty, signal.sizes)
+        scale = most_specific(what.scales, name)
+        finding = compare(name, false, signal, what.goals[pattern], None if scale is None else what.scales[scale])
+        channels[name] = ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=what.goals[pattern])
+    return channels, changed

@@ -1,0 +1,251 @@
+"""The invariance set of cases: every counterpart of a scene is run like the scene, told back and held against it.
+
+Both take the engine's whole ladder of efforts, so that each has an uncertainty of its own: a boosted or rescaled run
+takes other steps. Telling back adds the rounding of what it subtracts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import msgspec
+import numpy as np
+
+from crosscheck.biting.invariances import INVARIANCES, Counterpart, NotApplicable
+from crosscheck.biting.subject import Subject, reduced, subject
+from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
+from crosscheck.judging.verdict import Finding, Signal, Status, compare
+from crosscheck.library.find import Case
+from crosscheck.library.patterns import most_specific
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import CaseRecord, RunRecord
+from crosscheck.records.packing import pack, unpack
+from crosscheck.records.session import last_session
+from crosscheck.running.plan import MAIN, Job, plan, scene_identity
+from crosscheck.running.scheduler import BY_DEFAULT, Limits
+from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from flexmb.run.channels import magnitude
+from flexmb.scene.check import check_scene
+
+RECORDS = "invariances.jsonl"
+VERDICTS = "invariance.json"
+BOTH = 2.0  # uncertainties of the engine are summed here, where a goal is for one of it and one of a partner
+ANY = 1.0  # the goal where the case sets none: the two must differ by no more than they are uncertain
+
+
+class InvarianceVerdict(msgspec.Struct, frozen=True, kw_only=True):
+    """One invariance of one case: the gravest status of its channels, and in `channel` the one with the largest E/U.
+
+    `status` is "not applicable" where the invariance says nothing about the scene. `E` and `U` are relative to the
+    channel's range. `differing` are all channels that differ.
+    """
+
+    case: str
+    variant: str
+    engine: str
+    invariance: str
+    status: Status | str
+    channel: str = ""
+    E: float | None = None
+    U: float | None = None
+    channels: int = 0
+    differing: tuple[str, ...] = ()
+    reason: str = ""
+
+    @property
+    def ok(self) -> bool:
+        """Whether nothing speaks against the invariance."""
+        return self.status in ("agree", "not applicable")
+
+
+class InvarianceFile(msgspec.Struct, frozen=True, kw_only=True):
+    """invariance.json: a verdict for each case and invariance."""
+
+    format: int = 1
+    verdicts: tuple[InvarianceVerdict, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Set:
+    """The counterparts of a subject by the name of the invariance, and why there is none of the others."""
+
+    what: Subject
+    counterparts: dict[str, Counterpart]
+    without: dict[str, str]
+    record: CaseRecord
+    jobs: list[Job]
+
+
+def run_invariances(
+    cases: Sequence[Case],
+    out: Path,
+    *,
+    engine: str = "native",
+    fresh: bool = False,
+    provider: str = PROVIDER,
+    limits: Limits = BY_DEFAULT,
+    listener: Listener = lambda jobs, event: None,
+) -> tuple[InvarianceVerdict, ...]:
+    """Run every applicable invariance of the cases in one engine; `invariance.json` in `out` has the verdicts.
+
+    CaseError where a case judges nothing that the engine runs.
+    """
+    sets = [_planned(subject(case, engine), provider, limits) for case in cases]
+    plans = [(each.record, each.jobs) for each in sets]
+    run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
+    found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
+    verdicts = tuple(verdict for each in sets for verdict in _judged(each, found[each.what.case.name]))
+    text = msgspec.json.format(msgspec.json.encode(InvarianceFile(verdicts=verdicts)), indent=1)
+    (out / VERDICTS).write_bytes(text + b"\n")
+    return verdicts
+
+
+def _planned(what: Subject, provider: str, limits: Limits) -> _Set:
+    record, (true,) = plan(reduced(what), (), provider, limits.time_s)
+    counterparts: dict[str, Counterpart] = {}
+    without: dict[str, str] = {}
+    jobs = [true]
+    for invariance in INVARIANCES:
+        if true.scene is None:
+            without[invariance.name] = f"the case's own scene cannot be made: {true.error}"
+            continue
+        try:
+            counterpart = invariance.of(true.scene)
+        except NotApplicable as error:
+            without[invariance.name] = str(error)
+            continue
+        counterparts[invariance.name] = counterpart
+        jobs.append(_job(true, invariance.name, counterpart))
+    bare = msgspec.structs.replace(what.variant, efforts=())  # its jobs have them, those on another clock other steps
+    record = msgspec.structs.replace(record, run=msgspec.structs.replace(record.run, variants=(bare,)))
+    return _Set(what, counterparts, without, record, jobs)
+
+
+def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
+    """The counterpart's job. Steps of fixed efforts are told on its clock."""
+    times = counterpart.clock * true.times
+    efforts = tuple(
+        replace(effort, value=counterpart.clock * effort.value) if effort.kind == "step" else effort
+        for effort in true.efforts
+    )
+    job = replace(
+        true,
+        role=role(name),
+        scene=counterpart.scene,
+        scene_id=scene_identity(counterpart.scene, times),
+        times=times,
+        efforts=efforts,
+    )
+    try:
+        check_scene(counterpart.scene, t_end=float(times[-1]))
+    except ValueError as error:
+        return replace(job, scene=None, error=str(error))
+    return job
+
+
+def role(invariance: str) -> str:
+    """The role of an invariance's runs in the records."""
+    return f"invariance:{invariance}"
+
+
+def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
+    what = each.what
+    true = results.get(what.variant.name, what.engine, MAIN)
+    found = []
+    for invariance in INVARIANCES:
+        head = InvarianceVerdict(
+            case=what.case.name,
+            variant=what.variant.name,
+            engine=what.engine,
+            invariance=invariance.name,
+            status="not applicable",
+        )
+        if invariance.name in each.without:
+            found.append(msgspec.structs.replace(head, reason=each.without[invariance.name]))
+            continue
+        other = results.get(what.variant.name, what.engine, role(invariance.name))
+        ended = next((one for one in (true, other) if one.status != "finished"), None)
+        if ended is not None:
+            found.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
+            continue
+        found.append(_verdict(head, _findings(what, true, other, each.counterparts[invariance.name])))
+    return found
+
+
+def _findings(what: Subject, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
+    """A finding for every channel of the true run that the counterpart has, told back; the case need not judge it."""
+    told = _told(other, counterpart)
+    found: dict[str, Finding] = {}
+    for name in true.channels:
+        if name not in told.channels:
+            continue
+        pattern = most_specific(what.goals, name)
+        scale = most_specific(what.scales, name)
+        finding = compare(
+            name,
+            _with_rounding(name, told, other),
+            true.signal(name, across=False),
+            ANY if pattern is None else min(BOTH * what.goals[pattern], ANY),
+            None if scale is None else what.scales[scale],
+        )
+        if pattern is not None or finding.status != "unresolved":  # what the case does not ask for may be all rounding
+            found[name] = finding
+    return found
+
+
+def _told(other: Result, counterpart: Counterpart) -> Result:
+    """The counterpart's result on the true run's clock and in its frame; of coarse runs what they hold in full."""
+    runs = tuple(_run(run, other, counterpart) for run in other.runs)
+    return Result(other.variant, other.engine, other.status, other.message, runs)
+
+
+def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
+    if run.times is None or set(run.channels) != set(other.finest.channels):
+        return msgspec.structs.replace(run, channels={})
+    times = unpack(run.times) / counterpart.clock
+    channels = counterpart.back(times, {name: unpack(packed) for name, packed in run.channels.items()})
+    return msgspec.structs.replace(
+        run,
+        times=pack(times),
+        channels={name: pack(values) for name, values in channels.items()},
+        effort_value=run.effort_value / counterpart.clock if run.effort_kind == "step" else run.effort_value,
+    )
+
+
+def _with_rounding(name: str, told: Result, other: Result) -> Signal:
+    """A channel told back, with the rounding of what was added to it or taken from it."""
+    signal = told.signal(name, across=False)
+    moved = magnitude(name, other.values(name) - told.values(name))
+    floor = roundoff_floor(moved, max(told.finest.evaluations, len(told.times)))
+    doubt = signal.uncertainty
+    raised = Uncertainty(doubt.envelope + floor, doubt.value + floor, doubt.how, doubt.order)
+    return Signal(signal.values, raised, signal.sizes)
+
+
+def _verdict(head: InvarianceVerdict, findings: dict[str, Finding]) -> InvarianceVerdict:
+    """The verdict on all channels: the gravest of their statuses, shown by the channel where E is most of U."""
+    if not findings:
+        return msgspec.structs.replace(head, status="did not run", reason="no channel could be compared")
+
+    def excess(name: str) -> tuple[bool, float]:
+        found = findings[name]
+        return found.status not in ("agree", "unresolved"), (found.E or 0.0) / (found.U or np.inf)
+
+    worst = max(findings, key=excess)
+    unjudged = [name for name, found in findings.items() if found.status == "unresolved"]
+    status = findings[worst].status
+    if status == "agree" and unjudged:
+        worst, status = unjudged[0], "unresolved"
+    return msgspec.structs.replace(
+        head,
+        status=status,
+        channel=worst,
+        E=findings[worst].E,
+        U=findings[worst].U,
+        channels=len(findings),
+        differing=tuple(name for name, found in findings.items() if found.status == "differ"),
+        reason=findings[worst].reason,
+    )

@@ -1,0 +1,13 @@
+"""Changes of a scene that mean nothing: every result must come out the same, told in the other frame or unit."""
+
+from crosscheck.biting.invariances.boosted import BOOSTED
+from crosscheck.biting.invariances.clock import CLOCK
+from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.mirrored import MIRRORED
+from crosscheck.biting.invariances.order import REORDERED
+from crosscheck.biting.invariances.placed import MOVED, TURNED
+from crosscheck.biting.invariances.units import RESCALED
+
+INVARIANCES = (TURNED, MOVED, BOOSTED, CLOCK, REORDERED, RESCALED, MIRRORED)
+
+__all__ = ["INVARIANCES", "Counterpart", "Invariance", "NotApplicable"]

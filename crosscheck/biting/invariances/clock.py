@@ -1,0 +1,44 @@
+"""The zero of the clock that functions of time are written on.
+
+Runs begin at t = 0: the contract of engines has no start time. So only what can be written on another clock without one
+is: a sine by whole turns of its phase, a ramp by its start.
+"""
+
+from __future__ import annotations
+
+import math
+
+import msgspec
+
+from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.library.time_functions import in_functions
+from flexmb.scene.functions import Constant, Function, Ramp, Sine
+from flexmb.scene.schema import Scene
+
+SHIFT_S = 2.0
+TURNS = 1
+
+
+def _rewritten(scene: Scene) -> Counterpart:
+    found: list[Function] = []
+
+    def on_another_clock(function: Function) -> Function:
+        found.append(function)
+        match function:
+            case Ramp():
+                start = function.start_s + SHIFT_S
+                return msgspec.structs.replace(function, start_s=start, value=function.value + function.rate * SHIFT_S)
+            case Sine():
+                return msgspec.structs.replace(function, phase_rad=function.phase_rad + TURNS * 2.0 * math.pi)
+            case Constant():
+                return function
+        kind = function.__struct_config__.tag
+        raise NotApplicable(f'a "{kind}" cannot be shifted without a start time of the run, which engines do not have')
+
+    other = in_functions(scene, on_another_clock)
+    if other == scene:
+        raise NotApplicable("nothing depends on the clock")
+    return Counterpart(other, lambda times, channels: channels)
+
+
+CLOCK = Invariance("clock", "functions of time written on another clock", _rewritten)

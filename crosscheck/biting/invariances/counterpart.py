@@ -1,0 +1,113 @@
+"""What an invariance is: another scene of the same motion, and how its channels are told as those of the first."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexmb.scene.bodies import BeamBody, ModalBody, Quaternion, RigidBody, Vector
+from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import Coordinate
+from flexmb.typing import Real
+
+Channels = dict[str, Real]
+POLAR = (".position", ".velocity", ".force", ".linear")
+AXIAL = (".angular_velocity", ".torque", ".angular")
+
+
+class NotApplicable(ValueError):
+    """The invariance says nothing about this scene; the message says why."""
+
+
+@dataclass(frozen=True)
+class Counterpart:
+    """A scene that moves like another. `back(times, channels)` tells its channels (T, k) as those of the other at the
+    other's `times` (T,); what it leaves out is not compared. Its clock shows `clock` times as much."""
+
+    scene: Scene
+    back: Callable[[Real, Channels], Channels]
+    clock: float = 1.0
+
+
+@dataclass(frozen=True)
+class Invariance:
+    """A change that means nothing. `of` makes a scene's counterpart, or raises `NotApplicable`."""
+
+    name: str
+    what: str
+    of: Callable[[Scene], Counterpart]
+
+
+def by_kind(
+    channels: Channels,
+    polar: Callable[[Real], Real],
+    axial: Callable[[Real], Real],
+    orientation: Callable[[Real], Real],
+) -> Channels:
+    """Channels with their vectors and quaternions mapped, each after its kind; numbers as they are."""
+
+    def mapped(name: str, values: Real) -> Real:
+        if name.startswith("drive:"):  # whatever it is called
+            return values
+        if name.endswith(".orientation"):
+            return orientation(values)
+        if name.endswith(AXIAL):
+            return axial(values)
+        return polar(values) if name.endswith(POLAR) else values
+
+    return {name: mapped(name, values) for name, values in channels.items()}
+
+
+def with_energy(channels: Channels, changes: dict[str, Real]) -> Channels:
+    """Channels with (T,) added to kinds of energy, and to their total."""
+    found = dict(channels)
+    for kind, change in changes.items():
+        if f"energy.{kind}" in found:
+            found[f"energy.{kind}"] = found[f"energy.{kind}"] + change[:, None]
+            found["energy.total"] = found["energy.total"] + change[:, None]
+    return found
+
+
+def product(a: Real, b: Real) -> Real:
+    """Quaternions (4,) times (T,4): the rotation b, then a."""
+    w, v = a[0], a[1:]
+    scalar = w * b[:, 0] - b[:, 1:] @ v
+    vector = w * b[:, 1:] + b[:, :1] * v + np.cross(v, b[:, 1:])
+    return np.column_stack([scalar, vector])
+
+
+def is_prescribed(coordinate: Coordinate) -> bool:
+    """Whether a function of time says what the coordinate does."""
+    if isinstance(coordinate, LinearCoordinate):
+        return coordinate.prescribed_m is not None
+    return coordinate.prescribed_rad is not None
+
+
+def vector(values: Real) -> Vector:
+    x, y, z = (float(value) for value in values)
+    return (x, y, z)
+
+
+def quaternion(values: Real) -> Quaternion:
+    w, x, y, z = (float(value) for value in values)
+    return (w, x, y, z)
+
+
+def total_mass(scene: Scene) -> float:
+    """Mass of everything (kg); `NotApplicable` where a body keeps it in a file."""
+    found = sum(wheel.mass_kg for wheel in scene.wheels) + sum(point.mass_kg for point in scene.point_masses)
+    for body in scene.bodies:
+        match body:
+            case RigidBody():
+                found += body.mass_kg
+            case BeamBody():
+                x, density = np.array([(each.x_m, each.mass_per_length_kg_m) for each in body.stations]).T
+                found += float(np.trapezoid(density, x)) + sum(tip.mass_kg for tip in body.tip_masses)
+            case ModalBody() if body.points:
+                found += sum(point.mass_kg for point in body.points)
+            case _:
+                raise NotApplicable(f'body "{body.name}" keeps its mass in a file')
+    return found

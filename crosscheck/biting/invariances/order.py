@@ -1,0 +1,20 @@
+"""Everything declared in the opposite order: names, not places, say what belongs to what."""
+
+from __future__ import annotations
+
+import msgspec
+
+from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from flexmb.scene.schema import Scene
+
+COLLECTIONS = ("bodies", "hinges", "closures", "wheels", "point_masses", "loads", "markers", "modal_states")
+
+
+def _reordered(scene: Scene) -> Counterpart:
+    changes = {name: getattr(scene, name)[::-1] for name in COLLECTIONS}
+    if all(len(items) < 2 for items in changes.values()):
+        raise NotApplicable("there is one of each thing only")
+    return Counterpart(msgspec.structs.replace(scene, **changes), lambda times, channels: channels)
+
+
+REORDERED = Invariance("reordered", "bodies, hinges and all else declared in the opposite order", _reordered)

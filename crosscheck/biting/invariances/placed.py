@@ -1,0 +1,93 @@
+"""The World turned, and the World moved: what stands on the ground with it, gravity and loads in World axes too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+
+from crosscheck.biting.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    by_kind,
+    product,
+    quaternion,
+    total_mass,
+    vector,
+    with_energy,
+)
+from flexmb.scene.bodies import Quaternion, Vector
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.schema import Load, Scene
+from flexmb.scene.tree import GROUND
+from flexmb.typing import Real
+
+TURN = np.array([0.5, -0.1, 0.7, 0.5])  # of length 1, about no axis of any scene
+STEP_M = np.array([0.75, -1.25, 0.5])
+CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
+Placed = Callable[[Vector, Quaternion], tuple[Vector, Quaternion]]
+
+
+def _turned(scene: Scene) -> Counterpart:
+    R = rotation_matrix(TURN)
+
+    def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
+        return vector(R @ np.asarray(position)), quaternion(product(TURN, np.array([orientation]))[0])
+
+    def turned(load: Load) -> Load:
+        if load.frame == "node":
+            return load
+        return msgspec.structs.replace(load, direction=vector(R @ np.asarray(load.direction)))
+
+    other = msgspec.structs.replace(
+        on_ground(scene, placed),
+        gravity_m_s2=vector(R @ np.asarray(scene.gravity_m_s2)),
+        loads=tuple(map(turned, scene.loads)),
+    )
+
+    def back(times: Real, channels: Channels) -> Channels:
+        return by_kind(channels, lambda rows: rows @ R, lambda rows: rows @ R, lambda q: product(TURN * CONJUGATE, q))
+
+    return Counterpart(other, back)
+
+
+def _moved(scene: Scene) -> Counterpart:
+    gravity = np.asarray(scene.gravity_m_s2)
+    potential = total_mass(scene) * float(gravity @ STEP_M) if np.any(gravity) else 0.0
+
+    def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
+        return vector(np.asarray(position) + STEP_M), orientation
+
+    def back(times: Real, channels: Channels) -> Channels:
+        found = with_energy(channels, {"gravity": np.full(len(times), potential)})
+        if "momentum.linear" in found:
+            found["momentum.angular"] = found["momentum.angular"] - np.cross(STEP_M, found["momentum.linear"])
+        return {name: rows - STEP_M if name.endswith(".position") else rows for name, rows in found.items()}
+
+    return Counterpart(on_ground(scene, placed), back)
+
+
+def on_ground(scene: Scene, placed: Placed) -> Scene:
+    """The scene with the ends of hinges and closures on the ground placed elsewhere."""
+    hinges = []
+    for hinge in scene.hinges:
+        if hinge.parent == GROUND:
+            position, orientation = placed(hinge.parent_position_m, hinge.parent_quaternion)
+            hinge = msgspec.structs.replace(hinge, parent_position_m=position, parent_quaternion=orientation)
+        hinges.append(hinge)
+    closures = []
+    for closure in scene.closures:
+        if closure.body_a == GROUND:
+            position, orientation = placed(closure.position_a_m, closure.quaternion_a)
+            closure = msgspec.structs.replace(closure, position_a_m=position, quaternion_a=orientation)
+        if closure.body_b == GROUND:
+            position, orientation = placed(closure.position_b_m, closure.quaternion_b)
+            closure = msgspec.structs.replace(closure, position_b_m=position, quaternion_b=orientation)
+        closures.append(closure)
+    return msgspec.structs.replace(scene, hinges=tuple(hinges), closures=tuple(closures))
+
+
+TURNED = Invariance("turned", "the World turned, gravity and loads with it", _turned)
+MOVED = Invariance("moved", "the World moved", _moved)

@@ -1,0 +1,122 @@
+"""Other units of length, mass and time, by powers of two, which round nothing."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import msgspec
+
+from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
+from crosscheck.library.time_functions import scaled, slowed
+from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.functions import Function
+from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.schema import Load, ModalState, Scene
+from flexmb.scene.tree import coordinates
+from flexmb.scene.units import split_unit
+from flexmb.surrogate import modal_points
+from flexmb.typing import Real
+
+# Speeds, accelerations, forces, energies and all else have another factor than 1, and speeds one that leaves a material
+# one that exists, as the checks of a scene demand.
+LENGTH, MASS, TIME = 0.5, 8.0, 0.25
+
+
+class Dimension(NamedTuple):
+    """Powers of length, mass and time."""
+
+    length: int = 0
+    mass: int = 0
+    time: int = 0
+
+    @property
+    def factor(self) -> float:
+        """By which a number in the other units is larger."""
+        return LENGTH**self.length * MASS**self.mass * TIME**self.time
+
+
+NUMBER = Dimension()
+FORCE, ENERGY = Dimension(1, 1, -2), Dimension(2, 1, -2)
+OF_UNIT = {
+    "": NUMBER, "rad": NUMBER, "s": Dimension(time=1), "m": Dimension(1), "kg": Dimension(mass=1),
+    "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
+    "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
+    "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
+    "N m s/rad": Dimension(2, 1, -1),
+}  # fmt: skip
+# Of raw modal bodies, whose modal coordinates are numbers without unit.
+OF_MODES = {
+    "translation_modes": Dimension(1), "second_translation": Dimension(1), "stiffness": ENERGY,
+    "damping": Dimension(2, 1, -1), "gravity_stiffness": Dimension(1, 1), "gradient_stiffness": Dimension(2, 1),
+    "force_stiffness": Dimension(1),
+}  # fmt: skip
+OF_CHANNEL = {
+    ".position": Dimension(1), ".velocity": Dimension(1, 0, -1), ".angular_velocity": Dimension(time=-1),
+    ".force": FORCE, ".torque": ENERGY, ".linear": Dimension(1, 1, -1), ".angular": Dimension(2, 1, -1),
+}  # fmt: skip
+
+
+def _rescaled(scene: Scene) -> Counterpart:
+    for body in scene.bodies:
+        if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
+            raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
+    if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
+        scene = modal_points(scene)
+    drives = _drives(scene)
+
+    def back(times: Real, channels: Channels) -> Channels:
+        return {name: rows / _factor(name, drives) for name, rows in channels.items()}
+
+    return Counterpart(_in_units(scene), back, clock=TIME)
+
+
+def _factor(channel: str, drives: dict[str, float]) -> float:
+    if channel.startswith("drive:"):
+        return drives[channel.partition(":")[2]]
+    if channel.startswith(("energy.", "work")):
+        return ENERGY.factor
+    return next((each.factor for ending, each in OF_CHANNEL.items() if channel.endswith(ending)), 1.0)
+
+
+def _drives(scene: Scene) -> dict[str, Any]:
+    """Of each hinge and wheel with prescribed motion, the factors of its drive loads."""
+    found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
+    for hinge in scene.hinges:
+        prescribed = [each for _, each in coordinates(hinge) if is_prescribed(each)]
+        if prescribed:
+            found[hinge.name] = [
+                (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
+            ]
+    return found
+
+
+def _in_units(item: Any) -> Any:
+    """A struct with all its numbers in the other units, each by the unit in its key."""
+    return msgspec.structs.replace(
+        item, **{key: _converted(getattr(item, key), _dimension(item, key)) for key in item.__struct_fields__}
+    )
+
+
+def _dimension(item: msgspec.Struct, key: str) -> Dimension:
+    match item:
+        case Load() if key == "function":
+            return FORCE if item.type == "force" else ENERGY
+        case ModalState() if key == "rates":
+            return Dimension(time=-1)
+    return OF_MODES[key] if key in OF_MODES else OF_UNIT[split_unit(key)[1]]
+
+
+def _converted(value: Any, dimension: Dimension) -> Any:
+    if isinstance(value, Function):
+        return slowed(scaled(value, dimension.factor), TIME)
+    match value:
+        case msgspec.Struct():
+            return _in_units(value)
+        case tuple():
+            return tuple(_converted(each, dimension) for each in value)
+        case float():
+            return dimension.factor * value
+    return value
+
+
+RESCALED = Invariance("rescaled", "length, mass and time in other units, by powers of two", _rescaled)

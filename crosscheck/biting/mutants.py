@@ -1,0 +1,104 @@
+"""The mutants of a subject: which mutations at which targets, and which are passed over and why."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import msgspec
+
+from crosscheck.biting.subject import Subject, reduced
+from crosscheck.library.case import ComparisonSide, Control, MutationKind
+from crosscheck.library.find import Case
+from crosscheck.library.mutations import CATALOGUE, applicable, mutate
+from crosscheck.running.plan import at_level, variant_scene
+from flexmb.scene.check import check_scene
+from flexmb.scene.schema import Scene
+
+ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes; the smallest mutation changes 3e-4
+
+
+class PassedOver(msgspec.Struct, frozen=True, kw_only=True):
+    """A mutation of a target that is no mutant, and the reason."""
+
+    mutation: str
+    target: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Litter:
+    """The mutants of a subject, as negative controls of its case by name, and what was passed over."""
+
+    case: Case
+    mutants: dict[str, Control]
+    passed_over: tuple[PassedOver, ...]
+
+
+def litter(what: Subject, all_targets: bool = False) -> Litter:
+    """Every applicable mutation at one target of each kind, or at all targets.
+
+    Passed over is what physics says changes nothing, what the variant's transformation does not model, and what makes
+    no scene.
+    """
+    scene = at_level(what.case.scene(what.variant), what.variant)
+    true = variant_scene(scene, what.variant)
+    mutants: dict[str, Control] = {}
+    passed: list[PassedOver] = []
+    for kind, mutation in CATALOGUE.items():
+        done: set[str] = set()
+        for target in applicable(scene, mutation):
+            if target.kind in done and not all_targets:
+                continue
+            reason = mutation.idle(scene, target.name) or _no_mutant(scene, kind, target.name, true, what)
+            if reason:
+                passed.append(PassedOver(mutation=kind, target=target.name, reason=reason))
+                continue
+            done.add(target.kind)
+            control = _control(what, kind, target.name)
+            mutants[control.name] = control
+    small = reduced(what)
+    run = msgspec.structs.replace(small.run, controls=tuple(mutants.values()))
+    return Litter(replace(small, run=run), mutants, tuple(passed))
+
+
+def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what: Subject) -> str:
+    """Why the mutated scene is none that could be run and told from the true one; "" if it is."""
+    variant = msgspec.structs.replace(what.variant, level=None)
+    try:
+        mutant = variant_scene(mutate(scene, kind, target), variant)
+        check_scene(mutant, t_end=variant.duration_s or what.case.run.duration_s)
+    except (ValueError, NotImplementedError, OSError) as error:
+        return f"it makes no scene: {' '.join(str(error).split())}"
+    if same_to_rounding(mutant, true):
+        return f'variant "{variant.name}" does not model what it changes'
+    return ""
+
+
+def same_to_rounding(one: Any, other: Any) -> bool:
+    """Whether two scenes, or parts of them, differ by rounding at most: modes that come by another way are others.
+
+    Numbers of a vector, or of a row, are held against the largest of them: a zero may come out as a small number.
+    """
+    if isinstance(one, msgspec.Struct):
+        keys = one.__struct_fields__
+        return type(one) is type(other) and all(same_to_rounding(getattr(one, k), getattr(other, k)) for k in keys)
+    if not (isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other)):
+        return _near(one, other, 0.0)
+    if all(isinstance(each, float) for each in (*one, *other)):
+        largest = max(map(abs, one), default=0.0)
+        return all(_near(a, b, largest) for a, b in zip(one, other, strict=True))
+    return all(map(same_to_rounding, one, other))
+
+
+def _near(one: Any, other: Any, size: float) -> bool:
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isclose(one, other, rel_tol=ROUNDING, abs_tol=ROUNDING * size)
+    return bool(one == other)
+
+
+def _control(what: Subject, kind: MutationKind, target: str) -> Control:
+    side = ComparisonSide(variant=what.variant.name, engine=what.engine)
+    name = f"{kind} of {target}" if target else kind
+    return Control(name=name, mutation=kind, target=target, a=side, b=side, goals=what.goals, scales=what.scales)

@@ -1,0 +1,89 @@
+"""What of a case is put to the proof: one variant run by one engine, and the goals that its channels are judged by."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import msgspec
+
+from crosscheck.library.case import CaseError, Comparison, Variant
+from crosscheck.library.find import Case
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A case reduced to one variant and one engine.
+
+    `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others, where it has
+    none); of two goals for one pattern the stricter counts.
+    """
+
+    case: Case
+    variant: Variant
+    engine: str
+    goals: dict[str, float]
+    scales: dict[str, float]
+
+
+def subject(case: Case, engine: str) -> Subject:
+    """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
+
+    CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
+    """
+    judged = [_variants(each) for each in _agreeing(case)]
+    names = [name for group in judged for name in group]
+    if case.run.reference is not None and case.run.reference.variant in names:
+        names.insert(0, case.run.reference.variant)
+    named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
+    for name in dict.fromkeys(names):
+        variant = case.run.variant(name)
+        goals, scales = _asked(case, name, engine)
+        if goals and (engine not in named or engine in (*variant.engines, *variant.also)):
+            alone = msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None)
+            efforts = tuple(ladder for ladder in variant.efforts if ladder.engine == engine)
+            return Subject(case, msgspec.structs.replace(alone, efforts=efforts), engine, goals, scales)
+    raise CaseError(f"{case.name}: no comparison judges a variant that engine {engine} runs: it cannot notice anything")
+
+
+def reduced(what: Subject) -> Case:
+    """The case with nothing but the subject's run: no comparison, no control, no chart."""
+    run = msgspec.structs.replace(
+        what.case.run,
+        variants=(what.variant,),
+        comparisons=(),
+        controls=(),
+        conservations=(),
+        charts=(),
+        reference=None,
+    )
+    return replace(what.case, run=run, accepted={})
+
+
+def _agreeing(case: Case) -> list[Comparison]:
+    """Comparisons that must agree; where a case has none, all."""
+    return [each for each in case.run.comparisons if each.expect == "agree"] or list(case.run.comparisons)
+
+
+def _variants(comparison: Comparison) -> list[str]:
+    if comparison.variant is not None:
+        return [comparison.variant]
+    return [side.variant for side in (comparison.a, comparison.b) if side is not None]
+
+
+def _engines(case: Case, comparison: Comparison) -> tuple[str, ...]:
+    if comparison.variant is not None:
+        return comparison.engines or case.run.variant(comparison.variant).engines
+    return tuple(side.engine for side in (comparison.a, comparison.b) if side is not None)
+
+
+def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Goals and scales of a variant's comparisons: of those with the engine that must agree, where there are such."""
+    goals: dict[str, float] = {}
+    scales: dict[str, float] = {}
+    about = [each for each in case.run.comparisons if variant in _variants(each)]
+    agreeing = [each for each in about if each.expect == "agree"] or about
+    for comparison in [each for each in agreeing if engine in _engines(case, each)] or agreeing:
+        for pattern, goal in comparison.goals.items():
+            goals[pattern] = min(goal, goals.get(pattern, goal))
+        scales |= comparison.scales
+    return goals, scales

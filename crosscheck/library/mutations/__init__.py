@@ -1,0 +1,41 @@
+"""The catalogue of mutations: deliberate faults of a scene that a comparison must notice.
+
+Each is what a convention error or a slip in the data would do; they stand in files by what they change. A mutation that
+leaves the scene as it was is refused, since a control that changes nothing cannot be noticed.
+"""
+
+from __future__ import annotations
+
+from crosscheck.library.case import CaseError, MutationKind
+from crosscheck.library.mutations import frames, gravity, hinges, inertia, loads, modes, time_courses, wheels
+from crosscheck.library.mutations.mutation import Mutation, Target
+from flexmb.scene.schema import Scene
+
+CATALOGUE: dict[MutationKind, Mutation] = {
+    each.name: each
+    for room in (inertia, frames, hinges, wheels, gravity, loads, modes, time_courses)
+    for each in room.MUTATIONS
+}
+
+
+def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:
+    """The scene with one deliberate fault; CaseError where there is no such target or nothing would change."""
+    changed = CATALOGUE[mutation].change(scene, target)
+    if changed == scene:
+        raise CaseError(f'control "{mutation}" of "{target}" changes nothing in scene "{scene.name}": choose another')
+    return changed
+
+
+def applicable(scene: Scene, mutation: Mutation) -> list[Target]:
+    """The targets of a scene that the mutation can change, those among them that physics says nothing would show."""
+    found = []
+    for target in mutation.targets(scene):
+        try:
+            mutate(scene, mutation.name, target.name)
+        except CaseError:
+            continue
+        found.append(target)
+    return found
+
+
+__all__ = ["CATALOGUE", "Mutation", "Target", "applicable", "mutate"]

@@ -1,0 +1,142 @@
+"""How mutations reach into a scene: one named item replaced, and the targets that a scene offers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import TypeVar
+
+import msgspec
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.mutation import FACTOR, Target
+from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
+from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
+from flexmb.scene.schema import Load, PointMass, Scene, Wheel
+from flexmb.scene.tree import Coordinate, coordinates
+
+AnyNode = Node | BeamNode | ModalNode
+Named = TypeVar("Named", Body, Hinge, Wheel, Load, Closure, PointMass)
+
+
+def on_body(scene: Scene, target: str, change: Callable[[Body], Body]) -> Scene:
+    return msgspec.structs.replace(scene, bodies=replaced(scene.bodies, target, change))
+
+
+def on_hinge(scene: Scene, target: str, change: Callable[[Hinge], Hinge]) -> Scene:
+    return msgspec.structs.replace(scene, hinges=replaced(scene.hinges, target, change))
+
+
+def on_wheel(scene: Scene, target: str, change: Callable[[Wheel], Wheel]) -> Scene:
+    return msgspec.structs.replace(scene, wheels=replaced(scene.wheels, target, change))
+
+
+def on_load(scene: Scene, target: str, change: Callable[[Load], Load]) -> Scene:
+    return msgspec.structs.replace(scene, loads=replaced(scene.loads, target, change))
+
+
+def on_closure(scene: Scene, target: str, change: Callable[[Closure], Closure]) -> Scene:
+    return msgspec.structs.replace(scene, closures=replaced(scene.closures, target, change))
+
+
+def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> Scene:
+    """Node "body.node" replaced (body names may hold dots, node names may not here)."""
+    body_name, _, node_name = target.rpartition(".")
+
+    def with_node(body: Body) -> Body:
+        if isinstance(body, SidBody):
+            raise CaseError(f'body "{body.name}" keeps its nodes in a file: this mutation needs them inline')
+        nodes = tuple(change(node) if node.name == node_name else node for node in body.nodes)
+        return msgspec.structs.replace(body, nodes=nodes)
+
+    return on_body(scene, body_name, with_node)
+
+
+def replaced(items: tuple[Named, ...], target: str, change: Callable[[Named], Named]) -> tuple[Named, ...]:
+    """The items with the one called `target` changed; CaseError names those there are."""
+    if all(item.name != target for item in items):
+        known = ", ".join(item.name for item in items) or "none"
+        raise CaseError(f'control names "{target}", but there are only {known}')
+    return tuple(change(item) if item.name == target else item for item in items)
+
+
+def with_coordinates(hinge: Hinge, change: Callable[[Coordinate], Coordinate]) -> Hinge:
+    """The hinge with each of its scalar coordinates changed; none has a weld, a spherical and a free hinge."""
+    single: dict[str, Coordinate] = {}
+    several: dict[str, tuple[Coordinate, ...]] = {}
+    for name, coordinate in coordinates(hinge):
+        field, numbered, _ = name.partition("[")
+        if numbered:
+            several[field] = (*several.get(field, ()), change(coordinate))
+        else:
+            single[field] = change(coordinate)
+    return msgspec.structs.replace(hinge, **single, **several)
+
+
+def key_of(coordinate: Coordinate, stem: str) -> str:
+    """The key of a coordinate that begins with `stem`, whatever its unit: "stiffness", "prescribed"."""
+    return next(key for key in coordinate.__struct_fields__ if key.startswith(stem))
+
+
+def motor_key(coordinate: Coordinate) -> str:
+    """The key of the motor's function."""
+    match coordinate:
+        case AngularCoordinate():
+            return "torque_Nm"
+        case LinearCoordinate():
+            return "force_N"
+
+
+def place_key(coordinate: Coordinate) -> str:
+    """The key of the initial value."""
+    return "angle_rad" if isinstance(coordinate, AngularCoordinate) else "position_m"
+
+
+def whole(scene: Scene) -> Iterator[Target]:
+    yield Target("", "scene")
+
+
+def bodies(scene: Scene) -> Iterator[Target]:
+    yield from (Target(body.name, _tag(body)) for body in scene.bodies)
+
+
+def hinges(scene: Scene) -> Iterator[Target]:
+    yield from (Target(hinge.name, _tag(hinge)) for hinge in scene.hinges)
+
+
+def wheels(scene: Scene) -> Iterator[Target]:
+    yield from (Target(wheel.name, "wheel") for wheel in scene.wheels)
+
+
+def loads(scene: Scene) -> Iterator[Target]:
+    yield from (Target(load.name, f"{load.type} in {load.frame} axes") for load in scene.loads)
+
+
+def closures(scene: Scene) -> Iterator[Target]:
+    yield from (Target(closure.name, f"{closure.type} closure") for closure in scene.closures)
+
+
+def point_masses(scene: Scene) -> Iterator[Target]:
+    yield from (Target(mass.name, "point mass") for mass in scene.point_masses)
+
+
+def nodes(scene: Scene) -> Iterator[Target]:
+    for body in scene.bodies:
+        if not isinstance(body, SidBody):
+            yield from (Target(f"{body.name}.{node.name}", f"node of {_tag(body)}") for node in body.nodes)
+
+
+def scaled(values: tuple, factor: float = FACTOR) -> tuple:
+    """Numbers, in tuples however deep, multiplied."""
+    return tuple(scaled(value, factor) if isinstance(value, tuple) else factor * value for value in values)
+
+
+def opposite(vector: Vector) -> Vector:
+    return (-vector[0], -vector[1], -vector[2])
+
+
+def conjugate(quaternion: Quaternion) -> Quaternion:
+    return (quaternion[0], -quaternion[1], -quaternion[2], -quaternion[3])
+
+
+def _tag(item: Body | Hinge) -> str:
+    return str(item.__struct_config__.tag)

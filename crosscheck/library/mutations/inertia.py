@@ -1,0 +1,191 @@
+"""Mutations of masses, mass centres and moments of inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+import numpy as np
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.edits import bodies, on_body, opposite, point_masses, replaced, scaled
+from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.turning import EPS, only_axis
+from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody
+from flexmb.scene.schema import PointMass, Scene
+
+MILLI = 1e-3
+
+
+def _mass(scene: Scene, target: str) -> Scene:
+    """+1 % mass, inertia untouched (a beam: mass per length)."""
+
+    def heavier(body: Body) -> Body:
+        match body:
+            case RigidBody():
+                return msgspec.structs.replace(body, mass_kg=FACTOR * body.mass_kg)
+            case BeamBody():
+                return _scaled_stations(body, ("mass_per_length_kg_m",))
+            case ModalBody() if body.points:
+                return _scaled_points(body)
+        raise CaseError(f'body "{body.name}" keeps its mass in a file: control "mass" needs it inline')
+
+    return on_body(scene, target, heavier)
+
+
+def _inertia(scene: Scene, target: str) -> Scene:
+    """+1 % inertia about the mass centre."""
+
+    def stiffer_to_turn(body: Body) -> Body:
+        match body:
+            case RigidBody():
+                return msgspec.structs.replace(body, inertia_kg_m2=scaled(body.inertia_kg_m2))
+            case BeamBody():
+                return _scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
+        raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
+
+    return on_body(scene, target, stiffer_to_turn)
+
+
+def _point_mass(scene: Scene, target: str) -> Scene:
+    def heavier(mass: PointMass) -> PointMass:
+        return msgspec.structs.replace(mass, mass_kg=FACTOR * mass.mass_kg)
+
+    return msgspec.structs.replace(scene, point_masses=replaced(scene.point_masses, target, heavier))
+
+
+def _of_rigid(name: str, change: Callable[[RigidBody], RigidBody]) -> Callable[[Scene, str], Scene]:
+    """A change of one rigid body; CaseError for any other."""
+
+    def changed(body: Body) -> Body:
+        if isinstance(body, RigidBody):
+            return change(body)
+        raise CaseError(f'control "{name}" changes rigid bodies, not "{body.name}"')
+
+    return lambda scene, target: on_body(scene, target, changed)
+
+
+def _com(body: RigidBody) -> RigidBody:
+    return msgspec.structs.replace(body, com_m=scaled(body.com_m))
+
+
+def _com_sign(body: RigidBody) -> RigidBody:
+    return msgspec.structs.replace(body, com_m=opposite(body.com_m))
+
+
+def _com_unit(body: RigidBody) -> RigidBody:
+    return msgspec.structs.replace(body, com_m=scaled(body.com_m, MILLI))
+
+
+def _with(body: RigidBody, J: np.ndarray) -> RigidBody:
+    return msgspec.structs.replace(body, inertia_kg_m2=_matrix(J))
+
+
+def _swapped(body: RigidBody) -> RigidBody:
+    """x and z of the body's axes exchanged, so that J_xx and J_zz change places."""
+    return _with(body, np.asarray(body.inertia_kg_m2)[::-1, ::-1])
+
+
+def _products(body: RigidBody) -> RigidBody:
+    J = np.asarray(body.inertia_kg_m2)
+    return _with(body, 2.0 * np.diag(np.diag(J)) - J)
+
+
+def _about_origin(body: RigidBody) -> RigidBody:
+    """The parallel axes' part m (c.c 1 - c c) added once more."""
+    c = np.asarray(body.com_m)
+    return _with(body, np.asarray(body.inertia_kg_m2) + body.mass_kg * (c @ c * np.eye(3) - np.outer(c, c)))
+
+
+def _spherical(body: RigidBody) -> RigidBody:
+    """A third of the trace about every axis: w x J w vanishes."""
+    return _with(body, np.trace(np.asarray(body.inertia_kg_m2)) / 3.0 * np.eye(3))
+
+
+def _matrix(J: np.ndarray) -> Matrix3:
+    a, b, c = (tuple(float(value) + 0.0 for value in row) for row in J)  # + 0.0: no negative zeros
+    return (a, b, c)  # type: ignore[return-value]  # rows of three
+
+
+def _same_about_its_axis(change: Callable[[RigidBody], RigidBody]) -> Callable[[Scene, str], str]:
+    """Of a body that turns about one axis e only, the inertia enters as J e."""
+
+    def idle(scene: Scene, target: str) -> str:
+        body = next(body for body in scene.bodies if body.name == target)
+        axis = only_axis(scene, target)
+        if axis is None or not isinstance(body, RigidBody):
+            return ""
+        J, other = np.asarray(body.inertia_kg_m2), np.asarray(change(body).inertia_kg_m2)
+        same = np.max(np.abs((other - J) @ axis)) <= EPS * np.max(np.abs(J))
+        return "the body turns about one axis only, and the inertia about that is the same" if same else ""
+
+    return idle
+
+
+def _scaled_stations(body: BeamBody, keys: tuple[str, ...]) -> BeamBody:
+    stations = tuple(
+        msgspec.structs.replace(station, **{key: FACTOR * getattr(station, key) for key in keys})
+        for station in body.stations
+    )
+    return msgspec.structs.replace(body, stations=stations)
+
+
+def _scaled_points(body: ModalBody) -> ModalBody:
+    points = tuple(msgspec.structs.replace(point, mass_kg=FACTOR * point.mass_kg) for point in body.points)
+    return msgspec.structs.replace(body, points=points)
+
+
+MUTATIONS = (
+    Mutation(
+        "mass", "+1 % mass of a body, its inertia as it was", "a wrong figure, or a lump forgotten", bodies, _mass
+    ),
+    Mutation("inertia", "+1 % inertia about the mass centre", "a wrong figure", bodies, _inertia),
+    Mutation(
+        "inertia_swapped",
+        "x and z exchanged in the inertia of a rigid body",
+        "another order of the axes",
+        bodies,
+        _of_rigid("inertia_swapped", _swapped),
+        _same_about_its_axis(_swapped),
+    ),
+    Mutation(
+        "inertia_products",
+        "opposite sign of the products of inertia",
+        "J_xy taken for its negative, as half of all textbooks define it",
+        bodies,
+        _of_rigid("inertia_products", _products),
+        _same_about_its_axis(_products),
+    ),
+    Mutation(
+        "inertia_about_origin",
+        "parallel-axis part added to an inertia about the mass centre",
+        "inertia about the mass centre taken for that about the body origin, or the part counted twice",
+        bodies,
+        _of_rigid("inertia_about_origin", _about_origin),
+        _same_about_its_axis(_about_origin),
+    ),
+    Mutation(
+        "gyroscopic",
+        "inertia made spherical, a third of its trace about every axis",
+        "the gyroscopic moment w x J w left out",
+        bodies,
+        _of_rigid("gyroscopic", _spherical),
+        _same_about_its_axis(_spherical),
+    ),
+    Mutation("com", "+1 % offset of the mass centre", "a wrong figure", bodies, _of_rigid("com", _com)),
+    Mutation(
+        "com_sign",
+        "opposite offset of the mass centre",
+        "from the mass centre to the origin instead of the other way",
+        bodies,
+        _of_rigid("com_sign", _com_sign),
+    ),
+    Mutation(
+        "com_unit",
+        "offset of the mass centre a thousandth",
+        "millimetres taken for metres, or the offset left out",
+        bodies,
+        _of_rigid("com_unit", _com_unit),
+    ),
+    Mutation("point_mass", "+1 % of a point mass", "a wrong figure", point_masses, _point_mass),
+)

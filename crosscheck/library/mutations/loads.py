@@ -1,0 +1,56 @@
+"""Mutations of the loads that act from outside."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.edits import loads, on_load, opposite
+from crosscheck.library.mutations.mutation import Mutation
+from flexmb.scene.bodies import SidBody
+from flexmb.scene.schema import Load, Scene
+from flexmb.scene.tree import rest_frames
+
+
+def _of_load(change: Callable[[Load], Load]) -> Callable[[Scene, str], Scene]:
+    return lambda scene, target: on_load(scene, target, change)
+
+
+def _sign(load: Load) -> Load:
+    return msgspec.structs.replace(load, direction=opposite(load.direction))
+
+
+def _frame(load: Load) -> Load:
+    return msgspec.structs.replace(load, frame="node" if load.frame == "world" else "world")
+
+
+def _point(scene: Scene, target: str) -> Scene:
+    """At the first other place of the body: the origin, or one of its nodes where the load acts at the origin."""
+
+    def moved(load: Load) -> Load:
+        body = next(body for body in scene.bodies if body.name == load.body)
+        if isinstance(body, SidBody):
+            raise CaseError(f'body "{body.name}" keeps its nodes in a file: "load_point" needs them inline')
+        frames = rest_frames(body)
+        here = frames[load.node].position
+        other = [name for name, frame in frames.items() if frame.position != here]
+        if load.type == "torque" or not other:
+            raise CaseError(f'load "{load.name}" is a torque or has no other place on "{body.name}"')
+        return msgspec.structs.replace(load, node="origin" if "origin" in other else other[0])
+
+    return on_load(scene, target, moved)
+
+
+MUTATIONS = (
+    Mutation("load_sign", "opposite load", "action taken for reaction", loads, _of_load(_sign)),
+    Mutation("load_point", "force at another point of its body", "another reference point", loads, _point),
+    Mutation(
+        "load_frame",
+        "load in World axes instead of the node's, or the other way",
+        "dead load taken for follower load",
+        loads,
+        _of_load(_frame),
+    ),
+)

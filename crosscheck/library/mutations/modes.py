@@ -1,0 +1,136 @@
+"""Mutations of flexible bodies: their modes, their sections and the terms of their level."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import msgspec
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.edits import bodies, on_body, whole
+from crosscheck.library.mutations.mutation import Mutation
+from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode, RigidBody
+from flexmb.scene.schema import Scene
+from flexmb.surrogate import modal_points
+
+
+def _unstiffened(scene: Scene, target: str) -> Scene:
+    """Level stiffened becomes full (of body `target`, or of all)."""
+
+    def changed(body: Body) -> Body:
+        wanted = target in ("", body.name) and not isinstance(body, RigidBody) and body.level == "stiffened"
+        return msgspec.structs.replace(body, level="full") if wanted else body
+
+    return msgspec.structs.replace(scene, bodies=tuple(map(changed, scene.bodies)))
+
+
+def _undeformed(scene: Scene, target: str) -> Scene:
+    """Level full or stiffened becomes ruthless: inertia of the undeformed body."""
+
+    def changed(body: Body) -> Body:
+        wanted = not isinstance(body, RigidBody) and body.level in ("full", "stiffened", "linear")
+        return msgspec.structs.replace(body, level="ruthless") if wanted else body
+
+    return on_body(scene, target, changed)
+
+
+def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> Callable[[Scene, str], Scene]:
+    """A change of the modes of one body; a beam is made the points and modes that it stands for."""
+
+    def changed(scene: Scene, target: str) -> Scene:
+        alone = next((body for body in scene.bodies if body.name == target), None)
+        if isinstance(alone, BeamBody):
+            alone = modal_points(msgspec.structs.replace(scene, bodies=(alone,))).bodies[0]
+        if not isinstance(alone, ModalBody) or not alone.points:
+            raise CaseError(f'control "{name}" changes beams and inline modal bodies, not "{target}"')
+        spoilt = change(alone)
+        return on_body(scene, target, lambda body: spoilt)
+
+    return changed
+
+
+def _sign(body: ModalBody) -> ModalBody:
+    """The first mode with opposite sign in the nodes, as it was in the points."""
+
+    def spoilt(node: ModalNode) -> ModalNode:
+        return msgspec.structs.replace(
+            node,
+            translation_modes=_first_opposite(node.translation_modes),
+            rotation_modes=_first_opposite(node.rotation_modes),
+        )
+
+    return msgspec.structs.replace(body, nodes=tuple(map(spoilt, body.nodes)))
+
+
+def _first_opposite(modes: tuple) -> tuple:
+    return tuple(tuple(-value for value in mode) if i == 0 else mode for i, mode in enumerate(modes))
+
+
+def _order(body: ModalBody) -> ModalBody:
+    """Rows and columns of the first two modes exchanged in the stiffness alone."""
+    if len(body.stiffness) < 2:
+        raise CaseError(f'body "{body.name}" has fewer than two modes to be exchanged')
+    order = [1, 0, *range(2, len(body.stiffness))]
+    stiffness = tuple(tuple(body.stiffness[i][j] for j in order) for i in order)
+    return msgspec.structs.replace(body, stiffness=stiffness)
+
+
+def _no_rotation(body: ModalBody) -> ModalBody:
+    """Slopes of the modes left out at the nodes."""
+
+    def flat(node: ModalNode) -> ModalNode:
+        return msgspec.structs.replace(node, rotation_modes=tuple((0.0, 0.0, 0.0) for _ in node.rotation_modes))
+
+    return msgspec.structs.replace(body, nodes=tuple(map(flat, body.nodes)))
+
+
+def _section(scene: Scene, target: str) -> Scene:
+    def swapped(body: Body) -> Body:
+        if not isinstance(body, BeamBody):
+            raise CaseError(f'control "section_axes" changes beams, not "{body.name}"')
+        stations = tuple(
+            msgspec.structs.replace(each, EIy_Nm2=each.EIz_Nm2, EIz_Nm2=each.EIy_Nm2) for each in body.stations
+        )
+        return msgspec.structs.replace(body, stations=stations)
+
+    return on_body(scene, target, swapped)
+
+
+MUTATIONS = (
+    Mutation(
+        "dropped_stiffening",
+        "level stiffened becomes full",
+        "geometric stiffening left out",
+        whole,
+        _unstiffened,
+    ),
+    Mutation(
+        "dropped_deformation",
+        "level full or stiffened becomes ruthless",
+        "Coriolis, centrifugal and inertia terms of the deformation left out",
+        bodies,
+        _undeformed,
+    ),
+    Mutation(
+        "mode_sign",
+        "sign of the first mode at the nodes, not in the inertia",
+        "modes of two analyses mixed: the sign of an eigenvector is arbitrary",
+        bodies,
+        _of_modes("mode_sign", _sign),
+    ),
+    Mutation(
+        "mode_order",
+        "first two modes exchanged in the stiffness",
+        "modes sorted in one file and not in the other",
+        bodies,
+        _of_modes("mode_order", _order),
+    ),
+    Mutation(
+        "mode_rotation",
+        "no rotation of the nodes by the modes",
+        "slopes left out: what is mounted on the body does not turn with its bending",
+        bodies,
+        _of_modes("mode_rotation", _no_rotation),
+    ),
+    Mutation("section_axes", "EIy and EIz exchanged", "bending about y taken for bending along y", bodies, _section),
+)

@@ -1,0 +1,148 @@
+"""Mutations of functions of time: of motors, of prescribed motion and of loads."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator
+
+import msgspec
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.edits import (
+    key_of,
+    motor_key,
+    on_hinge,
+    on_load,
+    on_wheel,
+    with_coordinates,
+)
+from crosscheck.library.mutations.mutation import FACTOR, Mutation, Target
+from crosscheck.library.time_functions import delayed, scaled
+from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.schema import Scene, Wheel
+from flexmb.scene.tree import Coordinate, coordinates
+
+Change = Callable[[Function], Function]
+HUNDREDTH = 0.01
+PHASE_RAD = 0.01
+
+
+def _motors(scene: Scene) -> Iterator[Target]:
+    """Hinges and wheels with a motor."""
+    for hinge in scene.hinges:
+        if any(getattr(each, motor_key(each)) is not None for _, each in coordinates(hinge)):
+            yield Target(hinge.name, "motor of a hinge")
+    yield from (Target(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
+
+
+def _driven(scene: Scene) -> Iterator[Target]:
+    """Everything with a function of time; one kind for each kind of function."""
+    for hinge in scene.hinges:
+        for _, each in coordinates(hinge):
+            for what, key in (("motor", motor_key(each)), ("drive", key_of(each, "prescribed"))):
+                function = getattr(each, key)
+                if function is not None:
+                    yield Target(hinge.name, f"{what}, {_kind(function)}")
+    for wheel in scene.wheels:
+        for function in (wheel.torque_Nm, wheel.prescribed_rad):
+            if function is not None:
+                yield Target(wheel.name, f"wheel, {_kind(function)}")
+    yield from (Target(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
+
+
+def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
+    """The hinge, wheel or load called `target` with motors and loads by `change`, prescribed motions by `motion`."""
+
+    def of_coordinate(coordinate: Coordinate) -> Coordinate:
+        motor, prescribed = motor_key(coordinate), key_of(coordinate, "prescribed")
+        return msgspec.structs.replace(
+            coordinate,
+            **{motor: _changed(getattr(coordinate, motor), change)},
+            **{prescribed: _changed(getattr(coordinate, prescribed), motion)},
+        )
+
+    def of_wheel(wheel: Wheel) -> Wheel:
+        return msgspec.structs.replace(
+            wheel,
+            torque_Nm=_changed(wheel.torque_Nm, change),
+            prescribed_rad=_changed(wheel.prescribed_rad, motion),
+        )
+
+    if any(hinge.name == target for hinge in scene.hinges):
+        return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, of_coordinate))
+    if any(wheel.name == target for wheel in scene.wheels):
+        return on_wheel(scene, target, of_wheel)
+    if any(load.name == target for load in scene.loads):
+        return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
+    raise CaseError(f'no hinge, wheel or load is called "{target}"')
+
+
+def _changed(function: Function | None, change: Change | None) -> Function | None:
+    return function if function is None or change is None else change(function)
+
+
+def _motor_sign(scene: Scene, target: str) -> Scene:
+    return _on_item(scene, target, lambda function: scaled(function, -1.0))
+
+
+def _size(scene: Scene, target: str) -> Scene:
+    return _on_item(scene, target, lambda function: scaled(function, FACTOR), _farther)
+
+
+def _late(scene: Scene, target: str) -> Scene:
+    return _on_item(scene, target, _a_little_late, _a_little_late)
+
+
+def _farther(motion: Function) -> Function:
+    """A prescribed motion that goes farther from where it begins, which the initial state fits."""
+    match motion:
+        case Ramp():
+            start = motion.value - motion.rate * motion.start_s
+            return msgspec.structs.replace(motion, value=start, rate=FACTOR * motion.rate, start_s=0.0)
+        case Sine():
+            start = motion.amplitude * math.sin(motion.phase_rad)
+            offset = motion.offset + (1.0 - FACTOR) * start
+            return msgspec.structs.replace(motion, amplitude=FACTOR * motion.amplitude, offset=offset)
+        case SmoothStep():
+            end = motion.start_value + FACTOR * (motion.end_value - motion.start_value)
+            return msgspec.structs.replace(motion, end_value=end)
+    return scaled(motion, FACTOR)
+
+
+def _a_little_late(function: Function) -> Function:
+    """By a hundredth of the function's own time; of a ramp, which has none, by a hundredth of a second."""
+    match function:
+        case SmoothStep() | Pulse():
+            return delayed(function, HUNDREDTH * function.duration_s)
+        case Sine() if function.angular_frequency_rad_s != 0.0:
+            return delayed(function, PHASE_RAD / function.angular_frequency_rad_s)
+        case Ramp():
+            return delayed(function, HUNDREDTH)
+        case SpinUp():
+            return msgspec.structs.replace(function, duration_s=FACTOR * function.duration_s)
+        case Table():
+            raise CaseError("a table of values ends where it ends: it cannot come late")
+    return function
+
+
+def _kind(function: Function) -> str:
+    return str(function.__struct_config__.tag)
+
+
+MUTATIONS = (
+    Mutation(
+        "motor_sign",
+        "opposite torque or force of a motor",
+        "motor on the wrong one of two bodies",
+        _motors,
+        _motor_sign,
+    ),
+    Mutation("function_size", "+1 % of a function of time", "a wrong figure", _driven, _size),
+    Mutation(
+        "function_phase",
+        "a function of time late by a hundredth of its own time (a spin-up takes 1 % longer)",
+        "another phase, or another zero of the clock",
+        _driven,
+        _late,
+    ),
+)

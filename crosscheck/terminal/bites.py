@@ -1,0 +1,73 @@
+"""Mutation scores on the terminal: a line a case, then every fault that was missed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Column, Table
+
+from crosscheck.biting.score import ENOUGH, CaseBite, Mutant, mean_score
+from crosscheck.terminal.text import words
+
+
+def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = False) -> int:
+    """Print the scores; the exit code: 1 where the mean score is too low, or where something was not judged."""
+    console.print(_table(bites))
+    for each in bites:
+        for mutant in each.missed:
+            console.print(words(f"missed: {each.case}: {_named(mutant)}: {mutant.reason}", "yellow"), soft_wrap=True)
+        for mutant in each.not_judged:
+            console.print(words(f"not judged: {each.case}: {_named(mutant)}: {mutant.reason}", "red"), soft_wrap=True)
+        if verbose:
+            _details(console, each)
+    mean = mean_score(bites)
+    judged = not any(each.not_judged or each.score is None for each in bites)
+    good = judged and mean is not None and mean >= ENOUGH
+    shown = "none" if mean is None else f"{mean:.3f}"
+    console.print(words(f"Mean mutation score {shown}; {ENOUGH:g} is asked for.", "green" if good else "red"))
+    return 0 if good else 1
+
+
+def _table(bites: Sequence[CaseBite]) -> Table:
+    numbers = [Column(name, justify="right") for name in ("mutants", "noticed", "score", "at goals")]
+    table = Table(
+        Column("case", no_wrap=True),
+        "variant",
+        *numbers,
+        "weakest channel",
+        box=SIMPLE_HEAD,
+        pad_edge=False,
+        header_style="bold",
+    )
+    for each in bites:
+        counted = each.counted
+        noticed = sum(mutant.outcome == "noticed" for mutant in counted)
+        figures = ["–" if value is None else f"{value:.2f}" for value in (each.score, each.score_at_goals)]
+        cells = (each.case, each.variant, str(len(counted)), str(noticed), *figures, _weakest(each))
+        table.add_row(*(words(cell) for cell in cells))
+    return table
+
+
+def _weakest(each: CaseBite) -> str:
+    """Of the channels that notice anything: those of quantities that the case does not have notice nothing."""
+    seeing = {name: score for name, score in each.channels.items() if score.noticed}
+    if not seeing:
+        return ""
+    name, score = min(seeing.items(), key=lambda item: item[1].noticed / item[1].mutants)
+    return f"{name} {score.noticed}/{score.mutants}"
+
+
+def _details(console: Console, each: CaseBite) -> None:
+    for name, score in each.channels.items():
+        console.print(words(f"  {each.case}: {name}: {score.noticed} of {score.mutants}"), soft_wrap=True)
+    for mutant in each.mutants:
+        console.print(words(f"  {each.case}: {_named(mutant)}: {mutant.outcome}: {mutant.reason}"), soft_wrap=True)
+    for passed in each.passed_over:
+        where = f" of {passed.target}" if passed.target else ""
+        console.print(words(f"  {each.case}: {passed.mutation}{where}: passed over: {passed.reason}"), soft_wrap=True)
+
+
+def _named(mutant: Mutant) -> str:
+    return f"{mutant.mutation} of {mutant.target}" if mutant.target else mutant.mutation

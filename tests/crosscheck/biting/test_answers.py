@@ -1,0 +1,104 @@
+"""Faults planted in answers: each changes what it says, keeps to the contract, and is caught in an ordinary session."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
+from crosscheck.engines.answers import checked_run
+from crosscheck.engines.contract import MarkerPath, Trajectory
+from crosscheck.judging.outcome import conclude
+from crosscheck.judging.results import collect
+from crosscheck.library.find import load_case
+from crosscheck.records.kinds import Record, RunRecord
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import plan
+from flexmb.run.channels import channels_of
+from flexmb.scene.bodies import Node, RigidBody
+from flexmb.scene.hinges import AngularCoordinate, Revolute
+from flexmb.scene.schema import Marker, Scene, Wheel
+from tests.crosscheck.sessions import copy_case
+
+TIMES = np.linspace(0.0, 1.0, 5)
+ARM = RigidBody(
+    name="arm", mass_kg=1.0, inertia_kg_m2=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+    nodes=(Node(name="tip"),),
+)  # fmt: skip
+SCENE = Scene(
+    name="arm with a wheel",
+    bodies=(ARM,),
+    hinges=(Revolute(name="pivot", parent="ground", child="arm", rotation=AngularCoordinate()),),
+    wheels=(
+        Wheel(
+            name="wheel", body="arm", axis=(0.0, 0.6, 0.8), mass_kg=1.0, axial_inertia_kg_m2=0.1,
+            transverse_inertia_kg_m2=0.06, speed_rad_s=3.0,
+        ),
+    ),
+    markers=(Marker(name="tip", body="arm", node="tip"),),
+)  # fmt: skip
+
+
+def answer() -> Trajectory:
+    """Everything that an engine can offer, at random."""
+    rng = np.random.default_rng(1)
+    quaternion = rng.normal(size=(5, 4))
+    quaternion /= np.linalg.norm(quaternion, axis=1, keepdims=True)
+    return Trajectory(
+        status="finished",
+        message="",
+        times=TIMES,
+        markers={"tip": MarkerPath(rng.normal(size=(5, 3)), quaternion, rng.normal(size=(5, 6)))},
+        loads={"pivot": rng.normal(size=(5, 6))},
+        wheel_loads={"wheel": rng.normal(size=(5, 6))},
+        drives={"pivot": rng.normal(size=(5, 1))},
+        energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},
+        momentum=rng.normal(size=(5, 6)),
+        work=rng.normal(size=5),
+    )
+
+
+@pytest.mark.parametrize("fault", FAULTS, ids=lambda each: each.name)
+def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFault) -> None:
+    right = channels_of(answer())
+    wrong = channels_of(checked_run(fault.falsify(answer(), SCENE), TIMES, SCENE))
+    changed = {name for name, values in wrong.items() if not np.allclose(values, right[name])}
+    assert set(wrong) == set(right)
+    assert 0 < len(changed) < len(right) or fault.name == "late"
+
+
+def test_a_run_is_told_by_its_channels() -> None:
+    channels = channels_of(answer())
+    again = channels_of(run_of(TIMES, channels))
+    assert set(again) == set(channels)
+    assert all(np.array_equal(values, again[name]) for name, values in channels.items())
+
+
+CAUGHT = (
+    "load_reaction", "load_reference", "load_axes", "orientation_transposed", "orientation_order", "velocity_axes",
+    "rate_unit", "position_unit", "energy_kinetic", "energy_gravity", "late",
+)  # fmt: skip
+
+
+def test_faulty_adapters_are_caught_in_an_ordinary_session(tmp_path: Path) -> None:
+    names = ", ".join(f'"{name}"' for name in ("fine", *CAUGHT))
+    run_file = f"""
+[[variant]]
+name = "rigid"
+engines = [{names}]
+
+[[comparison]]
+name = "all"
+variant = "rigid"
+goals = {{ "marker:tip" = 1e-6, "load" = 1e-6, "energy" = 1e-6, "momentum" = 1e-6 }}
+"""
+    record, jobs = plan(load_case(copy_case(tmp_path, run_file)), (), "tests.crosscheck.biting.faulty_engine:engines")
+    records: list[Record] = [record]
+    for job in jobs:
+        execute(job, lambda content: records.append(content) if isinstance(content, RunRecord) else None)
+    verdicts = conclude(collect(records)).all
+    for name in CAUGHT:
+        against = [each.status for each in verdicts if (each.engine_a, each.engine_b) == ("fine", name)]
+        assert "differ" in against, name

@@ -1,0 +1,129 @@
+"""Campaigns on the small case with a fake engine: faults are noticed, and a blind case is told that it is."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from crosscheck.biting.campaign import RECORDS, SCORES, run_campaign
+from crosscheck.biting.mutants import litter, same_to_rounding
+from crosscheck.biting.score import CaseBite
+from crosscheck.biting.subject import subject
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import Case, load_case, resolve, shipped_cases
+from crosscheck.running.scheduler import Limits
+from crosscheck.terminal.bites import print_bites
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
+
+BLIND = """
+[[variant]]
+name = "rigid"
+engines = ["fine", "stepper"]
+
+[[comparison]]
+name = "a released pendulum's total energy stays zero"
+variant = "rigid"
+goals = { "energy.total" = 1e-6 }
+"""
+
+
+def campaign(case: Case, out: Path, engine: str = "fine") -> CaseBite:
+    out.mkdir(exist_ok=True)
+    (bite,) = run_campaign([case], out, engine=engine, provider=PROVIDER, limits=Limits(workers=2))
+    return bite
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("campaign")
+
+
+@pytest.fixture(scope="module")
+def seeing(out: Path) -> CaseBite:
+    return campaign(load_case(CASE), out)
+
+
+def test_the_small_case_notices_its_faults(seeing: CaseBite) -> None:
+    noticed = {each.mutation for each in seeing.mutants if each.outcome == "noticed"}
+    assert {"mass", "com", "com_sign", "gravity_sign", "gravity_size", "gravity_dropped", "node_position"} <= noticed
+    assert {"load_reaction", "orientation_transposed", "velocity_axes", "late", "energy_gravity"} <= noticed
+    assert seeing.score is not None and seeing.score >= 0.95
+    assert seeing.channels["marker:tip.position"].noticed > 5
+
+
+def test_what_no_channel_could_show_is_passed_over_with_its_physics(seeing: CaseBite) -> None:
+    reasons = {each.mutation: each.reason for each in seeing.passed_over}
+    assert "only names the coordinate" in reasons["hinge_axis"]
+    assert reasons["wheel_load_reaction"] == "it changes nothing in this run"
+
+
+def test_the_scores_are_in_a_file_and_the_records_serve_again(seeing: CaseBite, out: Path) -> None:
+    stored = json.loads((out / SCORES).read_text(encoding="utf-8"))
+    assert stored["format"] == 1
+    assert stored["cases"][0]["score"] == seeing.score
+    assert {each["outcome"] for each in stored["cases"][0]["mutants"]} <= {
+        "noticed",
+        "missed",
+        "no mutant",
+        "not judged",
+    }
+    runs = (out / RECORDS).read_text(encoding="utf-8").count('"record":"run"')
+    assert campaign(load_case(CASE), out) == seeing
+    assert (out / RECORDS).read_text(encoding="utf-8").count('"record":"run"') == runs
+
+
+def test_a_blind_case_is_told_what_it_missed(tmp_path: Path) -> None:
+    bite = campaign(load_case(copy_case(tmp_path, BLIND)), tmp_path / "out")
+    assert bite.score is not None and bite.score < 0.95
+    assert {"mass", "com"} <= {each.mutation for each in bite.missed}
+    console = Console(record=True, width=200)
+    assert print_bites(console, [bite], verbose=True) == 1
+    text = console.export_text()
+    assert "missed: pendulum/single: mass of rod" in text and "passed over" in text
+
+
+def test_an_engine_that_is_absent_leaves_nothing_judged_and_no_score(tmp_path: Path) -> None:
+    run_file = BLIND.replace('"stepper"', '"absent"')
+    bite = campaign(load_case(copy_case(tmp_path, run_file)), tmp_path / "out", engine="absent")
+    assert bite.score is None and bite.not_judged
+    assert print_bites(Console(quiet=True), [bite]) == 1
+
+
+UNJUDGED = """
+[[variant]]
+name = "other"
+engines = ["sloppy"]
+"""
+
+
+def test_a_case_that_judges_nothing_of_an_engine_is_refused(tmp_path: Path) -> None:
+    case = load_case(copy_case(tmp_path, UNJUDGED + BLIND))
+    assert subject(case, "fine").variant.name == "rigid"
+    with pytest.raises(CaseError, match="no comparison judges a variant that engine sloppy runs"):
+        subject(case, "sloppy")
+
+
+def test_mutants_of_shipped_cases_are_scenes() -> None:
+    for case in resolve(("torque_driven", "slider_crank", "flying_spaghetti")):
+        found = litter(subject(case, "native"))
+        assert len(found.mutants) >= 5, case.name
+        assert all(each.reason for each in found.passed_over)
+
+
+def test_rounding_is_no_mutation_and_one_per_cent_is() -> None:
+    scene = load_case(CASE).scene(load_case(CASE).run.variants[0])
+    assert same_to_rounding(scene, scene)
+    assert same_to_rounding((1.0, 1e-17), (1.0 + 1e-15, 0.0))
+    assert not same_to_rounding(((1.0, 0.0), (0.0, 1e16)), ((2.0, 0.0), (0.0, 1e16)))
+    assert (
+        not same_to_rounding(1.0, 1.01) and not same_to_rounding((1.0,), (1.0, 1.0)) and not same_to_rounding("a", 1.0)
+    )
+
+
+@pytest.mark.slow
+def test_the_library_bites(tmp_path: Path) -> None:
+    bites = run_campaign(shipped_cases(), tmp_path)
+    assert print_bites(Console(), bites) == 0

@@ -1,0 +1,66 @@
+"""Invariances of whole runs: an engine that has only one World in it is found out, and what says nothing says why."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from crosscheck.biting.invariance_runs import VERDICTS, InvarianceVerdict, run_invariances
+from crosscheck.library.find import load_case
+from crosscheck.running.scheduler import Limits
+from crosscheck.terminal.invariances import print_invariances
+from tests.crosscheck.sessions import CASE, PROVIDER
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("invariances")
+
+
+@pytest.fixture(scope="module")
+def verdicts(out: Path) -> dict[str, InvarianceVerdict]:
+    """Of a pendulum in a few lines, which knows neither where its hinge stands nor which way its World is turned."""
+    found = run_invariances([load_case(CASE)], out, engine="fine", provider=PROVIDER, limits=Limits(workers=1))
+    return {each.invariance: each for each in found}
+
+
+def test_units_and_the_mirror_change_nothing(verdicts: dict[str, InvarianceVerdict]) -> None:
+    for name in ("rescaled", "mirrored"):
+        assert verdicts[name].status == "agree"
+        assert verdicts[name].channels >= 10
+
+
+@pytest.mark.parametrize("name", ["moved", "turned"])
+def test_an_engine_with_one_world_is_found_out(name: str, verdicts: dict[str, InvarianceVerdict]) -> None:
+    assert verdicts[name].status == "differ"
+    assert "marker:tip.position" in verdicts[name].differing
+    assert not verdicts[name].ok
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [("boosted", "stands on the ground by pivot"), ("clock", "nothing depends"), ("reordered", "one of each")],
+)
+def test_what_says_nothing_says_why(name: str, reason: str, verdicts: dict[str, InvarianceVerdict]) -> None:
+    assert verdicts[name].status == "not applicable" and verdicts[name].ok
+    assert reason in verdicts[name].reason
+
+
+def test_they_are_printed_and_kept(out: Path, verdicts: dict[str, InvarianceVerdict]) -> None:
+    console = Console(record=True, width=120)
+    assert print_invariances(console, list(verdicts.values())) == 1
+    text = console.export_text()
+    assert "pendulum/single" in text and "moved: differ" in text
+    stored = json.loads((out / VERDICTS).read_text(encoding="utf-8"))
+    assert {each["invariance"]: each["status"] for each in stored["verdicts"]} == {
+        name: each.status for name, each in verdicts.items()
+    }
+
+
+def test_an_absent_engine_is_no_agreement(tmp_path: Path) -> None:
+    found = run_invariances([load_case(CASE)], tmp_path, engine="missing", provider=PROVIDER, limits=Limits(workers=1))
+    assert {each.status for each in found} == {"did not run", "not applicable"}
+    assert print_invariances(Console(quiet=True), found) == 1

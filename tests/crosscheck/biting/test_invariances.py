@@ -1,0 +1,141 @@
+"""Counterparts give the same loads, motion and energies at one state, for every kind of hinge, body and load; what is
+changed by half is noticed."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache
+
+import msgspec
+import numpy as np
+import pytest
+
+from crosscheck.biting.invariances import INVARIANCES, Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.counterpart import Channels
+from crosscheck.engines.native import NativeEngine
+from crosscheck.engines.trajectories import stack
+from flexmb.run.channels import channels_of, distance, family, magnitude
+from flexmb.scene.functions import Pulse
+from flexmb.scene.schema import Scene
+from flexmb.surrogate import modal_points
+from tests.crosscheck.engines.random_scenes import random_scene as random_rigid
+from tests.trees import random_scene as random_flexible
+
+BY_NAME = {each.name: each for each in INVARIANCES}
+AT = np.array([0.0])
+BOUND = 1e-9  # of a family's size: rounding, times what a mass matrix of random bodies makes of it
+KINDS = ("free", "revolute", "prismatic", "cylindrical", "universal", "gimbal2", "gimbal3", "spherical", "planar")
+
+
+@cache
+def rigid() -> Scene:
+    """Every kind of hinge, on a body that flies, with wheels, point masses, loads and prescribed motion."""
+    rng = np.random.default_rng(3)
+    while True:
+        scene = random_rigid(rng, KINDS, driven=True)
+        if sum(hinge.parent == "ground" for hinge in scene.hinges) == 1:
+            return scene
+
+
+@cache
+def flexible() -> Scene:
+    return modal_points(random_flexible(5))
+
+
+def seen(scene: Scene) -> Channels:
+    """All channels (1, k) at the scene's initial state."""
+    snapshot = NativeEngine().compile(scene).evaluate()
+    return channels_of(stack(AT, [snapshot], status="finished", message="", wall_s=0.0, evaluations=1))
+
+
+def strangers(scene: Scene, counterpart: Counterpart) -> list[str]:
+    """Channels in which a counterpart, told back, is another than the scene."""
+    true, told = seen(scene), counterpart.back(AT, seen(counterpart.scene))
+    sizes: dict[str, float] = {}
+    for name, values in true.items():
+        sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
+    return [
+        name for name, values in told.items() if distance(name, values, true[name])[0] > BOUND * sizes[family(name)]
+    ]
+
+
+@pytest.mark.parametrize("invariance", INVARIANCES, ids=lambda each: each.name)
+def test_nothing_changes_in_a_scene_of_every_hinge(invariance: Invariance) -> None:
+    counterpart = invariance.of(rigid())
+    assert counterpart.scene != rigid()
+    assert strangers(rigid(), counterpart) == []
+
+
+@pytest.mark.parametrize("name", ["turned", "moved", "reordered", "rescaled", "mirrored"])
+def test_nothing_changes_in_a_scene_with_flexible_bodies(name: str) -> None:
+    counterpart = BY_NAME[name].of(flexible())
+    assert counterpart.scene != flexible()
+    assert strangers(flexible(), counterpart) == []
+
+
+def _still_gravity(scene: Scene) -> Scene:
+    return msgspec.structs.replace(scene, gravity_m_s2=rigid().gravity_m_s2)
+
+
+def _still_loads(scene: Scene) -> Scene:
+    return msgspec.structs.replace(scene, loads=rigid().loads)
+
+
+def _still_hinges(scene: Scene) -> Scene:
+    return msgspec.structs.replace(scene, hinges=rigid().hinges)
+
+
+def _still_wheels(scene: Scene) -> Scene:
+    return msgspec.structs.replace(scene, wheels=rigid().wheels)
+
+
+def _still_inertia(scene: Scene) -> Scene:
+    first = msgspec.structs.replace(scene.bodies[0], inertia_kg_m2=rigid().bodies[0].inertia_kg_m2)
+    return msgspec.structs.replace(scene, bodies=(first, *scene.bodies[1:]))
+
+
+@pytest.mark.parametrize(
+    ("name", "spoil"),
+    [
+        ("turned", _still_gravity),
+        ("turned", _still_loads),
+        ("turned", _still_hinges),
+        ("moved", _still_hinges),
+        ("boosted", _still_hinges),
+        ("mirrored", _still_gravity),
+        ("mirrored", _still_loads),
+        ("mirrored", _still_wheels),
+        ("mirrored", _still_inertia),
+        ("rescaled", _still_gravity),
+        ("rescaled", _still_loads),
+        ("rescaled", _still_inertia),
+    ],
+)
+def test_what_is_changed_by_half_is_noticed(name: str, spoil: Callable[[Scene], Scene]) -> None:
+    whole = BY_NAME[name].of(rigid())
+    assert strangers(rigid(), Counterpart(spoil(whole.scene), whole.back, whole.clock))
+
+
+@pytest.mark.parametrize("name", ["turned", "moved", "boosted", "rescaled", "mirrored"])
+def test_channels_that_are_not_told_back_are_noticed(name: str) -> None:
+    whole = BY_NAME[name].of(rigid())
+    assert strangers(rigid(), Counterpart(whole.scene, lambda times, channels: channels))
+
+
+def test_what_stands_on_the_ground_is_not_boosted() -> None:
+    scene = random_rigid(np.random.default_rng(0), ("revolute",))
+    with pytest.raises(NotApplicable, match="stands on the ground by h0"):
+        BY_NAME["boosted"].of(scene)
+
+
+def test_what_needs_a_start_time_has_no_other_clock() -> None:
+    pulse = Pulse(value=1.0, start_s=0.0, duration_s=1.0)
+    loads = tuple(msgspec.structs.replace(load, function=pulse) for load in rigid().loads)
+    with pytest.raises(NotApplicable, match="pulse"):
+        BY_NAME["clock"].of(msgspec.structs.replace(rigid(), loads=loads))
+
+
+def test_one_of_each_thing_has_no_order() -> None:
+    scene = random_rigid(np.random.default_rng(0), ("revolute",), extras=False)
+    with pytest.raises(NotApplicable, match="one of each"):
+        BY_NAME["reordered"].of(scene)

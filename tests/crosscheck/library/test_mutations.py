@@ -1,0 +1,260 @@
+"""Every mutation changes what it says and nothing else, and refuses what it cannot change."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import get_args
+
+import msgspec
+import numpy as np
+import pytest
+
+from crosscheck.library.case import CaseError, MutationKind
+from crosscheck.library.mutations import CATALOGUE, applicable, mutate
+from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
+from flexmb.scene.check import check_scene
+from flexmb.scene.functions import Ramp, Sine, SmoothStep
+from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
+from flexmb.scene.schema import Closure, Free, Load, Planar, PointMass, Scene, Wheel
+from flexmb.surrogate import modal_points
+
+INERTIA = ((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.25))
+TURNED = (0.8, 0.0, 0.6, 0.0)
+SPRUNG = AngularCoordinate(stiffness_Nm_rad=3.0)
+STATION = {"EA_N": 1e6, "EIy_Nm2": 10.0, "EIz_Nm2": 20.0, "GJ_Nm2": 8.0, "mass_per_length_kg_m": 0.2}
+SCENE = Scene(
+    name="all of it",
+    gravity_m_s2=(0.0, 0.0, -9.81),
+    bodies=(
+        RigidBody(
+            name="hub",
+            mass_kg=4.0,
+            com_m=(0.1, 0.0, 0.0),
+            inertia_kg_m2=INERTIA,
+            nodes=(Node(name="port", quaternion=TURNED),),
+        ),
+        BeamBody(
+            name="boom",
+            length_m=1.0,
+            elements=4,
+            stations=(BeamStation(x_m=0.0, **STATION), BeamStation(x_m=1.0, **STATION)),
+            modes=Modes(count=2),
+            level="stiffened",
+        ),
+        RigidBody(name="tip", mass_kg=1.0, inertia_kg_m2=INERTIA),
+    ),
+    hinges=(
+        Revolute(name="base", parent="ground", child="hub", rotation=SPRUNG, child_quaternion=TURNED),
+        Gimbal(name="root", parent="hub", child="boom", rotations=(SPRUNG, AngularCoordinate(), SPRUNG)),
+        Spherical(name="end", parent="boom", parent_node="tip", child="tip", stiffness_Nm_rad=2.0),
+    ),
+    wheels=(
+        Wheel(
+            name="wheel",
+            body="hub",
+            axis=(0.0, 0.0, 1.0),
+            mass_kg=1.0,
+            axial_inertia_kg_m2=0.1,
+            transverse_inertia_kg_m2=0.05,
+        ),
+    ),
+)
+
+
+def changes(one: object, other: object, place: str = "$") -> set[str]:
+    """Places at which two structs differ."""
+    if isinstance(one, msgspec.Struct) and type(one) is type(other):
+        found = (changes(getattr(one, key), getattr(other, key), f"{place}.{key}") for key in one.__struct_fields__)
+        return set().union(*found)
+    if isinstance(one, tuple) and isinstance(other, tuple) and len(one) == len(other):
+        return set().union(*(changes(a, b, f"{place}[{i}]") for i, (a, b) in enumerate(zip(one, other, strict=True))))
+    return set() if one == other else {place}
+
+
+@pytest.mark.parametrize(
+    ("mutation", "target", "places"),
+    [
+        ("mass", "hub", {"$.bodies[0].mass_kg"}),
+        ("mass", "boom", {f"$.bodies[1].stations[{i}].mass_per_length_kg_m" for i in range(2)}),
+        ("inertia", "tip", {f"$.bodies[2].inertia_kg_m2[{i}][{i}]" for i in range(3)}),
+        ("com", "hub", {"$.bodies[0].com_m[0]"}),
+        ("hinge_axis", "base", {"$.hinges[0].axis[2]"}),
+        ("hinge_rotation", "base", {"$.hinges[0].child_quaternion[2]"}),
+        ("node_rotation", "hub.port", {"$.bodies[0].nodes[0].quaternion[2]"}),
+        ("gravity_sign", "", {"$.gravity_m_s2[2]"}),
+        ("wheel_axis", "wheel", {"$.wheels[0].axis[2]"}),
+        ("stiffness", "root", {f"$.hinges[1].rotations[{i}].stiffness_Nm_rad" for i in (0, 2)}),
+        ("stiffness", "end", {"$.hinges[2].stiffness_Nm_rad"}),
+        (
+            "stiffness",
+            "boom",
+            {f"$.bodies[1].stations[{i}].{key}" for i in range(2) for key in STATION if not key.startswith("mass")},
+        ),
+        ("dropped_stiffening", "boom", {"$.bodies[1].level"}),
+        ("dropped_stiffening", "", {"$.bodies[1].level"}),
+    ],
+)
+def test_a_mutation_changes_just_its_place(mutation: MutationKind, target: str, places: set[str]) -> None:
+    assert changes(SCENE, mutate(SCENE, mutation, target)) == places
+
+
+@pytest.mark.parametrize(
+    ("mutation", "target", "message"),
+    [
+        ("com", "tip", "changes nothing"),
+        ("node_rotation", "hub.nowhere", "changes nothing"),
+        ("mass", "bus", "there are only hub, boom, tip"),
+        ("hinge_axis", "end", "has no axis"),
+        ("inertia", "boom", "changes nothing"),
+        ("dropped_stiffening", "hub", "changes nothing"),
+    ],
+)
+def test_a_control_that_would_change_nothing_is_refused(mutation: MutationKind, target: str, message: str) -> None:
+    with pytest.raises(CaseError, match=message):
+        mutate(SCENE, mutation, target)
+
+
+PUSH = Sine(amplitude=2.0, angular_frequency_rad_s=3.0)
+
+
+@cache
+def everything() -> Scene:
+    """A scene with something for every mutation to change."""
+    swing = AngularCoordinate(
+        angle_rad=0.3, rate_rad_s=0.2, stiffness_Nm_rad=3.0, damping_Nms_rad=0.1, rest_rad=0.1, torque_Nm=PUSH
+    )
+    skew = ((0.2, 0.01, 0.02), (0.01, 0.3, 0.03), (0.02, 0.03, 0.4))
+    hub = RigidBody(
+        name="hub", mass_kg=4.0, com_m=(0.1, 0.2, 0.0), inertia_kg_m2=skew,
+        nodes=(Node(name="port", position_m=(0.5, 0.0, 0.0), quaternion=TURNED),),
+    )  # fmt: skip
+    boom = msgspec.structs.replace(SCENE.bodies[1], modes=Modes(count=2, damping_ratio=0.01), nodes=())
+    stations = tuple(
+        msgspec.structs.replace(each, rotary_y_kg_m=1e-4, rotary_z_kg_m=2e-4, GAy_N=1e5, GAz_N=1e5)
+        for each in boom.stations
+    )
+    boom = msgspec.structs.replace(boom, stations=stations)
+    tip = msgspec.structs.replace(hub, name="tip")
+    return Scene(
+        name="everything",
+        gravity_m_s2=(0.0, 1.0, -9.81),
+        bodies=(hub, boom, tip),
+        hinges=(
+            Free(
+                name="flight", parent="ground", child="hub", quaternion=TURNED, angular_velocity_rad_s=(0.1, 0.2, 0.3),
+                velocity_m_s=(1.0, 0.0, 0.0),
+            ),
+            Gimbal(
+                name="root", parent="hub", parent_node="port", child="boom", parent_quaternion=TURNED,
+                parent_position_m=(0.1, 0.0, 0.0), sequence="xyz", rotations=(swing, swing, swing),
+            ),
+            Revolute(name="end", parent="boom", parent_node="tip", child="tip", rotation=swing),
+        ),
+        closures=(
+            Closure(
+                name="loop", type="revolute", body_a="ground", body_b="tip", node_b="port",
+                position_a_m=(1.0, 0.0, 0.0), quaternion_a=TURNED,
+            ),
+        ),
+        wheels=(
+            Wheel(
+                name="wheel", body="hub", offset_m=(0.1, 0.0, 0.0), axis=(0.0, 0.0, 1.0), mass_kg=1.0,
+                axial_inertia_kg_m2=0.1, transverse_inertia_kg_m2=0.06, speed_rad_s=3.0, friction_Nms_rad=0.1,
+                torque_Nm=PUSH,
+            ),
+        ),
+        point_masses=(PointMass(name="lump", body="hub", mass_kg=0.1),),
+        loads=(Load(name="push", body="hub", node="port", type="force", direction=(1.0, 0.0, 0.0), function=PUSH),),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("mutation", get_args(MutationKind))
+def test_every_mutation_has_a_target_and_leaves_the_rest_as_it_was(mutation: MutationKind) -> None:
+    targets = applicable(everything(), CATALOGUE[mutation])
+    assert targets
+    for target in targets:
+        changed = mutate(everything(), mutation, target.name)
+        collections = {place.split(".")[1].split("[")[0] for place in changes(everything(), changed)}
+        assert len(collections) == 1
+        if mutation in ("damping", "damping_dropped", "stiffness", "mass"):
+            check_scene(changed)
+
+
+def test_the_catalogue_is_the_list_of_names_that_a_run_file_may_use() -> None:
+    assert set(CATALOGUE) == set(get_args(MutationKind))
+    assert len(CATALOGUE) >= 20
+    assert all(each.what and each.slip for each in CATALOGUE.values())
+
+
+def test_a_mode_s_sign_at_the_nodes_is_not_that_in_the_inertia() -> None:
+    """The beam becomes its points and modes, and only the nodes' first mode is the opposite."""
+    (target,) = applicable(everything(), CATALOGUE["mode_sign"])
+    true = modal_points(everything()).bodies[1]
+    spoilt = mutate(everything(), "mode_sign", target.name).bodies[1]
+    assert spoilt.points == true.points and spoilt.stiffness == true.stiffness
+    for one, other in zip(true.nodes, spoilt.nodes, strict=True):
+        np.testing.assert_array_equal(np.array(other.translation_modes[0]), -np.array(one.translation_modes[0]))
+        assert other.translation_modes[1:] == one.translation_modes[1:]
+
+
+@pytest.mark.parametrize(
+    ("motion", "start"),
+    [
+        (Ramp(value=0.4, rate=2.0, start_s=1.0), 0.4 - 2.0),
+        (Sine(amplitude=0.5, angular_frequency_rad_s=2.0, phase_rad=0.7, offset=0.1), 0.1 + 0.5 * np.sin(0.7)),
+        (SmoothStep(start_value=-1.0, end_value=2.0, start_s=0.1, duration_s=1.0), -1.0),
+    ],
+)
+def test_a_farther_prescribed_motion_begins_where_it_did(motion: Ramp | Sine | SmoothStep, start: float) -> None:
+    driven = Revolute(name="base", parent="ground", child="hub", rotation=AngularCoordinate(prescribed_rad=motion))
+    scene = msgspec.structs.replace(SCENE, hinges=(driven, *SCENE.hinges[1:]))
+    changed = mutate(scene, "function_size", "base").hinges[0].rotation.prescribed_rad
+    assert changed != motion
+    match changed:
+        case Ramp():
+            begins = changed.value - changed.rate * changed.start_s
+        case Sine():
+            begins = changed.offset + changed.amplitude * np.sin(changed.phase_rad)
+        case SmoothStep():
+            begins = changed.start_value
+    assert begins == pytest.approx(start, abs=1e-15)
+
+
+def planar(*axes: tuple[float, float, float]) -> Scene:
+    """A chain of rods on revolute hinges about these axes."""
+    rods = tuple(
+        RigidBody(name=f"rod{i}", mass_kg=1.0, inertia_kg_m2=((0.1, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)))
+        for i in range(len(axes))
+    )
+    parents = ("ground", *(rod.name for rod in rods))
+    hinges = tuple(
+        Revolute(name=f"h{i}", parent=parents[i], child=rod.name, axis=axes[i]) for i, rod in enumerate(rods)
+    )
+    return Scene(name="chain", bodies=rods, hinges=hinges)
+
+
+Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("axes", "idle"), [((Y,), True), ((Z,), False), ((Y, Y), True), ((Z, Y), False), ((Y, (0.0, -1.0, 0.0)), True)]
+)
+def test_only_the_inertia_about_its_axis_matters_to_a_body_on_parallel_hinges(axes: tuple, idle: bool) -> None:
+    """x and z exchanged in a rod along x: about y nothing changes, about z and in space it does."""
+    scene = planar(*axes)
+    assert bool(CATALOGUE["inertia_swapped"].idle(scene, scene.bodies[-1].name)) == idle
+
+
+def test_a_flexible_or_free_carrier_leaves_no_only_axis() -> None:
+    hinges = (Planar(name="flat", parent="ground", child="hub"), *SCENE.hinges[1:])
+    scene = msgspec.structs.replace(SCENE, hinges=hinges)
+    assert CATALOGUE["inertia_swapped"].idle(scene, "tip") == ""
+    assert CATALOGUE["inertia_swapped"].idle(everything(), "hub") == ""
+
+
+@pytest.mark.parametrize("quaternion", [(0.0, 0.6, 0.0, 0.8), (1.0, 0.0, 0.0, 0.0)])
+def test_a_half_turn_transposed_is_itself(quaternion: tuple[float, float, float, float]) -> None:
+    base = Revolute(name="base", parent="ground", child="hub", parent_quaternion=quaternion)
+    scene = msgspec.structs.replace(SCENE, hinges=(base, *SCENE.hinges[1:]))
+    assert "half-turn" in CATALOGUE["hinge_rotation"].idle(scene, "base")
+    assert CATALOGUE["hinge_rotation"].idle(SCENE, "base") == ""
