@@ -9,40 +9,44 @@ from typing import Annotated
 import typer
 
 from crosscheck.cli.common import (
+    CaseWords,
+    EngineNames,
     Jobs,
+    Json,
     Open,
     Out,
+    Quiet,
     Strict,
     TimeLimit,
+    Verbose,
     app,
     check_limit,
     console,
+    errors,
     found,
     refuse,
     sole_writer,
+    verbosity,
 )
 from crosscheck.judging.accept import NotAccepted, accept_figures
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library import find
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
-from crosscheck.report import Choice, write_all
+from crosscheck.report import write_all
 from crosscheck.running.pool import Limits
 from crosscheck.running.sweep import sweep
+from crosscheck.sealed.seal import FILE
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
+from crosscheck.terminal.verbosity import Verbosity
 from crosscheck.terminal.verdicts import print_outcome
 
 
 @app.command()
 def run(
-    cases: Annotated[
-        list[str],
-        typer.Argument(help="Case names, a tag such as `canonical`, `all`, or folders that hold a run.toml."),
-    ],
-    engine: Annotated[
-        list[str] | None,
-        typer.Option("--engine", "-e", help="Only these engines (repeat it). One alone is compared with its partners."),
-    ] = None,
+    cases: CaseWords,
+    engine: EngineNames = None,
     out: Out = Path("out"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Jobs = None,
@@ -52,11 +56,15 @@ def run(
     ] = False,
     strict: Strict = False,
     open_report: Open = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.
 
-    **Writes** into `--out`: `report.html` (open it), `verdicts.json`, `summary.md`, `junit.xml`, `records.jsonl`.
+    **Writes** into `--out`: `report.html` (open it), `results.json` (small and sealed, for `crosscheck compare`),
+    `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`, `records.jsonl`.
     A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
@@ -78,16 +86,18 @@ def run(
     `crosscheck run all --strict --time-limit 600`
     """
     check_limit(time_limit)
+    shown = verbosity(quiet, verbose)
     chosen = found(tuple(cases))
     idle = without_part((case.run for case in chosen), tuple(engine or ()))
     if idle:
         refuse(idle)
     with sole_writer(out):
-        with LiveProgress(console) as live:
+        with LiveProgress(console, shown) as live:
             limits = Limits(jobs, time_limit)
             sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear)
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
+        outcome, page = write_all(out / "records.jsonl", out, strict, last_session)
+    _conclude(outcome, page, shown, as_json=as_json, open_report=open_report, failed=not done)
 
 
 @app.command()
@@ -96,6 +106,9 @@ def report(
     out: Out = Path("out"),
     strict: Strict = False,
     open_report: Open = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """
     Judge and draw recorded runs again; no engine needs to be installed.
@@ -104,8 +117,10 @@ def report(
     """
     if not records.is_file():
         refuse(f"{records} is no file")
+    shown = verbosity(quiet, verbose)
     with sole_writer(out):
-        _conclude(records, out, open_report, strict, standing)
+        outcome, page = write_all(records, out, strict, standing)
+    _conclude(outcome, page, shown, as_json=as_json, open_report=open_report)
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
@@ -114,16 +129,20 @@ def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
     except NotAccepted as error:
-        console.print(words(str(error), "red"), soft_wrap=True)
+        errors.print(words(str(error), "red"), soft_wrap=True)
         return False
     return True
 
 
-def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice, failed: bool = False) -> None:
-    """Judge, write everything, show the table, and leave with the exit code; 1 where something has `failed` before."""
-    outcome, page = write_all(records, out, strict, chosen)
-    code = print_outcome(console, outcome)
-    console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+def _conclude(
+    outcome: SessionOutcome, page: Path, shown: Verbosity, *, as_json: bool, open_report: bool, failed: bool = False
+) -> None:
+    """Show what came out, and leave with the exit code: 1 also where something has `failed` before."""
+    code = print_outcome(console, outcome, shown)
+    if shown is not Verbosity.QUIET:
+        console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+    if as_json:
+        typer.echo((page.parent / FILE).read_text(encoding="ascii"), nl=False)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code or int(failed))

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import msgspec
 import typer
 
-from crosscheck.cli.common import app, console, found, in_one_line, refuse
+from crosscheck.cli.common import CaseWord, Json, app, console, found, in_one_line, print_json, refuse
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome
-from crosscheck.verify.against_case import sample_times_csv, verify_csv
+from crosscheck.verify.against_case import CsvOutcome, sample_times_csv, verify_csv
 
 
 @app.command()
 def verify(
-    case: Annotated[str, typer.Argument(help="Case name or folder.")],
+    case: CaseWord,
     csv: Annotated[Path, typer.Argument(help="Your code's results (see below).")],
     coarse: Annotated[
         Path | None,
@@ -25,6 +26,7 @@ def verify(
     variant: Annotated[str | None, typer.Option(help="Variant to be held against; by default the first.")] = None,
     engine: Annotated[str, typer.Option(help="Engine that gives the reference.")] = "native",
     template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
+    as_json: Json = False,
 ) -> None:
     """
     Hold a CSV of your own code against a case, without an adapter.
@@ -57,4 +59,17 @@ def verify(
     console.print(channels_table(outcome))
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
-    raise typer.Exit(print_outcome(console, outcome))
+    code = print_outcome(console, outcome)
+    if as_json:
+        print_json(_plain(outcome))
+    raise typer.Exit(code)
+
+
+def _plain(outcome: CsvOutcome) -> dict[str, Any]:
+    """The verdicts with the time at which each channel is worst and the guess of its cause."""
+    verdicts = []
+    for verdict in outcome.all:
+        detail = outcome.details.get(verdict.channel)
+        extra = {} if detail is None else {"worst_s": detail.worst_s, "cause": detail.cause}
+        verdicts.append({**msgspec.to_builtins(verdict), "ok": verdict.ok, **extra})
+    return {"ok": outcome.ok, "headline": outcome.headline, "verdicts": verdicts, "left_out": outcome.left_out}

@@ -46,7 +46,7 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, and the
-    figures accepted for it."""
+    figures accepted for it. `files` are digests of the files in its folder; records of older versions have none."""
 
     case: str
     run: RunFile
@@ -54,6 +54,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     readme: str
     variants: dict[str, VariantInfo]
     accepted: Accepted = {}
+    files: dict[str, str] = {}
 
 
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):

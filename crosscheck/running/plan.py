@@ -13,6 +13,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
 from crosscheck.library.controls import mutate
+from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.selection import select
 from crosscheck.records.kinds import CaseRecord, VariantInfo
@@ -96,6 +97,7 @@ def plan(
         readme=case.readme,
         variants=infos,
         accepted=case.accepted,
+        files=case_digests(case.folder),
     )
     return record, jobs
 

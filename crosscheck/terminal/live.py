@@ -13,6 +13,7 @@ from rich.text import Text
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.plan import Job
 from crosscheck.running.pool import Event
+from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.printable import printable
 
 MARKS = {
@@ -27,9 +28,13 @@ MARKS = {
 
 
 class LiveProgress:
-    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear."""
+    """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear.
 
-    def __init__(self, console: Console) -> None:
+    A line lasts for every job with VERBOSE, else for none: what did not go well is told at the end. QUIET shows no bar.
+    """
+
+    def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
+        self._lasting = verbosity is Verbosity.VERBOSE
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),  # names stand in it
@@ -38,6 +43,7 @@ class LiveProgress:
             TimeElapsedColumn(),
             console=console,
             transient=True,
+            disable=verbosity is Verbosity.QUIET,
         )
         self._overall: TaskID | None = None
         self._lines: dict[int, TaskID] = {}
@@ -67,7 +73,8 @@ class LiveProgress:
         elif event.kind != "emitted":
             self._progress.remove_task(self._lines.pop(event.job))
             self._progress.advance(self._overall)
-            self._progress.console.print(self._ending(title, event))
+            if self._lasting:
+                self._progress.console.print(self._ending(title, event))
 
     def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""
