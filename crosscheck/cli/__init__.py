@@ -1,6 +1,14 @@
 """The command `crosscheck`, one file a command: it reads the command line and shows what the other rooms do."""
 
-from crosscheck.cli import run, compare, listing, verify, contract, stability  # noqa: F401, I001 - each adds its commands, in this order
+from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
+    run,
+    compare,
+    listing,
+    verify,
+    regenerate,
+    contract,
+    stability,
+)
 from crosscheck.cli.common import app
 
 
