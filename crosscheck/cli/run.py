@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import webbrowser
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -31,6 +32,7 @@ from crosscheck.cli.common import (
 from crosscheck.judging.accept import NotAccepted, accept_figures
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library import find
+from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
 from crosscheck.report import write_all
@@ -47,6 +49,9 @@ from crosscheck.terminal.verdicts import print_outcome
 def run(
     cases: CaseWords,
     engine: EngineNames = None,
+    alone: Annotated[
+        bool, typer.Option("--alone", help="Hold the engines against the stored references only; no partners run.")
+    ] = False,
     out: Out = Path("out"),
     fresh: Annotated[bool, typer.Option("--fresh", help="Forget the records in --out instead of resuming.")] = False,
     jobs: Jobs = None,
@@ -82,12 +87,14 @@ def run(
     sense. With `--strict` also 1 where figures are worse than recorded or missing. `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
-    `crosscheck run all -e mycode --out results` · `crosscheck run ./my_case --accept` ·
+    `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
     `crosscheck run all --strict --time-limit 600`
     """
     check_limit(time_limit)
     shown = verbosity(quiet, verbose)
     chosen = found(tuple(cases))
+    if alone:
+        chosen = _alone(chosen)
     idle = without_part((case.run for case in chosen), tuple(engine or ()))
     if idle:
         refuse(idle)
@@ -121,6 +128,16 @@ def report(
     with sole_writer(out):
         outcome, page = write_all(records, out, strict, standing)
     _conclude(outcome, page, shown, as_json=as_json, open_report=open_report)
+
+
+def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
+    """The cases, to be run without partners; those without a stored reference are named and left out."""
+    without = [case.name for case in cases if case.run.reference is None or not has_reference(case.folder)]
+    if len(without) == len(cases):
+        refuse(f"no stored reference: {', '.join(without)}. `crosscheck regenerate` makes them; or leave --alone out")
+    if without:
+        console.print(words(f"Left out, as there is no stored reference: {', '.join(without)}", "yellow"))
+    return tuple(replace(case, alone=True) for case in cases if case.name not in without)
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:

@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
 
 import numpy as np
 
+from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.expectation import outside
-from crosscheck.judging.figures import worse
+from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.verdict import GRAVITY, Finding, Status, Verdict, VerdictKind, compare, conserve
+from crosscheck.judging.verdict import GRAVITY, Finding, Verdict, compare, conserve
 from crosscheck.library.accepted import key
 from crosscheck.library.case import Comparison, ComparisonSide, Conservation, Control
 from crosscheck.library.channels import CONSERVED
 from crosscheck.library.patterns import most_specific
-from crosscheck.records.kinds import CaseRecord
 from flexmb.run.channels import matches, norms
 
 CLOCK = 1e-9  # relative difference of two clocks that show the same time: old records hold the engines' own
@@ -23,7 +22,7 @@ TRUE_MODEL = "conservation law"
 
 
 def judge(case: CaseResults) -> list[Verdict]:
-    """All verdicts of a case, in the order of its run file."""
+    """All verdicts of a case, in the order of its run file, then those against its stored reference."""
     run = case.case.run
     found: list[Verdict] = []
     for comparison in run.comparisons:
@@ -32,49 +31,8 @@ def judge(case: CaseResults) -> list[Verdict]:
         found += _control(case, control)
     for conservation in run.conservations:
         found += (_conservation(case, conservation, engine) for engine in conservation.engines)
+    found += judge_reference(case)
     return found
-
-
-@dataclass(frozen=True)
-class Question:
-    """What a case asks of two sides: which status it expects of every channel, and why if that is not agreement."""
-
-    case: CaseRecord
-    name: str
-    kind: VerdictKind
-    a: ComparisonSide
-    b: ComparisonSide
-    expected: Status
-    why: str
-
-    def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "") -> Verdict:
-        """The verdict on one channel; `beyond` says how a finding with the expected status is outside its bounds."""
-        place = key(channel, (self.a.engine, self.a.variant), (self.b.engine, self.b.variant))
-        accepted = self.case.accepted.get(self.name, {}).get(place) if self.kind != "control" else None
-        infos = self.case.variants
-        levels = dict.fromkeys(infos[side.variant].level for side in (self.a, self.b) if side.variant in infos)
-        return Verdict(
-            case=self.case.case,
-            comparison=self.name,
-            kind=self.kind,
-            channel=channel,
-            variant_a=self.a.variant,
-            engine_a=self.a.engine,
-            variant_b=self.b.variant,
-            engine_b=self.b.engine,
-            level=" / ".join(levels),
-            status=finding.status,
-            expected=self.expected,
-            E=finding.E,
-            U=finding.U,
-            goal=goal,
-            scale=finding.scale,
-            reason=f"{finding.reason}; {beyond}" if beyond and beyond != finding.reason else finding.reason,
-            expected_reason=self.why,
-            outside=beyond,
-            accepted=accepted,
-            worse=worse(accepted, finding.E, finding.U),
-        )
 
 
 def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:

@@ -7,11 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from crosscheck.judging.sizes import sizes
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
-from flexmb.run.channels import family, magnitude, signal_range
+from flexmb.run.channels import family, magnitude
 from flexmb.typing import Real
 
 Key = tuple[str, str, str]  # variant, engine, role
@@ -137,15 +138,8 @@ class Result:
         return self._signal(channel, like.doubt(channel, across))
 
     def _signal(self, channel: str, doubt: Uncertainty) -> Signal:
-        sizes = [max(signal_range(name, self.values(name)) for name in self._relatives(channel))]
-        if channel.endswith(".torque"):
-            sizes.append(self._largest(".force") * self._largest(".position"))
-        return Signal(self.values(channel), doubt, tuple(sizes))
-
-    def _largest(self, ending: str) -> float:
-        """Largest magnitude (SI) among the channels with that ending; 0 if there is none."""
-        sizes = (magnitude(name, self.values(name)) for name in self.finest.channels if name.endswith(ending))
-        return max(sizes, default=0.0)
+        everything = {name: self.values(name) for name in self.finest.channels}
+        return Signal(everything[channel], doubt, sizes(channel, everything))
 
     def _relatives(self, channel: str) -> list[str]:
         kin = family(channel)

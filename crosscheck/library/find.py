@@ -23,7 +23,10 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Case:
-    """A case folder that was read and checked. `name` is "<family>/<case>"."""
+    """A case folder that was read and checked. `name` is "<family>/<case>".
+
+    `alone`: engines are held against the stored reference only, and no partners run.
+    """
 
     name: str
     folder: Path
@@ -31,6 +34,7 @@ class Case:
     provenance: Provenance | None
     readme: str
     accepted: Accepted = field(default_factory=dict)
+    alone: bool = False
 
     def scene(self, variant: Variant) -> Scene:
         """The variant's scene as its file says, before any transformation."""

@@ -4,7 +4,7 @@ In the reduced run file every comparison is an explicit pair, and `engines` of a
 
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
-engine by engine; if it does not exist, that shows as *did not run*.
+engine by engine, and the variant of the stored reference; if it does not exist, that shows as *did not run*.
 """
 
 from __future__ import annotations
@@ -41,6 +41,56 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     )
 
 
+def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
+    """The run file reduced to the engines that were asked for (none: all) on the variant of the stored reference.
+
+    Nothing is compared engine against engine. Empty where the case has no such variant.
+    """
+    of = run.reference.variant if run.reference is not None else ""
+    run = _joined(run, asked)
+    running = {engine for variant in run.variants if variant.name == of for engine in _all(variant)}
+    needed = {(of, engine) for engine in running if engine in asked or not asked}
+    conserved = (_narrowed(run, item, asked) for item in run.conservations if item.variant == of)
+    return msgspec.structs.replace(
+        run,
+        variants=tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines),
+        comparisons=(),
+        controls=(),
+        conservations=tuple(item for item in conserved if item is not None),
+        charts=(),
+    )
+
+
+def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
+    """Goals and scales, by engine, of those of `engines` that are held against the stored reference.
+
+    They are those that a comparison of its variant expects to agree, or those that the table `[reference]` names; and
+    engines that the case does not know. Goals are the table's, or those of the engine's comparisons, the first before
+    later ones.
+    """
+    recipe = run.reference
+    if recipe is None:
+        return {}
+    engines = tuple(engines)
+    foreign = {engine for engine in engines if _foreign(run, engine)}
+    run = _joined(run, engines)
+    pairs = [pair for each in run.comparisons if each.expect == "agree" for pair in _pairs(run, each)]
+    pairs = [pair for pair in pairs if all(side.variant == recipe.variant for side in pair.sides)]
+    known = _all(run.variant(recipe.variant))
+    found = {}
+    for engine in engines:
+        own = [pair for pair in pairs if any(side.engine == engine for side in pair.sides)]
+        chosen = engine in recipe.engines or (not recipe.engines and bool(own or recipe.goals))
+        if engine in known and (chosen or engine in foreign):
+            goals, scales = dict(recipe.goals), {}
+            for pair in own or pairs:
+                goals |= {} if recipe.goals else {key: goal for key, goal in pair.goals.items() if key not in goals}
+                scales |= {key: scale for key, scale in pair.scales.items() if key not in scales}
+            if goals:
+                found[engine] = goals, scales
+    return found
+
+
 def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
     """A message that names the engines that were asked for and have no part in any of the run files; "" if all have."""
     runs = tuple(runs)
@@ -54,14 +104,19 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The run file with engines that it does not know added to the variants that are compared engine by engine."""
-    known = set(BUILT_IN).union(*(_all(variant) for variant in run.variants))
-    foreign = tuple(engine for engine in asked if engine not in known)
+    foreign = tuple(engine for engine in asked if _foreign(run, engine))
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
+    open_to_all |= {run.reference.variant} if run.reference is not None else set()
     variants = tuple(
         msgspec.structs.replace(variant, engines=variant.engines + foreign) if variant.name in open_to_all else variant
         for variant in run.variants
     )
     return msgspec.structs.replace(run, variants=variants)
+
+
+def _foreign(run: RunFile, engine: str) -> bool:
+    """Whether the run file does not know an engine: it is neither ours nor one of its variants'."""
+    return engine not in BUILT_IN and all(engine not in _all(variant) for variant in run.variants)
 
 
 def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:

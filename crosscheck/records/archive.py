@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 import os
 import warnings
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -21,7 +21,7 @@ import msgspec
 from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
-from crosscheck.records.packing import packed_bytes, unpack
+from crosscheck.records.packing import Packed, packed_bytes, unpack
 from flexmb.output.writing import folder, writing
 from flexmb.scene.reading import MIB, allowance, regular_size
 
@@ -95,16 +95,21 @@ def _checked(record: Any, limit: int) -> int:
         check_recorded(record.run)
         if record.variants.keys() != {variant.name for variant in record.run.variants}:
             raise ValueError("its variants are not those of its run file")
+        return 0 if record.reference is None else _checked_arrays(record.reference.arrays, limit)
     if not isinstance(record, RunRecord):
         return 0
     sized = 0.0 < record.effort_value < math.inf or (record.effort_value == 0.0 and record.rungs < 2)
     if not (0 <= record.rung <= max(record.rungs - 1, 0) and sized):
         raise ValueError(f"effort {record.effort_value} on rung {record.rung} of {record.rungs} is none")
-    arrays = [*record.channels.values(), *([] if record.times is None else [record.times])]
+    _check_shapes(record)
+    return _checked_arrays([*record.channels.values(), *([] if record.times is None else [record.times])], limit)
+
+
+def _checked_arrays(arrays: Sequence[Packed], limit: int) -> int:
+    """Bytes of memory that arrays take; ValueError where one is damaged or they exceed `limit`."""
     size = sum(packed_bytes(packed) for packed in arrays)
     if size > limit:
         raise ValueError(f"its arrays would take {size / MIB:.3g} MiB, more than a file of this size can hold")
-    _check_shapes(record)
     for packed in arrays:
         unpack(packed)
     return size

@@ -10,6 +10,7 @@ import msgspec
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import Provenance, RunFile
 from crosscheck.records.drawing import Drawing
+from crosscheck.records.held import RecordedReference
 from crosscheck.records.packing import Packed
 
 RunStatus = Literal["finished", "diverged", "failed", "crashed", "did not finish", "refused", "did not run"]
@@ -45,8 +46,8 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
-    """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, and the
-    figures accepted for it. `files` are digests of the files in its folder; records of older versions have none."""
+    """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, the figures
+    accepted for it, its stored reference if it has one, and digests of the `files` in its folder."""
 
     case: str
     run: RunFile
@@ -54,6 +55,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     readme: str
     variants: dict[str, VariantInfo]
     accepted: Accepted = {}
+    reference: RecordedReference | None = None
     files: dict[str, str] = {}
 
 

@@ -58,9 +58,7 @@ def _changes(before: StoredReference, now: Agreed) -> Iterator[str]:
 
 
 def _shared(before: StoredReference, now: Agreed) -> tuple[np.ndarray, np.ndarray]:
-    """The places of the times that both have, in the one and in the other."""
-    places = np.clip(np.searchsorted(before.times, now.times), 1, len(before.times) - 1)
-    left = np.abs(now.times - before.times[places - 1]) < np.abs(before.times[places] - now.times)
-    nearest = places - left
+    """The places of the times that both have, in `now` and in `before`."""
+    nearest = np.argmin(np.abs(before.times[None, :] - now.times[:, None]), axis=1)
     same = np.abs(before.times[nearest] - now.times) <= CLOCK * before.times[-1]
     return np.flatnonzero(same), nearest[same]

@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.case_verdicts import drift_of
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
@@ -48,7 +49,7 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
     """One panel a comparison and kind of channel; each offers its channels to choose from."""
     groups: dict[str, dict[str, list[Verdict]]] = {}
     for verdict in verdicts:
-        if verdict.kind == "comparison":
+        if verdict.kind == "comparison" and verdict.engine_b != REFERENCE:  # no run, so nothing of it to draw
             for channel in _drawn(case, verdict):
                 groups.setdefault(verdict.comparison, {}).setdefault(channel, []).append(verdict)
     panels = []

@@ -15,9 +15,10 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.controls import mutate
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
-from crosscheck.library.selection import select
+from crosscheck.library.selection import alone, select
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
+from crosscheck.running.held import held_reference
 from crosscheck.running.pool import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
@@ -73,7 +74,7 @@ def plan(
     case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None
 ) -> tuple[CaseRecord, list[Job]]:
     """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own."""
-    run = select(case.run, asked)
+    run = (alone if case.alone else select)(case.run, asked)
     infos: dict[str, VariantInfo] = {}
     jobs: list[Job] = []
     for variant in run.variants:
@@ -97,6 +98,7 @@ def plan(
         readme=case.readme,
         variants=infos,
         accepted=case.accepted,
+        reference=held_reference(case, run),
         files=case_digests(case.folder),
     )
     return record, jobs

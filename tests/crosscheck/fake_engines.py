@@ -215,6 +215,7 @@ def engines() -> dict[str, Fake]:
             Fake("fine"),
             Fake("stepper", STEPS),
             Fake("sloppy", COARSE),
+            Fake("second"),
             Fake("biased", gravity_factor=1.001),
             Absent("absent"),
             Refuser("refuser"),

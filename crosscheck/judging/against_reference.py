@@ -1,0 +1,123 @@
+"""A result against the stored reference of its case: no other engine is needed for these verdicts.
+
+E is taken at the times of the reference, which are some of the case's, up to its horizon, and U is that of the engine
+up to there and the uncertainty that the reference states. Goals and scales are those of the engine's comparisons, see
+`crosscheck.library.selection.held`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from crosscheck.judging.question import Question
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.sizes import sizes
+from crosscheck.judging.uncertainty import Uncertainty
+from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
+from crosscheck.library.case import ComparisonSide
+from crosscheck.library.patterns import most_specific
+from crosscheck.library.reference import StoredReference
+from crosscheck.records.held import Asked, RecordedReference
+from crosscheck.records.packing import unpack
+from flexmb.typing import Real
+
+NAME = "against the reference"
+REFERENCE = "reference"  # who is on the other side of such a verdict
+CLOCK = 1e-9  # relative difference of two clocks that show the same time
+
+
+@dataclass(frozen=True)
+class ReferenceSignals:
+    """What a reference knows: channels (T, k) at `times` (T,), in SI and World axes, with their uncertainties (SI)."""
+
+    times: Real
+    channels: Mapping[str, Real]
+    uncertainties: Mapping[str, float]
+
+    def signal(self, channel: str) -> Signal:
+        """The channel as a verdict needs it."""
+        rows, known = self.channels[channel], self.uncertainties.get(channel, np.inf)
+        doubt = Uncertainty(np.full(len(rows), known), known, "stated by the reference")
+        return Signal(rows, doubt, sizes(channel, self.channels))
+
+
+def of_stored(reference: StoredReference) -> ReferenceSignals:
+    """The signals of a reference that was read from its files."""
+    known = {name: each.uncertainty for name, each in reference.knowledge.channels.items()}
+    return ReferenceSignals(reference.times, reference.channels, known)
+
+
+def of_record(reference: RecordedReference) -> ReferenceSignals:
+    """The signals of a reference that a record holds."""
+    times = np.zeros(0) if reference.times is None else unpack(reference.times)
+    channels = {name: unpack(packed) for name, packed in reference.channels.items()}
+    return ReferenceSignals(times, channels, reference.uncertainties)
+
+
+def judge_reference(case: CaseResults) -> Iterator[Verdict]:
+    """The verdicts of a case's engines against its stored reference; none where it has none."""
+    recorded = case.case.reference
+    if recorded is None:
+        return
+    signals = of_record(recorded)
+    for engine, asked in recorded.asked.items():
+        result = case.get(recorded.variant, engine)
+        side = ComparisonSide(variant=recorded.variant, engine=engine)
+        other = ComparisonSide(variant=recorded.variant, engine=REFERENCE)
+        question = Question(case.case, NAME, "comparison", side, other, "agree", "")
+        if recorded.fault:
+            absent = Finding("did not run", f"the stored reference cannot be used: {recorded.fault}")
+            yield from (question.verdict(pattern, goal, absent) for pattern, goal in asked.goals.items())
+            continue
+        for channel, goal, finding in hold(result, signals, asked):
+            yield question.verdict(channel, goal, finding)
+
+
+def hold(result: Result, reference: ReferenceSignals, asked: Asked) -> Iterator[tuple[str, float, Finding]]:
+    """The finding on every channel of the reference for which there is a goal, with that goal. Never raises.
+
+    A kind of energy that the engine does not know is left out; any other channel that it does not offer it refuses. A
+    result that did not finish gives its status for each goal.
+    """
+    if result.status != "finished":
+        ending = result.ending
+        finding = Finding(ending.status, ending.reason, endings=(ending,))
+        yield from ((pattern, goal, finding) for pattern, goal in asked.goals.items())
+        return
+    places = shared_times(reference.times, result.times)
+    wanted = {name: most_specific(asked.goals, name) for name in reference.channels}
+    named = [(name, pattern) for name, pattern in wanted.items() if pattern is not None]
+    if places is None or not named:
+        what = "it has no channel with a goal" if places is not None else "its times are not among the case's"
+        finding = Finding("did not run", f"the stored reference says nothing here: {what}: regenerate it")
+        yield from ((pattern, goal, finding) for pattern, goal in asked.goals.items())
+        return
+    for channel, pattern in named:
+        goal = asked.goals[pattern]
+        if channel in result.channels:
+            scaled = most_specific(asked.scales, channel)
+            scale = asked.scales[scaled] if scaled is not None else None
+            own = _at(result.signal(channel, across=False), places)
+            yield channel, goal, compare(channel, own, reference.signal(channel), goal, scale)
+        elif not channel.startswith("energy."):
+            yield channel, goal, Finding("refused", f"{result.engine} does not offer {channel}")
+
+
+def shared_times(wanted: Real, given: Real) -> np.ndarray | None:
+    """Where the `wanted` times (s) are among those `given`, both rising; None unless all of them are."""
+    if not (len(wanted) and len(given)):
+        return None
+    after = np.minimum(np.searchsorted(given, wanted), len(given) - 1)
+    before = np.maximum(after - 1, 0)
+    places = np.where(np.abs(given[before] - wanted) < np.abs(given[after] - wanted), before, after)
+    return places if np.all(np.abs(given[places] - wanted) <= CLOCK * np.max(np.abs(given))) else None
+
+
+def _at(signal: Signal, places: np.ndarray) -> Signal:
+    """A signal at some of its samples, with the U that it has reached by the last of them."""
+    envelope = signal.uncertainty.envelope[places]
+    doubt = Uncertainty(envelope, float(envelope[-1]), signal.uncertainty.how, signal.uncertainty.order)
+    return Signal(signal.values[places], doubt, signal.sizes)

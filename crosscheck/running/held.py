@@ -1,0 +1,38 @@
+"""The stored reference of a case, as its record takes it along."""
+
+from __future__ import annotations
+
+from crosscheck.library.case import CaseError, RunFile
+from crosscheck.library.find import Case
+from crosscheck.library.reference import current_reference, has_reference
+from crosscheck.library.selection import held
+from crosscheck.records.held import Asked, RecordedReference
+from crosscheck.records.packing import pack
+
+
+def held_reference(case: Case, run: RunFile) -> RecordedReference | None:
+    """The case's stored reference with those engines of the reduced run file `run` that are held against it.
+
+    None where there is none, or nobody is. Stored files that cannot be used, or that belong to another scene, are a
+    fault that the record tells, so that what should have been judged shows as not run.
+    """
+    recipe = case.run.reference
+    if recipe is None or not has_reference(case.folder):
+        return None
+    running = [engine for variant in run.variants if variant.name == recipe.variant for engine in variant.engines]
+    asked = {
+        engine: Asked(goals=goals, scales=scales) for engine, (goals, scales) in held(case.run, running).items()
+    }
+    if not asked:
+        return None
+    try:
+        stored = current_reference(case)
+    except CaseError as error:
+        return RecordedReference(variant=recipe.variant, asked=asked, fault=str(error))
+    return RecordedReference(
+        variant=recipe.variant,
+        asked=asked,
+        times=pack(stored.times),
+        channels={name: pack(rows) for name, rows in stored.channels.items()},
+        uncertainties={name: known.uncertainty for name, known in stored.knowledge.channels.items()},
+    )
