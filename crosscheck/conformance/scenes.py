@@ -26,12 +26,12 @@ def arm(
     )
 
 
-def pendulum(angle: float = -0.3, rate: float = 0.4, stiffness: float = 0.0) -> Scene:
+def pendulum(rate: float = 0.4) -> Scene:
     """The simplest scene: one body on a hinge about World z, its mass centre on its x, gravity along -y, a marker."""
     return (
         SceneBuilder("pendulum", gravity=(0.0, -G, 0.0))
         .rigid_body("rod", mass=MASS, com=(ARM, 0.0, 0.0), inertia=INERTIA, nodes={"tip": (1.0, 0.0, 0.0)})
-        .revolute("pivot", "ground", "rod", axis=(0.0, 0.0, 1.0), angle=angle, rate=rate, stiffness=stiffness)
+        .revolute("pivot", "ground", "rod", axis=(0.0, 0.0, 1.0), angle=-0.3, rate=rate)
         .marker("tip", "rod", node="tip")
         .scene()
     )

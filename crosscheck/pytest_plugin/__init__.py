@@ -26,7 +26,7 @@ import pytest
 if TYPE_CHECKING:
     from crosscheck.pytest_plugin.request import Request
 
-REQUEST = pytest.StashKey["Request"]()
+REQUEST: pytest.StashKey[Request] = pytest.StashKey()
 TEMPORARY = pytest.StashKey[Path]()
 SHARED = "crosscheck_shared"  # what the controller of xdist tells its workers: folder and session
 

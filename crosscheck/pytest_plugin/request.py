@@ -48,7 +48,7 @@ def read_request(options: Namespace, folder: Path, session: str) -> Request:
     """The request of a command line; pytest.UsageError says what is wrong with it and what there is."""
     names = tuple(dict.fromkeys(options.crosscheck_engine))
     if not names:
-        raise pytest.UsageError("--crosscheck needs --crosscheck-engine NAME: `crosscheck engines` shows which there are")
+        raise pytest.UsageError("--crosscheck needs --crosscheck-engine NAME: `crosscheck engines` shows them")
     if not (options.crosscheck or options.crosscheck_contract):
         raise pytest.UsageError("--crosscheck-engine needs --crosscheck CASES, or --crosscheck-contract, or both")
     known = engines()
