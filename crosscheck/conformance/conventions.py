@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from msgspec.structs import replace
 
@@ -23,7 +25,7 @@ def quaternions_are_scalar_first(engine: Engine) -> None:
 
 @CONVENTIONS.clause("Speeds of a free hinge are given in outboard axes; marker velocities come back in World axes.")
 def free_velocities_are_in_outboard_axes(engine: Engine) -> None:
-    turned = {"quaternion": QUARTER, "angular_velocity": (1.0, 0.0, 0.0), "velocity": (2.0, 0.0, 3.0)}
+    turned: dict[str, Any] = {"quaternion": QUARTER, "angular_velocity": (1.0, 0.0, 0.0), "velocity": (2.0, 0.0, 3.0)}
     scene = arm(NONE).free("free", "ground", "arm", **turned).scene()
     velocity = snapshot(engine, scene).markers["origin"].velocity
     equal("the velocity [angular; linear] of the origin", velocity, [0, 1, 0, 0, 2, 3])
@@ -59,7 +61,7 @@ def loads_are_about_the_outboard_hinge_point(engine: Engine) -> None:
 def momentum_is_about_the_world_origin(engine: Engine) -> None:
     place, w, v = np.array([1.0, -2.0, 0.5]), np.array([0.4, -0.7, 1.1]), np.array([0.3, 0.2, -0.5])
     com = np.array([0.2, -0.1, 0.3])
-    motion = {"position": tuple(place), "angular_velocity": tuple(w), "velocity": tuple(v)}
+    motion: dict[str, Any] = {"position": tuple(place), "angular_velocity": tuple(w), "velocity": tuple(v)}
     scene = arm(NONE, tuple(com)).free("free", "ground", "arm", **motion).scene()
     found = given("the momentum", snapshot(engine, scene).momentum)
     p = MASS * (v + np.cross(w, com))

@@ -31,7 +31,7 @@ class ClauseOutcome:
     message: str = ""
 
 
-class Trial(NamedTuple):
+class ClauseTrial(NamedTuple):
     """One clause to be tried on one engine of a provider, "module:function"."""
 
     provider: str
@@ -60,7 +60,7 @@ def try_engine(
     name: str, clauses: tuple[str, ...] = tuple(CLAUSES), provider: str = PROVIDER, limit_s: float = CLAUSE_LIMIT_S
 ) -> Iterator[ClauseOutcome]:
     """Try clauses on the engine called `name`, one after the other, each after at most `limit_s` seconds broken."""
-    trials = [Trial(provider, name, clause) for clause in clauses]
+    trials = [ClauseTrial(provider, name, clause) for clause in clauses]
     with tempfile.TemporaryDirectory() as folder:
         log = str(Path(folder) / "log")
         for event in run_jobs(attempt, trials, 1, log, kind=_engine, time_limit_s=lambda trial: limit_s):
@@ -71,7 +71,7 @@ def try_engine(
                 yield ClauseOutcome(clause.name, clause.sentence, "broken", clean(str(event.content)))
 
 
-def attempt(trial: Trial, emit: Callable[[ClauseOutcome], None]) -> None:
+def attempt(trial: ClauseTrial, emit: Callable[[ClauseOutcome], None]) -> None:
     """What a worker does with a trial."""
     clause = CLAUSES[trial.clause]
     found = find_engine(trial.provider, trial.engine)
@@ -99,5 +99,5 @@ def verdict_on(outcomes: list[ClauseOutcome]) -> tuple[bool, str]:
     return counts["broken"] == 0, text
 
 
-def _engine(trial: Trial) -> str:
+def _engine(trial: ClauseTrial) -> str:
     return trial.engine

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from crosscheck.conformance.clause import Chapter, equal, given, snapshot
@@ -11,7 +13,7 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.functions import Constant, Ramp, Sine
 
 WHEELS = Chapter(physical=True)
-WHEEL = {"axis": (0.0, 0.0, 1.0), "mass": 0.5, "axial_inertia": 0.04, "transverse_inertia": 0.025}
+WHEEL: dict[str, Any] = {"axis": (0.0, 0.0, 1.0), "mass": 0.5, "axial_inertia": 0.04, "transverse_inertia": 0.025}
 
 
 @WHEELS.clause("A wheel's motor reacts on its body; `wheel_loads` act on the wheel about its centre.")

@@ -101,9 +101,10 @@ def pytest_make_collect_report(
     report = yield
     request = collector.config.stash.get(REQUEST, None)
     if request is not None and isinstance(collector, pytest.Session) and report.passed:
-        from crosscheck.pytest_plugin.items import Asked
+        from crosscheck.pytest_plugin.items import PREFIX, CrosscheckItems
 
-        report.result.append(Asked.from_parent(collector, request=request))
+        everything = CrosscheckItems.from_parent(collector, name=PREFIX, nodeid=PREFIX, request=request)
+        report.result.append(everything)
     return report
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import pytest
 
 from crosscheck.conformance.catalogue import CLAUSES
-from crosscheck.judging.verdict import Verdict
+from crosscheck.judging.verdict import Verdict, VerdictKind
 from crosscheck.library.case import CaseError
 from crosscheck.library.channels import CONSERVED
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
-from crosscheck.library.reference import StoredReference, has_reference, load_reference
+from crosscheck.library.reference import has_reference, load_reference
 from crosscheck.library.selection import alone, held
 from crosscheck.pytest_plugin.request import Request, marks_of
 
@@ -29,52 +29,50 @@ class EngineIsMissing(Exception):
     """The engine that was asked for is not installed, or gave no result at all."""
 
 
-class Asked(pytest.Collector):
+class CrosscheckItems(pytest.Collector):
     """All items of a request, below the session."""
 
     def __init__(self, request: Request, **others: Any) -> None:
         super().__init__(**others)
         self.request = request
 
-    @classmethod
-    def from_parent(cls, parent: pytest.Session, *, request: Request) -> Asked:  # type: ignore[override]
-        made: Asked = super().from_parent(parent, name=PREFIX, nodeid=PREFIX, request=request)
-        return made
-
     def collect(self) -> Iterator[pytest.Item]:
         """The contract first, then the cases in the order in which they were asked for."""
         for engine in self.request.engines:
             for clause in CLAUSES if self.request.contract else ():
-                yield ClauseItem.from_parent(self, request=self.request, engine=engine, clause=clause)
+                name = f"contract[{engine}-{clause}]"
+                yield ClauseItem.from_parent(self, name=name, request=self.request, engine=engine, clause=clause)
         for case in self.request.cases:
             for engine in self.request.engines:
                 yield from self._of(case, engine)
 
     def _of(self, case: Case, engine: str) -> Iterator[pytest.Item]:
         """A case on an engine: the channels of its reference for which there is a goal, and what is conserved."""
-        common = {"request": self.request, "case": case, "engine": engine}
+        common: dict[str, Any] = {"request": self.request, "case": case, "engine": engine}
+        stand_in = common | {"name": f"{case.name}[{engine}-reference]"}
         if not has_reference(case.folder):
-            yield CannotBeHeld.from_parent(self, **common, why="the case has no stored reference", fails=True)
+            yield CannotBeHeld.from_parent(self, **stand_in, why="the case has no stored reference", fails=True)
             return
         try:
             reference = load_reference(case.folder)
         except CaseError as error:
-            yield CannotBeHeld.from_parent(self, **common, why=str(error), fails=True)
+            yield CannotBeHeld.from_parent(self, **stand_in, why=str(error), fails=True)
             return
         goals, _ = held(case.run, (engine,)).get(engine, ({}, {}))
         if not goals:
             why = f"the case does not hold {engine} against its reference: {reason_of(case, engine)}"
-            yield CannotBeHeld.from_parent(self, **common, why=why, fails=False)
+            yield CannotBeHeld.from_parent(self, **stand_in, why=why, fails=False)
             return
+        common |= {"reference": reference.knowledge.values}
         for channel in reference.channels:
             pattern = most_specific(goals, channel)
             if pattern is not None:
-                yield ChannelItem.from_parent(self, **common, channel=channel, pattern=pattern, reference=reference)
+                name = f"{case.name}[{engine}-{channel}]"
+                yield ChannelItem.from_parent(self, **common, name=name, kind="comparison", wanted=(channel, pattern))
         for item in alone(case.run, (engine,)).conservations:
             channel = CONSERVED[item.quantity]
-            yield ChannelItem.from_parent(
-                self, **common, channel=f"{channel} conserved", pattern=channel, reference=reference
-            )
+            name = f"{case.name}[{engine}-{channel} conserved]"
+            yield ChannelItem.from_parent(self, **common, name=name, kind="conservation", wanted=(channel,))
 
 
 def reason_of(case: Case, engine: str) -> str:
@@ -132,19 +130,17 @@ class _CaseItem(_EngineItem):
 
 
 class ChannelItem(_CaseItem):
-    """One channel of a case on an engine, held against the stored reference; or what the engine must conserve."""
+    """One channel of a case on an engine, held against the stored reference; or what the engine must conserve.
 
-    def __init__(self, channel: str, pattern: str, reference: StoredReference, **others: Any) -> None:
+    `wanted` are the channel and, where a run that did not finish has no channels, the pattern that stands for it.
+    """
+
+    def __init__(self, kind: VerdictKind, wanted: tuple[str, ...], reference: str, **others: Any) -> None:
         super().__init__(**others)
-        self.channel = channel
-        self.pattern = pattern
-        self.tell("channel", channel)
-        self.tell("reference", reference.knowledge.values)
-
-    @classmethod
-    def from_parent(cls, parent: pytest.Collector, *, case: Case, engine: str, channel: str, **others: Any) -> Any:
-        name = f"{case.name}[{engine}-{channel}]"
-        return super().from_parent(parent, name=name, case=case, engine=engine, channel=channel, **others)
+        self.kind = kind
+        self.wanted = wanted
+        self.tell("channel", wanted[0])
+        self.tell("reference", reference)
 
     def setup(self) -> None:
         """Have the engine run, if it has not yet; an engine that is not there is an error, not a failure."""
@@ -157,7 +153,7 @@ class ChannelItem(_CaseItem):
         """Judge the channel."""
         verdict = self._verdict()
         if verdict is None:
-            pytest.skip(f"{self.engine} does not know {self.channel}")
+            pytest.skip(f"{self.engine} does not know {self.wanted[0]}")
         numbers = {"E": verdict.E, "U": verdict.U, "goal": verdict.goal}
         for name, value in {"status": verdict.status, "expected": verdict.expected, **numbers}.items():
             self.tell(name, value if value is None or isinstance(value, str) else f"{value:.6g}")
@@ -172,13 +168,10 @@ class ChannelItem(_CaseItem):
             pytest.xfail(f"{verdict.status}, as the case expects: {verdict.expected_reason}")
 
     def _verdict(self) -> Verdict | None:
-        """The verdict on the channel; where a run did not finish, the one that stands for its pattern."""
+        """The verdict on the channel, or the one that stands for it; None where the engine has no such energy."""
         outcome = self.request.runs.outcome(self.case, self.engine)
-        conserved = self.channel != self.pattern and self.channel.endswith(" conserved")
-        kind = "conservation" if conserved else "comparison"
-        wanted = (self.pattern,) if conserved else (self.channel, self.pattern)
-        mine = {verdict.channel: verdict for verdict in outcome.all if verdict.kind == kind}
-        return next((mine[name] for name in wanted if name in mine), None)
+        mine = {verdict.channel: verdict for verdict in outcome.all if verdict.kind == self.kind}
+        return next((mine[name] for name in self.wanted if name in mine), None)
 
 
 class CannotBeHeld(_CaseItem):
@@ -188,11 +181,6 @@ class CannotBeHeld(_CaseItem):
         super().__init__(**others)
         self.why = why
         self.fails = fails
-
-    @classmethod
-    def from_parent(cls, parent: pytest.Collector, *, case: Case, engine: str, **others: Any) -> Any:
-        name = f"{case.name}[{engine}-reference]"
-        return super().from_parent(parent, name=name, case=case, engine=engine, **others)
 
     def runtest(self) -> None:
         """Say why."""
@@ -209,11 +197,6 @@ class ClauseItem(_EngineItem):
         self.clause = clause
         self.tell("clause", CLAUSES[clause].sentence)
         self.add_marker(pytest.mark.xdist_group(f"crosscheck contract {self.engine}"))
-
-    @classmethod
-    def from_parent(cls, parent: pytest.Collector, *, engine: str, clause: str, **others: Any) -> Any:
-        name = f"contract[{engine}-{clause}]"
-        return super().from_parent(parent, name=name, engine=engine, clause=clause, **others)
 
     def setup(self) -> None:
         """Have the clauses tried, if they were not yet; an engine that is not there is an error."""

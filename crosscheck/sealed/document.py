@@ -36,11 +36,11 @@ from crosscheck.records.kinds import RunStatus
 FORMAT, VERSION = "crosscheck results", 1
 
 
-class _Part(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+class _SealedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
     """Base of the parts of the file: a key that it should not have is an error, defaults are left out."""
 
 
-class SealedVerdict(_Part, frozen=True, kw_only=True):
+class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
     """One channel of one comparison."""
 
     status: Status
@@ -54,7 +54,7 @@ class SealedVerdict(_Part, frozen=True, kw_only=True):
     reason: str = ""
 
 
-class SealedRun(_Part, frozen=True, kw_only=True):
+class SealedRun(_SealedPart, frozen=True, kw_only=True):
     """One engine on one variant, at its finest effort; times in s."""
 
     status: RunStatus
@@ -63,7 +63,7 @@ class SealedRun(_Part, frozen=True, kw_only=True):
     compile_s: float = 0.0
 
 
-class SealedCase(_Part, frozen=True, kw_only=True):
+class SealedCase(_SealedPart, frozen=True, kw_only=True):
     """A case: digests of its files and scenes, its verdicts by comparison, its runs."""
 
     files: dict[str, str]
@@ -72,7 +72,7 @@ class SealedCase(_Part, frozen=True, kw_only=True):
     runs: dict[str, SealedRun]
 
 
-class Origin(_Part, frozen=True, kw_only=True):
+class Origin(_SealedPart, frozen=True, kw_only=True):
     """When, where and with what the session was run."""
 
     at: str = ""
@@ -83,7 +83,7 @@ class Origin(_Part, frozen=True, kw_only=True):
     engines: dict[str, str] = {}
 
 
-class SealedResults(_Part, frozen=True, kw_only=True):
+class SealedResults(_SealedPart, frozen=True, kw_only=True):
     """The whole file, but for its seal."""
 
     format: str = ""
