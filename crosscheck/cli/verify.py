@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
-import msgspec
 import typer
 
-from crosscheck.cli.common import CaseWord, Json, app, console, found, in_one_line, print_json, refuse
+from crosscheck.cli.common import CaseWord, Json, app, console, found, in_one_line, refuse
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome
-from crosscheck.verify.against_case import CsvOutcome, sample_times_csv, verify_csv
+from crosscheck.verify.against_case import outcome_json, sample_times_csv, verify_csv
 
 
 @app.command()
@@ -23,20 +22,29 @@ def verify(
         Path | None,
         typer.Option(help="The same results at half the accuracy: your U is 3 x the difference, not the case's goal."),
     ] = None,
-    variant: Annotated[str | None, typer.Option(help="Variant to be held against; by default the first.")] = None,
-    engine: Annotated[str, typer.Option(help="Engine that gives the reference.")] = "native",
+    variant: Annotated[
+        str | None, typer.Option(help="Variant to be held against; by default that of the stored reference.")
+    ] = None,
+    engine: Annotated[
+        str | None, typer.Option(help="Run this engine and hold against it, instead of the stored reference.")
+    ] = None,
     template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
     as_json: Json = False,
 ) -> None:
     """
-    Hold a CSV of your own code against a case, without an adapter.
+    Hold a CSV of your own code against a case, without an adapter, and where it has a stored reference without any run.
 
-    **Format**: one header line, one line a sample time of the case. Columns: `t` (s); for a marker `tip`
-    `tip.px tip.py tip.pz` (m), `tip.qw tip.qx tip.qy tip.qz`, `tip.vx tip.vy tip.vz` (m/s), `tip.wx tip.wy tip.wz`
-    (rad/s); for a hinge `elbow` `elbow.tx elbow.ty elbow.tz` (Nm) and `elbow.fx elbow.fy elbow.fz` (N), the load on the
-    outboard body about the hinge point. World axes; quaternions scalar-first, body to World. Only whole groups count,
+    **Format**: one header line, one line a time. Columns: `t` (s); for a marker `tip` `tip.px tip.py tip.pz` (m),
+    `tip.qw tip.qx tip.qy tip.qz`, `tip.vx tip.vy tip.vz` (m/s), `tip.wx tip.wy tip.wz` (rad/s); for a hinge or a wheel
+    `elbow` `elbow.tx elbow.ty elbow.tz` (Nm) and `elbow.fx elbow.fy elbow.fz` (N), the load on the outboard body about
+    the hinge point; its drive `elbow.drive`; `energy.kinetic`, `energy.total` ... (J), `momentum.angular.x .y .z` (Nms)
+    and `momentum.linear.x .y .z` (Ns). World axes; quaternions scalar-first, body to World. Only whole groups count,
     any subset of groups will do; `--template` writes a file with the times and all columns to fill in. flexmb's own
-    `trajectory.csv` will do as it is: it is compared in whatever the case sets a goal for.
+    `trajectory.csv` and a file like `reference.csv` will do as they are: they are compared in whatever the case sets a
+    goal for.
+
+    Your own times will do too, if they rise and cover the reference's: they are interpolated, and what that leaves open
+    is added to U. `docs/verify.md` leads from a code of your own to the first verdict.
 
     **Shows** each channel's distance E, uncertainty U, the time at which it is worst, and what is wrong where that can
     be guessed: thousandths, degrees, a sign, exchanged components, quaternions conjugate or scalar-last, body axes,
@@ -57,19 +65,12 @@ def verify(
             return
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
     console.print(channels_table(outcome))
+    console.print(words(f"Held against {outcome.against}."), soft_wrap=True)
+    if outcome.interpolated:
+        console.print(words(f"Your times: {outcome.interpolated}."), soft_wrap=True)
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
     code = print_outcome(console, outcome)
     if as_json:
-        print_json(_plain(outcome))
+        typer.echo(outcome_json(outcome))
     raise typer.Exit(code)
-
-
-def _plain(outcome: CsvOutcome) -> dict[str, Any]:
-    """The verdicts with the time at which each channel is worst and the guess of its cause."""
-    verdicts = []
-    for verdict in outcome.all:
-        detail = outcome.details.get(verdict.channel)
-        extra = {} if detail is None else {"worst_s": detail.worst_s, "cause": detail.cause}
-        verdicts.append({**msgspec.to_builtins(verdict), "ok": verdict.ok, **extra})
-    return {"ok": outcome.ok, "headline": outcome.headline, "verdicts": verdicts, "left_out": outcome.left_out}

@@ -157,22 +157,33 @@ def parse_values(text: str, file: str) -> tuple[Real, dict[str, Real]]:
         raise CaseError(f"{file}: {error}") from None
     if not (np.all(np.isfinite(table)) and np.all(np.diff(table[:, 0]) > 0.0)):
         raise CaseError(f"{file}: it holds numbers that are not finite, or times that do not rise")
-    places: dict[str, list[int]] = {}
-    for place, name in enumerate(header[1:], start=1):
-        places.setdefault(_channel_of(name), []).append(place)
-    channels = {channel: table[:, columns] for channel, columns in places.items()}
-    expected = [TIME, *(name for channel, values in channels.items() for name in _names(channel, values, file))]
-    if expected != header:
-        wrong = next((one for one, other in zip(header, expected, strict=False) if one != other), header[-1])
-        raise CaseError(f'{file}: column "{wrong}" is not where or what it should be')
-    return table[:, 0], channels
-
-
-def _names(channel: str, values: Real, file: str) -> list[str]:
     try:
-        return column_names(channel, values.shape[1])
-    except KeyError:
-        raise CaseError(f"{file}: {channel} has {values.shape[1]} columns: none of its kind has") from None
+        places = channels_by_column(header[1:])
+    except CaseError as error:
+        raise CaseError(f"{file}: {error}") from None
+    return table[:, 0], {channel: table[:, [place + 1 for place in found]] for channel, found in places.items()}
+
+
+def channels_by_column(names: list[str]) -> dict[str, list[int]]:
+    """The places of the columns of each channel, by names such as "marker:tip.position.x [m]".
+
+    CaseError names the first column that is not what, or not where, it should be.
+    """
+    places: dict[str, list[int]] = {}
+    for place, name in enumerate(names):
+        places.setdefault(_channel_of(name), []).append(place)
+    for channel, found in places.items():
+        try:
+            expected = column_names(channel, len(found))
+        except KeyError:
+            raise CaseError(f"{channel} has {len(found)} columns: none of its kind has") from None
+        for place, name in zip(found, expected, strict=True):
+            if names[place] != name:
+                raise CaseError(f'column "{names[place]}" is not where or what it should be: expected is "{name}"')
+    if (flat := [place for found in places.values() for place in found]) != list(range(len(names))):
+        wrong = next(place for place, other in enumerate(flat) if place != other)
+        raise CaseError(f'column "{names[wrong]}" is not where it should be: the columns of a channel stand together')
+    return places
 
 
 def _channel_of(column: str) -> str:

@@ -42,15 +42,16 @@ def select(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
-    """The run file reduced to the engines that were asked for (none: all) on the variant of the stored reference.
+    """The run file reduced to the variant of the stored reference, and there to the engines that were asked for.
 
-    Nothing is compared engine against engine. Empty where the case has no such variant.
+    Without any these are all that are held against it. Nothing is compared engine against engine.
     """
     of = run.reference.variant if run.reference is not None else ""
     run = _joined(run, asked)
-    running = {engine for variant in run.variants if variant.name == of for engine in _all(variant)}
-    needed = {(of, engine) for engine in running if engine in asked or not asked}
-    conserved = (_narrowed(run, item, asked) for item in run.conservations if item.variant == of)
+    running = [engine for variant in run.variants if variant.name == of for engine in _all(variant)]
+    kept = tuple(engine for engine in running if engine in (asked or held(run, running)))
+    needed = {(of, engine) for engine in kept}
+    conserved = (_narrowed(run, item, kept) for item in run.conservations if item.variant == of and kept)
     return msgspec.structs.replace(
         run,
         variants=tuple(variant for each in run.variants if (variant := _keep(each, needed)).engines),

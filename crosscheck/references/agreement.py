@@ -2,7 +2,7 @@
 
 With E = max |a - b| of the route a that gives the values and another route b, and their numerical U,
 
-    E <= U_a + U_b   is required of all routes,      uncertainty = max(U_a, every E).
+    E <= U_a + U_b, both finite, is required of all routes,      uncertainty = max(U_a, every E).
 
 E is no less than what the two routes together have got wrong unless they err alike, and U_a is what the first one knows
 of itself. The 17 digits of the file and the rounding of one operation, eps times the size of the channel's family, are
@@ -15,7 +15,7 @@ still agree within their uncertainties, but say nothing.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain
 
@@ -49,31 +49,49 @@ def agree(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> Agreed:
     """
     wanted = _wanted(routes, patterns)
     until = _horizon(routes, wanted)
-    problems: list[str] = []
-    channels, known = {}, {}
-    for channel in wanted:
-        offering = [route for route in routes if channel in route.channels]
-        first = offering[0]
-        others = [other for other in offering[1:] if other.channels[channel].shape == first.channels[channel].shape]
-        if not any(first.independent_of(other) for other in others):
-            problems.append(_alone(channel, first, offering[1:]))
-            continue
-        apart = [_distance(channel, first, other, until) for other in others]
-        for other, (error, when) in zip(others, apart, strict=True):
-            doubt = _doubt(first, channel, until) + _doubt(other, channel, until)
-            if not error <= doubt:
-                problems.append(_disagreement(channel, first, other, error, doubt, when))
-        channels[channel] = first.channels[channel][:until]
-        largest = max(error for error, _ in apart)
-        floor = _floor(channel, first.channels, until)
-        known[channel] = Known(
-            uncertainty=_rounded_up(max(_doubt(first, channel, until), largest, floor)),
-            scale=float(f"{signal_range(channel, channels[channel]):.3g}"),
-            how=_in_words(channel, first, others, apart, until),
-        )
+    offering = {channel: [route for route in routes if channel in route.channels] for channel in wanted}
+    problems = [text for channel in wanted for text in _problems(channel, offering[channel], until)]
     if problems:
         raise CaseError("\n".join(problems))
-    return Agreed(routes[0].times[:until], channels, known)
+    return Agreed(
+        routes[0].times[:until],
+        {channel: offering[channel][0].channels[channel][:until] for channel in wanted},
+        {channel: _known(channel, offering[channel], until) for channel in wanted},
+    )
+
+
+def _problems(channel: str, routes: Sequence[RouteSignals], until: int) -> Iterator[str]:
+    """Why the routes that offer a channel make no reference of it."""
+    first, *others = routes
+    for other in others:
+        if other.channels[channel].shape != first.channels[channel].shape:
+            yield f"[reference] {channel}: {first.title} and {other.title} give it other shapes: correct one of the two"
+            return
+    if not any(first.independent_of(other) for other in others):
+        yield _alone(channel, first, routes[1:])
+    for each in (first, *others):
+        if not np.isfinite(_doubt(each, channel, until)):
+            how = each.uncertainties[channel].how
+            yield f"[reference] {channel}: the uncertainty of {each.title} is none ({how}): {ADVICE}"
+    for other in others:
+        error, when = _distance(channel, first, other, until)
+        doubt = _doubt(first, channel, until) + _doubt(other, channel, until)
+        if not error <= doubt:
+            yield _disagreement(channel, first, other, error, doubt, when)
+
+
+def _known(channel: str, routes: Sequence[RouteSignals], until: int) -> Known:
+    """What routes that agree know of a channel."""
+    first, *others = routes
+    apart = [_distance(channel, first, other, until)[0] for other in others]
+    own = _doubt(first, channel, until)
+    words = [f"U {own:.1e} of {first.name}: {first.uncertainties[channel].how}"]
+    words += [f"E {error:.1e} to {other.name}" for other, error in zip(others, apart, strict=True)]
+    return Known(
+        uncertainty=_rounded_up(max(own, *apart, _floor(channel, first.channels, until))),
+        scale=float(f"{signal_range(channel, first.channels[channel][:until]):.3g}"),
+        how="; ".join(words),
+    )
 
 
 def _wanted(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> list[str]:
@@ -135,18 +153,6 @@ def _rounded_up(number: float) -> float:
     """Two digits, not below the number."""
     rounded = float(f"{number:.1e}")
     return rounded if rounded >= number else float(f"{number * 1.05:.1e}")
-
-
-def _in_words(
-    channel: str,
-    first: RouteSignals,
-    others: Sequence[RouteSignals],
-    apart: Sequence[tuple[float, float]],
-    until: int,
-) -> str:
-    own = f"U {_doubt(first, channel, until):.1e} of {first.name}: {first.uncertainties[channel].how}"
-    against = (f"E {error:.1e} to {other.name}" for other, (error, _) in zip(others, apart, strict=True))
-    return "; ".join([own, *against])
 
 
 def _alone(channel: str, first: RouteSignals, others: Sequence[RouteSignals]) -> str:

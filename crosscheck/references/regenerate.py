@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+import msgspec
 import numpy as np
 
 from crosscheck.library.case import CaseError
@@ -31,6 +32,7 @@ from crosscheck.running.sweep import PROVIDER, Listener
 from flexmb.scene.reading import read_text
 from flexmb.typing import Real
 
+PROVENANCE = "provenance.toml"
 Done = Literal["confirmed", "written", "would be written"]
 
 
@@ -76,12 +78,21 @@ def regenerate(
     knowledge = _knowledge(case, recipe, routes, agreed, values)
     remark = "" if before is None else _permitted(case, before, agreed, knowledge)
     if before is not None and not remark and _describes_the_same(before, agreed, knowledge):
+        if before.knowledge.provenance != knowledge.provenance:  # the next change needs its own reason
+            values = values_text(before.times, before.channels)
+            knowledge = msgspec.structs.replace(before.knowledge, provenance=knowledge.provenance)
+            return _put(case, values, knowledge, check, f"reproduced; {PROVENANCE} was changed since")
         share = f"reproduced, farthest off by {largest_share(before, agreed):.2g} of the stated uncertainty"
         return Regenerated(case.name, "confirmed", len(agreed.channels), knowledge.horizon_s, share)
+    return _put(case, values, knowledge, check, remark)
+
+
+def _put(case: Case, values: str, knowledge: Knowledge, check: bool, remark: str) -> Regenerated:
+    """Write the two files, unless this is a check."""
     if not check:
         write_both(case.folder, values, knowledge_text(knowledge))
     done: Done = "would be written" if check else "written"
-    return Regenerated(case.name, done, len(agreed.channels), knowledge.horizon_s, remark)
+    return Regenerated(case.name, done, len(knowledge.channels), knowledge.horizon_s, remark)
 
 
 def _times(case: Case, recipe: ReferenceRecipe) -> Real:
@@ -107,7 +118,7 @@ def _knowledge(
 
 
 def _provenance(case: Case) -> str:
-    file = case.folder / "provenance.toml"
+    file = case.folder / PROVENANCE
     return digest(read_text(file) if file.exists() else "")
 
 
@@ -119,9 +130,9 @@ def _permitted(case: Case, before: StoredReference, agreed: Agreed, knowledge: K
         raise CaseError(
             f"{case.name}: {VALUES} is not replaced, as more would change than was stated:\n{listed}\n"
             "  A reference is not moved to make a run green. If the case is meant to be another, say so in "
-            f"{case.folder / 'provenance.toml'}: with that changed too, the reference is replaced."
+            f"{case.folder / PROVENANCE}: with that changed too, the reference is replaced."
         )
-    return f"{len(changes)} changes beyond what was stated, with provenance.toml: {changes[0]}" if changes else ""
+    return f"{len(changes)} changes beyond what was stated, with {PROVENANCE}: {changes[0]}" if changes else ""
 
 
 def _describes_the_same(before: StoredReference, agreed: Agreed, knowledge: Knowledge) -> bool:

@@ -1,4 +1,7 @@
-"""Holding a CSV of somebody's code against a case: columns to channels, one engine as reference, the usual verdicts."""
+"""Holding a CSV of somebody's code against a case: columns to channels, the stored reference, the usual verdicts.
+
+Where a case has no stored reference, or another variant or an engine is asked for, an engine runs and is the reference.
+"""
 
 from __future__ import annotations
 
@@ -11,22 +14,28 @@ from tempfile import TemporaryDirectory
 import msgspec
 import numpy as np
 
+from crosscheck.judging.against_reference import REFERENCE, of_stored
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import Result, collect
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import RunFile, Variant
+from crosscheck.library.channels import kind_named
 from crosscheck.library.find import Case
+from crosscheck.library.patterns import most_specific
+from crosscheck.library.reference import current_reference, has_reference
 from crosscheck.records.archive import read
 from crosscheck.running.plan import MAIN, sample_times, variant_scene
 from crosscheck.running.pool import Limits
 from crosscheck.running.sweep import PROVIDER, sweep
 from crosscheck.verify.causes import likely_cause
-from crosscheck.verify.columns import LOAD_GROUPS, MARKER_GROUPS, Columns, VerifyError, read_columns
-from flexmb.run.channels import distance, matches, signal_range
+from crosscheck.verify.columns import Columns, VerifyError, read_columns, short_names
+from flexmb.run.channels import distance, signal_range
+from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
 YOURS = "csv"
+INTERPOLATION = "interpolation from times of its own"
 
 
 @dataclass(frozen=True)
@@ -39,10 +48,25 @@ class Detail:
 
 @dataclass(frozen=True)
 class CsvOutcome(SessionOutcome):
-    """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared."""
+    """The outcome of a CSV, with details by channel; `left_out` are columns that were not compared.
+
+    `against` says what the reference is, `interpolated` how times of the CSV's own were dealt with, "" if it has none.
+    """
 
     details: dict[str, Detail] = field(default_factory=dict)
     left_out: tuple[str, ...] = ()
+    against: str = ""
+    interpolated: str = ""
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a CSV is held against: signals at `times` (T,) s; `engine` gave them, `title` says so in words."""
+
+    engine: str
+    title: str
+    times: Real
+    signals: dict[str, Signal]
 
 
 def verify_csv(
@@ -51,36 +75,70 @@ def verify_csv(
     *,
     coarse: Path | None = None,
     variant: str | None = None,
-    engine: str = "native",
+    engine: str | None = None,
     provider: str = PROVIDER,
 ) -> CsvOutcome:
-    """Verdicts on every channel of a CSV against `engine` on a variant (by default the first) of a case.
+    """Verdicts on every channel of a CSV against the stored reference of a case, for which no engine runs.
 
-    The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the case's goal. Of
-    a whole trajectory.csv those channels are compared that the case sets a goal for and the engine offers.
+    An `engine`, or a `variant` of which there is no stored reference, is run instead (by default "native" on the first
+    variant). The CSV's own U is 3 x its distance from the `coarse` CSV; without one it is taken to claim just the
+    case's goal. What interpolation from other times leaves open is added. Of a whole trajectory.csv or reference.csv
+    those channels are compared that the case sets a goal for and the reference has.
     """
-    chosen = _variant(case, variant)
-    times = sample_times(case.run, chosen)
-    mine = read_columns(file, times)
-    rough = read_columns(coarse, times) if coarse is not None else Columns({})
+    chosen = _variant(case, variant, stored=engine is None)
+    target = _target(case, chosen, engine, provider)
+    mine = read_columns(file, target.times)
+    rough = read_columns(coarse, target.times) if coarse is not None else Columns({})
     lacking = [name for name in mine.channels if name not in rough.channels]
     if coarse is not None and lacking:
         raise VerifyError(f"{coarse} lacks {', '.join(lacking)}, which {file} has: give both the same columns")
-    reference = _reference(case, chosen, engine, provider)
     verdicts, details, left_out = [], {}, list(mine.left_out)
     for name, values in mine.channels.items():
-        channel = _known_as(name, reference)
+        channel = _known_as(name, target)
         goal = _goal(case.run, chosen, channel)
-        if mine.own and (goal is None or channel not in reference.channels):
+        if mine.own and (goal is None or channel not in target.signals):
             left_out.append(channel)
             continue
-        finding = _judge(reference, channel, values, rough.channels.get(name), goal)
+        added = mine.doubts.get(name, 0.0)
+        finding = _judge(target, channel, values, rough.channels.get(name), goal, added)
         if goal is not None and finding.E is not None:
-            details[channel] = detail = _detail(reference, channel, values, goal, times, finding)
+            details[channel] = detail = _detail(target, channel, values, goal, finding)
             cause = f"; {detail.cause}?" if detail.cause else ""
             finding = replace(finding, reason=f"{finding.reason}; worst at t = {detail.worst_s:.6g} s{cause}")
-        verdicts.append(_verdict(case, chosen, channel, engine, goal or 0.0, finding))
-    return CsvOutcome({case.name: verdicts}, [], details=details, left_out=tuple(left_out))
+        verdicts.append(_verdict(case, chosen, channel, target, goal or 0.0, finding))
+    return CsvOutcome(
+        {case.name: verdicts},
+        [],
+        details=details,
+        left_out=tuple(left_out),
+        against=target.title,
+        interpolated=_interpolation(mine, target),
+    )
+
+
+def outcome_json(outcome: CsvOutcome) -> str:
+    """The outcome as JSON: what it was held against, whether all agrees, and each channel with its figures."""
+    channels = {
+        verdict.channel: {
+            "status": verdict.status,
+            "E": verdict.E,
+            "U": verdict.U,
+            "goal": verdict.goal,
+            "worst_s": detail.worst_s if (detail := outcome.details.get(verdict.channel)) else None,
+            "cause": detail.cause if detail else "",
+            "reason": verdict.reason,
+        }
+        for verdict in outcome.all
+    }
+    found = {
+        "case": next(iter(outcome.verdicts)),
+        "against": outcome.against,
+        "ok": outcome.ok,
+        "interpolated": outcome.interpolated,
+        "left_out": outcome.left_out,
+        "channels": channels,
+    }
+    return msgspec.json.format(msgspec.json.encode(found)).decode()
 
 
 def read_signals(file: Path, times: Real) -> dict[str, Real]:
@@ -89,23 +147,71 @@ def read_signals(file: Path, times: Real) -> dict[str, Real]:
 
 
 def sample_times_csv(case: Case, variant: str | None) -> str:
-    """A CSV to fill in: the case's times and a column for every component of every marker and hinge."""
-    chosen = _variant(case, variant)
-    scene = variant_scene(case.scene(chosen), chosen)
-    names = [f"{marker.name}.{part}" for marker in scene.markers for group in MARKER_GROUPS.values() for part in group]
-    names += [f"{hinge.name}.{part}" for hinge in scene.hinges for group in LOAD_GROUPS.values() for part in group]
+    """A CSV to fill in: the times of the reference and a column for every component of every channel with a goal.
+
+    Without a stored reference of the variant: the case's times, and all markers, hinges and wheels.
+    """
+    chosen = _variant(case, variant, stored=True)
+    if _has_stored(case, chosen):
+        reference = current_reference(case)
+        times = reference.times
+        shapes = {name: rows.shape[1] for name, rows in reference.channels.items()}
+        shapes = {name: width for name, width in shapes.items() if _goal(case.run, chosen, name) is not None}
+    else:
+        times = sample_times(case.run, chosen)
+        shapes = _shapes(variant_scene(case.scene(chosen), chosen))
+    names = dict.fromkeys(column for channel, width in shapes.items() for column in short_names(channel, width))
     text = io.StringIO()
     writer = csv.writer(text, lineterminator="\n")
     writer.writerow(["t", *names])
-    writer.writerows([[repr(float(t)), *([""] * len(names))] for t in sample_times(case.run, chosen)])
+    writer.writerows([[repr(float(t)), *([""] * len(names))] for t in times])
     return text.getvalue()
 
 
-def _variant(case: Case, name: str | None) -> Variant:
-    return case.run.variants[0] if name is None else case.run.variant(name)
+def _shapes(scene: Scene) -> dict[str, int]:
+    """Channels of the markers, hinges and wheels of a scene, with their widths."""
+    items = {
+        "marker": [marker.name for marker in scene.markers],
+        "load": [hinge.name for hinge in scene.hinges],
+        "wheel_load": [wheel.name for wheel in scene.wheels],
+    }
+    return {
+        f"{kind}:{name}.{part.name}": len(part.letters)
+        for kind, names in items.items()
+        for name in names
+        for part in kind_named(kind).parts
+    }
 
 
-def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Result:
+def _variant(case: Case, name: str | None, stored: bool) -> Variant:
+    """The variant called `name`; without a name that of the `stored` reference if it counts, else the first."""
+    if name is not None:
+        return case.run.variant(name)
+    recipe = case.run.reference
+    if stored and recipe is not None and has_reference(case.folder):
+        return case.run.variant(recipe.variant)
+    return case.run.variants[0]
+
+
+def _has_stored(case: Case, variant: Variant) -> bool:
+    recipe = case.run.reference
+    return recipe is not None and recipe.variant == variant.name and has_reference(case.folder)
+
+
+def _target(case: Case, variant: Variant, engine: str | None, provider: str) -> Target:
+    """The stored reference, or the result of an engine that runs now."""
+    if engine is None and _has_stored(case, variant):
+        stored = current_reference(case)
+        signals = of_stored(stored)
+        title = f"the stored reference of variant {variant.name}, to {stored.times[-1]:g} s"
+        return Target(REFERENCE, title, stored.times, {name: signals.signal(name) for name in signals.channels})
+    name = engine or "native"
+    result = _run(case, variant, name, provider)
+    signals_now = {channel: result.signal(channel, across=False) for channel in result.channels}
+    return Target(name, f"{name}, run now on variant {variant.name}", result.times, signals_now)
+
+
+def _run(case: Case, variant: Variant, engine: str, provider: str) -> Result:
     """The engine's result on the variant, run now, in a worker: what hangs or ends its process gives no reference."""
     run = msgspec.structs.replace(
         case.run,
@@ -114,6 +220,7 @@ def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Resu
         controls=(),
         conservations=(),
         charts=(),
+        reference=None,
     )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
@@ -126,71 +233,99 @@ def _reference(case: Case, variant: Variant, engine: str, provider: str) -> Resu
 
 
 def _goal(run: RunFile, variant: Variant, channel: str) -> float | None:
-    """The goal of the first comparison of the variant that judges the channel."""
+    """The goal of the stored reference, or else of the first comparison of the variant that judges the channel."""
+    recipe = run.reference
+    asked = [recipe.goals] if recipe is not None and recipe.variant == variant.name else []
     for item in run.comparisons:
         sides = [side.variant for side in (item.a, item.b) if side is not None]
         if variant.name in (item.variant, *sides):
-            naming = [pattern for pattern in item.goals if matches(pattern, channel)]
-            if naming:
-                return item.goals[max(naming, key=len)]
+            asked.append(item.goals)
+    for goals in asked:
+        pattern = most_specific(goals, channel)
+        if pattern is not None:
+            return goals[pattern]
     return None
 
 
-def _judge(reference: Result, channel: str, values: Real, rough: Real | None, goal: float | None) -> Finding:
-    if channel not in reference.channels:
+def _judge(
+    reference: Target, channel: str, values: Real, rough: Real | None, goal: float | None, added: float
+) -> Finding:
+    """The finding on a channel; `added` (SI) is what interpolation adds to the U of its values."""
+    if channel not in reference.signals:
         return Finding("did not run", f"the reference has no channel {channel}: check the name")
     if goal is None:
         return Finding("refused", "the case sets no goal for this channel")
-    target = reference.signal(channel, across=False)
+    target = reference.signals[channel]
     if rough is not None:
         doubt = estimate(channel, "tolerance", [RungSignal(2.0, rough), RungSignal(1.0, values)], 0, target.sizes[0])
+        if added:
+            doubt = Uncertainty(doubt.envelope + added, doubt.value + added, f"{doubt.how}; {INTERPOLATION}")
     else:
-        doubt = _claimed(channel, target, goal)
+        doubt = _claimed(channel, target, goal, added)
     return compare(channel, Signal(values, doubt, target.sizes), target, goal)
 
 
-def _known_as(channel: str, reference: Result) -> str:
+def _known_as(channel: str, reference: Target) -> str:
     """The channel's name in the reference: the load of a wheel where no hinge has that name."""
     wheel = f"wheel_{channel}"
-    return wheel if channel not in reference.channels and wheel in reference.channels else channel
+    return wheel if channel not in reference.signals and wheel in reference.signals else channel
 
 
-def _detail(reference: Result, channel: str, values: Real, goal: float, times: Real, finding: Finding) -> Detail:
-    target = reference.values(channel)
-    worst = float(times[int(np.argmax(distance(channel, values, target)))])
+def _detail(reference: Target, channel: str, values: Real, goal: float, finding: Finding) -> Detail:
+    target = reference.signals[channel]
+    worst = float(reference.times[int(np.argmax(distance(channel, values, target.values)))])
     if finding.status == "agree":
         return Detail(worst)
-    allowed = max(goal * signal_range(channel, target), reference.uncertainty(channel).value)
+    allowed = max(goal * signal_range(channel, target.values), target.uncertainty.value)
     markers = {
-        name.partition(":")[2].rpartition(".")[0]: reference.values(name)
-        for name in reference.channels
+        name.partition(":")[2].rpartition(".")[0]: signal.values
+        for name, signal in reference.signals.items()
         if name.endswith(".orientation")
     }
-    return Detail(worst, likely_cause(channel, values, target, allowed, markers))
+    return Detail(worst, likely_cause(channel, values, target.values, allowed, markers))
 
 
-def _claimed(channel: str, target: Signal, goal: float) -> Uncertainty:
-    """The U that, with the reference's, just makes the goal (less a rounding, so that it does).
+def _claimed(channel: str, target: Signal, goal: float, added: float) -> Uncertainty:
+    """The U that, with the reference's, just makes the goal (less a rounding, so that it does), or `added` if larger.
 
     The goal is relative to what the verdict takes for the signal's size: that of its family where the signal is zero.
     """
     sizes = (signal_range(channel, target.values), *target.sizes)
     size = next((size for size in sizes if size > target.uncertainty.value), 0.0)
-    allowed = goal * size * (1.0 - 1e-12)
-    value = max(allowed - target.uncertainty.value, 0.0)
-    return Uncertainty(np.full(len(target.values), value), value, "claimed: the case's goal")
+    allowed = goal * size * (1.0 - 1e-12) - target.uncertainty.value
+    value, how = (allowed, "claimed: the case's goal") if allowed >= added else (added, INTERPOLATION)
+    value = max(value, 0.0)
+    return Uncertainty(np.full(len(target.values), value), value, how)
 
 
-def _verdict(case: Case, variant: Variant, channel: str, engine: str, goal: float, finding: Finding) -> Verdict:
+def _interpolation(mine: Columns, target: Target) -> str:
+    """How times of the CSV's own were dealt with, in words; "" where it has none."""
+    if not mine.doubts:
+        return ""
+    sizes = {name: target.signals.get(_known_as(name, target)) for name in mine.doubts}
+    shares = {
+        name: mine.doubts[name] / size
+        for name, signal in sizes.items()
+        if signal is not None and (size := max(signal_range(name, signal.values), *signal.sizes)) > 0.0
+    }
+    most = max(shares, key=lambda name: shares[name], default="")
+    part = f", at most {shares[most]:.2g} of the range, in {most}" if most else ""
+    return (
+        f"{mine.samples} samples at times of its own, interpolated at the reference's {len(target.times)} by splines "
+        f"of degree 5; the difference from degree 3 is added to U{part}"
+    )
+
+
+def _verdict(case: Case, variant: Variant, channel: str, target: Target, goal: float, finding: Finding) -> Verdict:
     return Verdict(
         case=case.name,
-        comparison=f"your results against {engine}",
+        comparison=f"your results against {target.engine}",
         kind="comparison",
         channel=channel,
         variant_a=variant.name,
         engine_a=YOURS,
         variant_b=variant.name,
-        engine_b=engine,
+        engine_b=target.engine,
         level="",
         status=finding.status,
         expected="agree",
@@ -202,4 +337,4 @@ def _verdict(case: Case, variant: Variant, channel: str, engine: str, goal: floa
     )
 
 
-__all__ = ["CsvOutcome", "Detail", "VerifyError", "read_signals", "sample_times_csv", "verify_csv"]
+__all__ = ["CsvOutcome", "Detail", "VerifyError", "outcome_json", "read_signals", "sample_times_csv", "verify_csv"]

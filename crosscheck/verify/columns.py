@@ -6,13 +6,17 @@ import csv
 import io
 import math
 import re
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
 
-from crosscheck.library.channels import kind_named
+from crosscheck.judging.against_reference import shared_times
+from crosscheck.library.case import CaseError
+from crosscheck.library.channels import KINDS, kind_named, part_of
+from crosscheck.library.reference import channels_by_column
+from crosscheck.verify.resample import FEWEST, resample
 from flexmb.scene.reading import MIB, Unreadable, read_text
 from flexmb.typing import Real
 
@@ -21,7 +25,8 @@ LOAD_GROUPS = {part.name: part.letters for part in kind_named("load").parts}
 # What is compared of Trajectory.to_csv: the kind of channels and the part, by what the columns call it.
 OWN_GROUPS = {part.own: (kind, part) for kind in ("marker", "load") for part in kind_named(kind).parts}
 OWN_HEADER = re.compile(r"(.+) \[([^\]]*)\]")
-TIME_MATCH_S = 1e-9
+STORED = ("marker:", "load:", "wheel_load:", "drive:")  # how a reference.csv calls what items of the scene have
+DRIVE = "drive"
 LIMIT = 128 * MIB
 NUMBER = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
@@ -34,20 +39,29 @@ class VerifyError(ValueError):
 
 @dataclass(frozen=True)
 class Columns:
-    """Channels (T, k) of a CSV; `own`: it is a whole trajectory.csv of flexmb, and `left_out` are its other columns."""
+    """Channels (T, k) of a CSV at the times asked for.
+
+    `own`: it is a whole trajectory.csv of flexmb or a reference.csv, and `left_out` are its other columns.
+
+    Where the file has times of its own, of which there are `samples`, `doubts` say what interpolation adds to the U of
+    each channel (SI); else both are empty.
+    """
 
     channels: dict[str, Real]
     own: bool = False
     left_out: tuple[str, ...] = ()
+    samples: int = 0
+    doubts: dict[str, float] = field(default_factory=dict)
 
 
 def read_columns(file: Path, times: Real) -> Columns:
-    """Channels of a CSV whose times are the case's; groups such as tip.px, tip.py, tip.pz must be whole.
+    """Channels of a CSV at `times` (T,) s, rising; groups such as tip.px, tip.py, tip.pz must be whole.
 
+    Its own times may be others, if they rise and cover these: then it is interpolated (see `resample`).
     VerifyError names file, line, column and remedy.
     """
     try:
-        header, numbers, rows = _rows(read_text(file, LIMIT), len(times))
+        header, numbers, rows = _rows(read_text(file, LIMIT))
     except OSError as error:
         raise VerifyError(f"{file} cannot be read: {error.strerror}") from None
     except Unreadable as error:
@@ -60,11 +74,19 @@ def read_columns(file: Path, times: Real) -> Columns:
         raise VerifyError(f"{file}: {error}") from None
 
 
-def _rows(text: str, wanted: int) -> tuple[list[str], list[int], Real]:
-    """Names of the columns, line numbers of the rows, and the numbers (rows, columns); an empty cell is NaN.
+def short_names(channel: str, width: int) -> list[str]:
+    """What the columns of a channel are called: "tip.px", "elbow.tz", "elbow.drive", "momentum.linear.x"."""
+    kind, _, named = channel.partition(":")
+    if kind == "drive":
+        return [f"{named}.{DRIVE}"] if width == 1 else [f"{named}.{DRIVE}.{i}" for i in range(width)]
+    part = part_of(channel)
+    if named and part is not None:
+        return [f"{named.rpartition('.')[0]}.{letter}" for letter in part.letters]
+    return [channel] if width == 1 else [f"{channel}.{letter}" for letter in "xyz"]
 
-    Of rows beyond those wanted only one is read: it is enough to know that there are more.
-    """
+
+def _rows(text: str) -> tuple[list[str], list[int], Real]:
+    """Names of the columns, line numbers of the rows, and the numbers (rows, columns); an empty cell is NaN."""
     reader = csv.reader(io.StringIO(text, newline=""), strict=True)
     numbers: list[int] = []
     rows: list[Real] = []
@@ -79,7 +101,7 @@ def _rows(text: str, wanted: int) -> tuple[list[str], list[int], Real]:
                     advice = "write commas between columns and points in numbers (no decimal comma)"
                     raise VerifyError(f"line {reader.line_num}: columns are separated by {word}: {advice}")
         for row in reader:
-            if any(cell.strip() for cell in row) and len(rows) <= wanted:
+            if any(cell.strip() for cell in row):
                 numbers.append(reader.line_num)
                 rows.append(_numbers(row, names, reader.line_num))
     except csv.Error as error:
@@ -114,10 +136,11 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> 
         if name and name in places:
             raise VerifyError(f'columns {places[name]} and {number} are both called "{name}": keep one of them')
         places[name] = number
-    own = OWN_HEADER.fullmatch(header[0]) is not None
+    own, stored = OWN_HEADER.fullmatch(header[0]) is not None, any(name.startswith(STORED) for name in header)
     if header[0] not in ("t", "t [s]"):
         raise VerifyError(f'the first column must be "t"; it is "{header[0]}"')
-    _check_times(numbers, rows[:, 0], times)
+    given = rows[:, 0]
+    _check_times(numbers, given, times)
     filled = {}
     for name, values in zip(header[1:], rows.T[1:], strict=True):
         empty = np.isnan(values)
@@ -129,29 +152,42 @@ def _columns(header: list[str], numbers: list[int], rows: Real, times: Real) -> 
         if not name:
             raise VerifyError(f"column {header.index('') + 1} has no name: name it in the first line or leave it out")
         filled[name] = values
-    return _own_channels(filled) if own else Columns(_channels(filled))
+    found = _stored_channels(filled) if stored else _own_channels(filled) if own else Columns(_channels(filled))
+    channels, doubts = resample(found.channels, given, times)
+    return replace(found, channels=channels, doubts=doubts, samples=len(given) if doubts else 0)
 
 
 def _check_times(numbers: list[int], given: Real, times: Real) -> None:
+    """The times must be numbers that rise, and be the case's or cover them."""
     asked = (
-        f"{len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s; --template writes a file "
-        f"with them, `flexmb simulate SCENE --t-end {times[-1]:g} --samples {len(times)}` gives them"
+        f"the case has {len(times)} samples, every {times[1] - times[0]:.10g} s from 0 to {times[-1]:g} s; --template "
+        "writes a file with them"
     )
-    n = min(len(given), len(times))
-    off = ~(np.abs(given[:n] - times[:n]) <= TIME_MATCH_S)
-    if np.any(off):
-        i = int(np.argmax(off))
-        wrong = "empty" if np.isnan(given[i]) else f"{given[i]:.17g} s, not {times[i]:.10g} s"
-        raise VerifyError(f"its times are not the case's: in line {numbers[i]} the time is {wrong} (they are {asked})")
-    if len(given) != len(times):
-        count = "more" if len(given) > len(times) else f"only {len(given)}"
-        raise VerifyError(f"its times are not the case's: there are {count} rows (they are {asked})")
+    empty = np.isnan(given)
+    if np.any(empty):
+        raise VerifyError(f"in line {numbers[int(np.argmax(empty))]} the time is empty ({asked})")
+    falling = np.diff(given) <= 0.0
+    if np.any(falling):
+        i = int(np.argmax(falling)) + 1
+        where = f"in line {numbers[i]} the time is {given[i]:.17g} s, after {given[i - 1]:.10g} s"
+        raise VerifyError(f"{where}: times must rise ({asked})")
+    if shared_times(times, given) is not None:
+        return
+    slack = 1e-9 * abs(times[-1])
+    if len(given) < FEWEST:
+        raise VerifyError(f"there are only {len(given)} rows, and not at the case's times ({asked})")
+    if given[0] > times[0] + slack or given[-1] < times[-1] - slack:
+        raise VerifyError(f"its times, {given[0]:g} to {given[-1]:g} s, do not cover the case's ({asked})")
 
 
 def _channels(filled: dict[str, Real]) -> dict[str, Real]:
     """Whole groups of filled columns as channels; VerifyError for a column that belongs to no whole group."""
     found: dict[str, Real] = {}
     left = dict(filled)
+    for channel in _whole(left):
+        names = short_names(channel, _width(channel, left))
+        if all(name in left for name in names):
+            found[channel] = np.column_stack([left.pop(name) for name in names])
     for item in dict.fromkeys(name.rpartition(".")[0] for name in filled):
         for prefix, groups in (("marker", MARKER_GROUPS), ("load", LOAD_GROUPS)):
             for part, letters in groups.items():
@@ -163,6 +199,33 @@ def _channels(filled: dict[str, Real]) -> dict[str, Real]:
     if not found:
         raise VerifyError("there is nothing in it but times")
     return found
+
+
+def _whole(columns: Iterable[str]) -> list[str]:
+    """Channels that columns may be of which are no vector of an item: energies, momentum, work, and drives."""
+    drives = dict.fromkeys(name.partition(f".{DRIVE}")[0] for name in columns if f".{DRIVE}" in name)
+    known = [kind for kind in KINDS if not kind.of_items]
+    named = [f"{kind.name}.{part.name}" if part.name else kind.name for kind in known for part in kind.parts]
+    return [*named, *(f"drive:{item}" for item in drives)]
+
+
+def _width(channel: str, columns: Mapping[str, Real]) -> int:
+    """The number of columns of such a channel."""
+    part = part_of(channel)
+    if part is not None and part.width is not None:
+        return part.width
+    several = [name for name in columns if name.startswith(f"{channel.partition(':')[2]}.{DRIVE}.")]
+    return len(several) or 1
+
+
+def _stored_channels(filled: dict[str, Real]) -> Columns:
+    """Channels of a file with the columns of a reference.csv."""
+    try:
+        places = channels_by_column(list(filled))
+    except CaseError as error:
+        raise VerifyError(str(error)) from None
+    rows = list(filled.values())
+    return Columns({name: np.column_stack([rows[i] for i in found]) for name, found in places.items()}, own=True)
 
 
 def _own_channels(filled: dict[str, Real]) -> Columns:
@@ -206,4 +269,5 @@ def _listed(names: list[str]) -> str:
 
 def _groups_text() -> str:
     groups = (*MARKER_GROUPS.values(), *LOAD_GROUPS.values())
-    return ", ".join("NAME." + "/".join(group) for group in groups)
+    whole = f"NAME.{DRIVE}, momentum.angular.x/y/z, momentum.linear.x/y/z, energy.KIND"
+    return ", ".join(["NAME." + "/".join(group) for group in groups] + [whole])

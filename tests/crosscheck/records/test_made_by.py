@@ -40,6 +40,8 @@ WITHOUT_PART = {
     "crosscheck.records.machine": "tells the reader of a report about the machine",
     "crosscheck.running.draw": "draws",
     "crosscheck.records.drawing": "holds what was drawn",
+    "crosscheck.records.held": "holds the stored reference, which is made of other runs",
+    "crosscheck.running.held": "holds the stored reference, which is made of other runs",
     "flexmb.output.writing": "says what is wrong with a folder",
     "crosscheck.running.pool": "hands out jobs",
     "crosscheck.running.processes": "ends processes",

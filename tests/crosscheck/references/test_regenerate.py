@@ -164,6 +164,18 @@ def test_a_change_needs_its_reason_in_the_provenance(copied: Path) -> None:
     assert current_reference(load_case(copied)).times[-1] == 2.0
 
 
+def test_a_reason_serves_for_one_change_only(copied: Path) -> None:
+    """A correction of the provenance that comes with no change of numbers does not license a later one."""
+    before = (copied / VALUES).read_bytes()
+    edit(copied / "provenance.toml", "any textbook", "any good textbook")
+    assert regenerate(copied, check=True).done == "would be written"
+    assert "provenance.toml was changed since" in regenerate(copied).remark
+    assert (copied / VALUES).read_bytes() == before
+    assert regenerate(copied).done == "confirmed"
+    edit(copied / "scene.toml", "9.81", "9.812")
+    assert "is not replaced" in refusal(copied)
+
+
 @pytest.mark.parametrize(("old", "new", "said"), [
     ("samples = 11\n", "samples = 11\nhorizon_s = 1.0\n", "the horizon is 1 s, it was 2 s"),
     ("samples = 11\n", 'samples = 11\nchannels = ["marker"]\n', "load:pivot.force is not there any more"),
@@ -199,7 +211,7 @@ def test_published_numbers_are_met_between_samples_too(copied: Path) -> None:
     given = ANCHOR.format(component="y", t_s=0.05, value=-fall)
     text = (copied / "provenance.toml").read_text(encoding="utf-8")
     (copied / "provenance.toml").write_text(text + given, encoding="utf-8")
-    assert regenerate(copied).done == "confirmed"
+    assert regenerate(copied, check=True).remark == "reproduced; provenance.toml was changed since"
 
 
 @pytest.mark.parametrize(("change", "said"), [
