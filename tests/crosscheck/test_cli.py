@@ -118,7 +118,7 @@ def test_a_coarse_csv_gives_its_own_uncertainty(runner: CliRunner, tmp_path: Pat
     [
         (lambda text: text.replace("tip.px", "tip.x", 1), "no whole group contains tip.x"),
         (lambda text: text.replace("t,", "time,", 1), 'the first column must be "t"'),
-        (lambda text: "\n".join(text.splitlines()[:-3]) + "\n", "its times are not the case's"),
+        (lambda text: "\n".join(text.splitlines()[:-3]) + "\n", "do not cover the case's"),
         (lambda text: "", "cannot be read"),
     ],
 )
