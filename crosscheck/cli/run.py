@@ -104,7 +104,7 @@ def run(
             sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear)
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
         outcome, page = write_all(out / "records.jsonl", out, strict, last_session)
-    _conclude(outcome, page, shown, as_json=as_json, open_report=open_report, failed=not done)
+    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report, failed=not done)
 
 
 @app.command()
@@ -127,7 +127,7 @@ def report(
     shown = verbosity(quiet, verbose)
     with sole_writer(out):
         outcome, page = write_all(records, out, strict, standing)
-    _conclude(outcome, page, shown, as_json=as_json, open_report=open_report)
+    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report)
 
 
 def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
@@ -152,14 +152,15 @@ def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
 
 
 def _conclude(
-    outcome: SessionOutcome, page: Path, shown: Verbosity, *, as_json: bool, open_report: bool, failed: bool = False
-) -> None:
-    """Show what came out, and leave with the exit code: 1 also where something has `failed` before."""
+    outcome: SessionOutcome, page: Path, shown: Verbosity, *, results: Path | None, open_report: bool,
+    failed: bool = False,
+) -> None:  # fmt: skip
+    """Show what came out, print the file of `results` if one is given, leave with the exit code: 1 if it `failed`."""
     code = print_outcome(console, outcome, shown)
     if shown is not Verbosity.QUIET:
         console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
-    if as_json:
-        typer.echo((page.parent / FILE).read_text(encoding="ascii"), nl=False)
+    if results is not None:
+        typer.echo(results.read_text(encoding="ascii"), nl=False)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code or int(failed))
