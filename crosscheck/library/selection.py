@@ -65,9 +65,9 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
     """Goals and scales, by engine, of those of `engines` that are held against the stored reference.
 
-    They are those that a comparison of its variant expects to agree, or those that the table `[reference]` names; and
-    engines that the case does not know. Goals are the table's, or those of the engine's comparisons, the first before
-    later ones.
+    They are those that a comparison of its variant expects to agree, or those that the table `[reference]` names; where
+    this gives goals, also those of which no comparison there expects anything; and engines that the case does not know.
+    Goals are the table's, or those of the engine's comparisons, the first before later ones.
     """
     recipe = run.reference
     if recipe is None:
@@ -75,15 +75,19 @@ def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, floa
     engines = tuple(engines)
     foreign = {engine for engine in engines if _foreign(run, engine)}
     run = _joined(run, engines)
-    pairs = [pair for each in run.comparisons if each.expect == "agree" for pair in _pairs(run, each)]
+    pairs = [pair for each in run.comparisons for pair in _pairs(run, each)]
     pairs = [pair for pair in pairs if all(side.variant == recipe.variant for side in pair.sides)]
+    named = {side.engine for pair in pairs for side in pair.sides}
+    pairs = [pair for pair in pairs if pair.expect == "agree"]
     known = _all(run.variant(recipe.variant))
     found = {}
     for engine in engines:
         own = [pair for pair in pairs if any(side.engine == engine for side in pair.sides)]
-        chosen = engine in recipe.engines or (not recipe.engines and bool(own or recipe.goals))
+        free = bool(recipe.goals) and engine not in named
+        chosen = engine in recipe.engines if recipe.engines else bool(own) or free
         if engine in known and (chosen or engine in foreign):
-            goals, scales = dict(recipe.goals), {}
+            goals: dict[str, float] = dict(recipe.goals)
+            scales: dict[str, float] = {}
             for pair in own or pairs:
                 goals |= {} if recipe.goals else {key: goal for key, goal in pair.goals.items() if key not in goals}
                 scales |= {key: scale for key, scale in pair.scales.items() if key not in scales}

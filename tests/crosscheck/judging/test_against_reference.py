@@ -14,6 +14,7 @@ from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import CaseResults, collect
 from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES
+from crosscheck.library.selection import held
 from crosscheck.records.archive import read
 from crosscheck.records.held import Asked
 from crosscheck.records.packing import pack, unpack
@@ -83,6 +84,20 @@ def test_engines_that_agree_with_each_other_are_held_and_those_that_differ_are_n
     assert ("fine", "load:pivot.force") in found
     assert ("fine", "momentum.linear") not in found  # for it there is no goal
     assert all(each.ok for each in outcome.all if each.comparison == NAME)
+
+
+@pytest.mark.parametrize(("change", "engines"), [
+    ("", {"fine", "stepper"}),
+    ('goals = { "marker:tip.position" = 1e-3 }\n', {"fine", "stepper", "sloppy", "refuser"}),
+    ('engines = ["sloppy"]\ngoals = { "marker:tip.position" = 1e-3 }\n', {"sloppy"}),
+    ('engines = ["stepper", "biased"]\n', {"stepper", "biased"}),
+])  # fmt: skip
+def test_the_recipe_says_who_is_held(change: str, engines: set[str], folder: Path, tmp_path: Path) -> None:
+    """With goals those too that no comparison names; one that is expected to differ only where it is named."""
+    other = copy_of(folder, tmp_path / "case")
+    edit(other / "run.toml", "samples = 11\n", f"samples = 11\n{change}")
+    run = load_case(other).run
+    assert set(held(run, ("fine", "stepper", "sloppy", "biased", "refuser"))) == engines
 
 
 def test_an_engine_alone_needs_no_partner(folder: Path, tmp_path: Path) -> None:
