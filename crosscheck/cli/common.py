@@ -2,21 +2,25 @@
 
 from __future__ import annotations
 
+import json
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
-from math import inf
+from math import inf, isfinite
 from pathlib import Path
-from typing import Annotated, NoReturn
+from typing import Annotated, Any, NoReturn
 
 import typer
 from rich.console import Console
 
+from crosscheck.engines.registry import BUILT_IN, plug_ins
 from crosscheck.library import find
 from crosscheck.library.case import CaseError
 from crosscheck.records.lock import FolderInUseError, locked
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
+from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.versions import versions_text
 from flexmb.output.writing import in_words
 
 EXIT_USAGE = 2
@@ -24,16 +28,75 @@ EXIT_INTERRUPTED = 130  # as shells have it
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",
     help="""
 Run the same multibody scene in independent codes and say who **agrees** with whom, on what, by how much, how fast.
 
 Start with `crosscheck run canonical`, then open the report whose path it prints.
 `crosscheck list` shows the cases, `crosscheck engines` the codes that are installed here.
+
+**Exit codes** of every command: 0 all is well; 1 something is not as it should be; 2 the request makes no sense, or a
+file cannot be read; 130 interrupted. Errors go to stderr.
 """,
 )
 console = Console(markup=False, emoji=False)  # names and paths stand in what it prints
+errors = Console(stderr=True, markup=False, emoji=False)
+
+
+def _show_versions(asked: bool) -> None:
+    if asked:
+        typer.echo(versions_text())
+        raise typer.Exit
+
+
+@app.callback()
+def everything(
+    version: Annotated[
+        bool,
+        typer.Option("--version", callback=_show_versions, is_eager=True, help="Show versions, engines' too, and end."),
+    ] = False,
+) -> None:
+    """Has no words of its own: the application's help stands above."""
+
+
+def _machine_readable(asked: bool) -> bool:
+    """Leave stdout to the JSON alone: all else that a command shows goes to stderr."""
+    console.stderr = asked
+    return asked
+
+
+def _complete_case(begun: str) -> list[str]:
+    return [name for name in find.shipped_names() if name.startswith(begun)]
+
+
+def _complete_engine(begun: str) -> list[str]:
+    return [name for name in (*BUILT_IN, *plug_ins()) if name.startswith(begun)]
+
+
+CaseWords = Annotated[
+    list[str],
+    typer.Argument(
+        help="Case names, a tag such as `canonical`, `all`, or folders that hold a run.toml.",
+        autocompletion=_complete_case,
+    ),
+]
+CaseWord = Annotated[str, typer.Argument(help="Case name or folder.", autocompletion=_complete_case)]
+EngineWords = Annotated[
+    list[str], typer.Argument(metavar="ENGINE...", help="Names of engines.", autocompletion=_complete_engine)
+]
+EngineNames = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--engine", "-e", autocompletion=_complete_engine,
+        help="Only these engines (repeat it). One alone is compared with its partners.",
+    ),
+]  # fmt: skip
+Json = Annotated[
+    bool,
+    typer.Option("--json", callback=_machine_readable, help="Print JSON and nothing else on stdout; the rest: stderr."),
+]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Show the last line only, and errors.")]
+Verbose = Annotated[bool, typer.Option("--verbose", "-v", help="Show every comparison and every run.")]
 
 Out = Annotated[Path, typer.Option("--out", "-o", help="Folder for records, verdicts and report.")]
 TimeLimit = Annotated[
@@ -79,7 +142,7 @@ def check_limit(seconds: float | None) -> None:
 def in_one_line() -> Iterator[None]:
     """Show each warning, and the error that ends the command, in one line without a traceback."""
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: console.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+        warnings.showwarning = lambda message, *_: errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
         try:
             yield
         except KeyboardInterrupt:
@@ -94,5 +157,25 @@ def in_one_line() -> Iterator[None]:
 
 
 def refuse(message: str) -> NoReturn:
-    console.print(words(message, "red"), soft_wrap=True)
+    errors.print(words(message, "red"), soft_wrap=True)
     raise typer.Exit(EXIT_USAGE)
+
+
+def print_json(content: Any) -> None:
+    """Print plain lists, mappings, texts and numbers as JSON on stdout; a number that JSON has not is null."""
+    typer.echo(json.dumps(_finite(content), indent=1))
+
+
+def _finite(content: Any) -> Any:
+    if isinstance(content, dict):
+        return {str(key): _finite(value) for key, value in content.items()}
+    if isinstance(content, list | tuple):
+        return [_finite(value) for value in content]
+    return None if isinstance(content, float) and not isfinite(content) else content
+
+
+def verbosity(quiet: bool, verbose: bool) -> Verbosity:
+    """How much to show; both at once make no sense."""
+    if quiet and verbose:
+        refuse("--quiet and --verbose contradict each other: give one of them")
+    return Verbosity.QUIET if quiet else Verbosity.VERBOSE if verbose else Verbosity.NORMAL

@@ -13,6 +13,7 @@ from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.invariances import print_invariances
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
+from crosscheck.terminal.verbosity import Verbosity
 
 
 @app.command()
@@ -42,7 +43,7 @@ def invariance(
     check_limit(time_limit)
     chosen = found(tuple(cases))
     with sole_writer(out):
-        with LiveProgress(console, only_faults=True) as live:
+        with LiveProgress(console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)
             verdicts = run_invariances(chosen, out, engine=engine, fresh=fresh, limits=limits, listener=live.hear)
         code = print_invariances(console, verdicts, verbose)

@@ -2,18 +2,48 @@
 
 from __future__ import annotations
 
-from crosscheck.cli.common import app, console, found
-from crosscheck.running.installed import describe_engines
+from typing import Any
+
+from crosscheck.cli.common import Json, app, console, found, print_json
+from crosscheck.library.find import Case
+from crosscheck.running.installed import EngineState, describe_engines
 from crosscheck.terminal.listings import cases_table, engines_table
 
 
 @app.command("list")
-def list_cases() -> None:
+def list_cases(as_json: Json = False) -> None:
     """List the shipped cases with their tags, variants and engines."""
-    console.print(cases_table(found(("all",))))
+    cases = found(("all",))
+    if as_json:
+        print_json([_plain(case) for case in cases])
+    else:
+        console.print(cases_table(cases))
 
 
 @app.command()
-def engines() -> None:
+def engines(as_json: Json = False) -> None:
     """List the engines: which are installed, in which version, and how to install the others."""
-    console.print(engines_table(describe_engines()))
+    states = describe_engines()
+    if as_json:
+        print_json([_state(state) for state in states])
+    else:
+        console.print(engines_table(states))
+
+
+def _state(state: EngineState) -> dict[str, Any]:
+    problem = "" if state.version is not None else state.absence
+    return {
+        "name": state.name, "summary": state.summary, "version": state.version, "problem": problem,
+        "advice": state.advice,
+    }  # fmt: skip
+
+
+def _plain(case: Case) -> dict[str, Any]:
+    return {
+        "name": case.name,
+        "title": case.run.title,
+        "tags": case.run.tags,
+        "folder": str(case.folder),
+        "variants": {each.name: {"engines": each.engines, "also": each.also} for each in case.run.variants},
+        "accepted_figures": sum(len(table) for table in case.accepted.values()),
+    }

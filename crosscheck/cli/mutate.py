@@ -13,6 +13,7 @@ from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.bites import print_bites
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
+from crosscheck.terminal.verbosity import Verbosity
 
 
 @app.command()
@@ -50,7 +51,7 @@ def mutate(
     check_limit(time_limit)
     chosen = found(tuple(cases))
     with sole_writer(out):
-        with LiveProgress(console, only_faults=True) as live:
+        with LiveProgress(console, Verbosity.NORMAL) as live:
             limits = Limits(jobs, time_limit)
             bites = run_campaign(
                 chosen, out, engine=engine, all_targets=all_targets, fresh=fresh, limits=limits, listener=live.hear

@@ -10,43 +10,47 @@ from typing import Annotated
 import typer
 
 from crosscheck.cli.common import (
+    CaseWords,
+    EngineNames,
     Jobs,
+    Json,
     Open,
     Out,
+    Quiet,
     SchedulerAddress,
     Strict,
     TimeLimit,
+    Verbose,
     app,
     check_limit,
     console,
+    errors,
     found,
     refuse,
     sole_writer,
+    verbosity,
 )
 from crosscheck.judging.accept import NotAccepted, accept_figures
+from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library import find
 from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
-from crosscheck.report import Choice, write_all
+from crosscheck.report import write_all
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.running.sweep import sweep
+from crosscheck.sealed.seal import FILE
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
+from crosscheck.terminal.verbosity import Verbosity
 from crosscheck.terminal.verdicts import print_outcome
 
 
 @app.command()
 def run(
-    cases: Annotated[
-        list[str],
-        typer.Argument(help="Case names, a tag such as `canonical`, `all`, or folders that hold a run.toml."),
-    ],
-    engine: Annotated[
-        list[str] | None,
-        typer.Option("--engine", "-e", help="Only these engines (repeat it). One alone is compared with its partners."),
-    ] = None,
+    cases: CaseWords,
+    engine: EngineNames = None,
     alone: Annotated[
         bool, typer.Option("--alone", help="Hold the engines against the stored references only; no partners run.")
     ] = False,
@@ -60,11 +64,15 @@ def run(
     ] = False,
     strict: Strict = False,
     open_report: Open = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.
 
-    **Writes** into `--out`: `report.html` (open it), `verdicts.json`, `summary.md`, `junit.xml`, `records.jsonl`.
+    **Writes** into `--out`: `report.html` (open it), `results.json` (small and sealed, for `crosscheck compare`),
+    `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`, `records.jsonl`.
     A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
@@ -86,6 +94,7 @@ def run(
     `crosscheck run all --strict --time-limit 600`
     """
     check_limit(time_limit)
+    shown = verbosity(quiet, verbose)
     chosen = found(tuple(cases))
     if alone:
         chosen = _alone(chosen)
@@ -94,13 +103,14 @@ def run(
         refuse(idle)
     with sole_writer(out):
         runs_on = scheduler_at(scheduler)
-        with LiveProgress(console) as live:
+        with LiveProgress(console, shown) as live:
             sweep(
                 chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=Limits(jobs, time_limit),
                 scheduler=runs_on, listener=live.hear,
             )  # fmt: skip
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
+        outcome, page = write_all(out / "records.jsonl", out, strict, last_session)
+    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report, failed=not done)
 
 
 @app.command()
@@ -109,6 +119,9 @@ def report(
     out: Out = Path("out"),
     strict: Strict = False,
     open_report: Open = False,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
 ) -> None:
     """
     Judge and draw recorded runs again; no engine needs to be installed.
@@ -117,8 +130,10 @@ def report(
     """
     if not records.is_file():
         refuse(f"{records} is no file")
+    shown = verbosity(quiet, verbose)
     with sole_writer(out):
-        _conclude(records, out, open_report, strict, standing)
+        outcome, page = write_all(records, out, strict, standing)
+    _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report)
 
 
 def _alone(cases: tuple[find.Case, ...]) -> tuple[find.Case, ...]:
@@ -137,16 +152,21 @@ def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
         for file, count in accept_figures(cases, records, partial):
             console.print(words(f"{count} figures accepted: review {file}"), soft_wrap=True)
     except NotAccepted as error:
-        console.print(words(str(error), "red"), soft_wrap=True)
+        errors.print(words(str(error), "red"), soft_wrap=True)
         return False
     return True
 
 
-def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice, failed: bool = False) -> None:
-    """Judge, write everything, show the table, and leave with the exit code; 1 where something has `failed` before."""
-    outcome, page = write_all(records, out, strict, chosen)
-    code = print_outcome(console, outcome)
-    console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+def _conclude(
+    outcome: SessionOutcome, page: Path, shown: Verbosity, *, results: Path | None, open_report: bool,
+    failed: bool = False,
+) -> None:  # fmt: skip
+    """Show what came out, print the file of `results` if one is given, leave with the exit code: 1 if it `failed`."""
+    code = print_outcome(console, outcome, shown)
+    if shown is not Verbosity.QUIET:
+        console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
+    if results is not None:
+        typer.echo(results.read_text(encoding="ascii"), nl=False)
     if open_report:
         webbrowser.open(page.resolve().as_uri())
     raise typer.Exit(code or int(failed))

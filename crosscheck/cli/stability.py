@@ -7,7 +7,18 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, Out, SchedulerAddress, app, check_limit, console, refuse, sole_writer
+from crosscheck.cli.common import (
+    Jobs,
+    Json,
+    Out,
+    SchedulerAddress,
+    app,
+    check_limit,
+    console,
+    print_json,
+    refuse,
+    sole_writer,
+)
 from crosscheck.running.scheduler import TIME_LIMIT_S, Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.listings import maps_table
@@ -29,6 +40,7 @@ def stability(
         typer.Option("--time-limit", metavar="SECONDS", help=f"Stop a longer cell; default {TIME_LIMIT_S:g}."),
     ] = None,
     scheduler: SchedulerAddress = LOCAL,
+    as_json: Json = False,
 ) -> None:
     """
     Draw stability maps: where a method or a motion fails, beside the boundary that theory says.
@@ -43,10 +55,15 @@ def stability(
     `crosscheck stability all --pictures docs/pictures`
     """
     from crosscheck.stability.run import PROVIDER, maps_of
+    from crosscheck.stability.verdict_file import VERDICTS
     from crosscheck.terminal.map_runs import run_and_draw  # they load the compiler
 
     check_limit(time_limit)
     known = maps_of(PROVIDER)
+    if maps == ["list"] and as_json:
+        axes = {name: {"x": each.x.label, "y": each.y.label} for name, each in known.items()}
+        print_json({name: axes[name] | {"overlay": each.overlay.name} for name, each in known.items()})
+        return
     if maps == ["list"]:
         console.print(maps_table(known.values()))
         return
@@ -60,4 +77,6 @@ def stability(
         code = run_and_draw(
             console, chosen, out, pictures or out, depth=depth, fresh=fresh, limits=limits, scheduler=runs_on
         )
+    if as_json:
+        typer.echo(((pictures or out) / VERDICTS).read_text(encoding="utf-8"), nl=False)
     raise typer.Exit(code)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import app, console, found, in_one_line, refuse
+from crosscheck.cli.common import CaseWord, Json, app, console, found, in_one_line, refuse
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome
@@ -16,7 +16,7 @@ from crosscheck.verify.against_case import outcome_json, sample_times_csv, verif
 
 @app.command()
 def verify(
-    case: Annotated[str, typer.Argument(help="Case name or folder.")],
+    case: CaseWord,
     csv: Annotated[Path, typer.Argument(help="Your code's results (see below).")],
     coarse: Annotated[
         Path | None,
@@ -29,7 +29,7 @@ def verify(
         str | None, typer.Option(help="Run this engine and hold against it, instead of the stored reference.")
     ] = None,
     template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print the outcome as JSON, and nothing else.")] = False,
+    as_json: Json = False,
 ) -> None:
     """
     Hold a CSV of your own code against a case, without an adapter, and where it has a stored reference without any run.
@@ -64,13 +64,13 @@ def verify(
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
         outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
-    if as_json:
-        typer.echo(outcome_json(outcome))
-        raise typer.Exit(int(not outcome.ok))
     console.print(channels_table(outcome))
     console.print(words(f"Held against {outcome.against}."), soft_wrap=True)
     if outcome.interpolated:
         console.print(words(f"Your times: {outcome.interpolated}."), soft_wrap=True)
     if outcome.left_out:
         console.print(words(f"Not compared: {', '.join(outcome.left_out)}"), soft_wrap=True)
-    raise typer.Exit(print_outcome(console, outcome))
+    code = print_outcome(console, outcome)
+    if as_json:
+        typer.echo(outcome_json(outcome))
+    raise typer.Exit(code)

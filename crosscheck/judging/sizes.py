@@ -8,7 +8,6 @@ from dataclasses import dataclass, field
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 
-
 Measure = Callable[[str, Real], float]  # of a channel's signal: its largest magnitude, its range
 
 

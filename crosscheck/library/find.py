@@ -55,6 +55,12 @@ def shipped_cases() -> tuple[Case, ...]:
     return tuple(load_case(path.parent) for path in sorted(shipped_folder().glob("*/*/run.toml")))
 
 
+def shipped_names() -> tuple[str, ...]:
+    """Names of the shipped cases; none of their files is read."""
+    folders = (path.parent for path in sorted(shipped_folder().glob("*/*/run.toml")))
+    return tuple(f"{folder.parent.name}/{folder.name}" for folder in folders)
+
+
 def resolve(words: tuple[str, ...]) -> tuple[Case, ...]:
     """The cases a user asks for: "canonical" or another tag, "all", a case name or its last part, or a folder.
 

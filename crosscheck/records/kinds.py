@@ -47,7 +47,7 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, the figures
-    accepted for it, and its stored reference if it has one."""
+    accepted for it, its stored reference if it has one, and digests of the `files` in its folder."""
 
     case: str
     run: RunFile
@@ -56,6 +56,7 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     variants: dict[str, VariantInfo]
     accepted: Accepted = {}
     reference: RecordedReference | None = None
+    files: dict[str, str] = {}
 
 
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):

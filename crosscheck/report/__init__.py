@@ -1,4 +1,7 @@
-"""The outputs of a session, made from its records alone: verdicts.json, report.html, summary.md, junit.xml."""
+"""The outputs of a session, made from its records alone.
+
+verdicts.json, report.html, summary.md, junit.xml, results.json and the badge.
+"""
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -10,6 +13,9 @@ from crosscheck.records.kinds import Record
 from crosscheck.records.session import standing
 from crosscheck.report.ci import write_junit, write_summary, write_verdicts
 from crosscheck.report.html import write_report
+from crosscheck.sealed.badge import badge_json, badge_svg
+from crosscheck.sealed.document import results_of
+from crosscheck.sealed.seal import FILE, sealed_text
 from flexmb.output.writing import folder, writing
 
 __all__ = ["Choice", "Outcome", "write_all"]
@@ -32,4 +38,7 @@ def write_all(
         write_summary(outcome, out / "summary.md")
         write_junit(outcome, out / "junit.xml")
         write_report(session, outcome, out / "report.html")
+        (out / FILE).write_text(sealed_text(results_of(session, outcome, records)), encoding="ascii")
+        (out / "badge.json").write_text(badge_json(outcome), encoding="ascii")
+        (out / "badge.svg").write_text(badge_svg(outcome), encoding="utf-8")
     return outcome, out / "report.html"

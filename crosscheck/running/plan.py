@@ -12,6 +12,7 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort
 from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, RunFile, Variant
+from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
 from crosscheck.library.selection import alone, select
@@ -106,6 +107,7 @@ def plan(
         variants=infos,
         accepted=case.accepted,
         reference=held_reference(case, run),
+        files=case_digests(case.folder),
     )
     return record, jobs
 

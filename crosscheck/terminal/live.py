@@ -15,6 +15,7 @@ from crosscheck.running.expected import Remaining
 from crosscheck.running.plan import Job
 from crosscheck.running.scheduler import Event
 from crosscheck.terminal.time_left import TimeLeft
+from crosscheck.terminal.verbosity import Verbosity
 from flexmb.output.printable import printable
 
 MARKS = {
@@ -31,11 +32,11 @@ MARKS = {
 class LiveProgress:
     """A context in which `hear` shows the events of a sweep; without a terminal only the lasting lines appear.
 
-    Of what has hundreds of runs, `only_faults` leaves lasting lines of those that did not finish.
+    A line lasts for every job with VERBOSE, else for none: what did not go well is told at the end. QUIET shows no bar.
     """
 
-    def __init__(self, console: Console, only_faults: bool = False) -> None:
-        self._only_faults = only_faults
+    def __init__(self, console: Console, verbosity: Verbosity = Verbosity.VERBOSE) -> None:
+        self._lasting = verbosity is Verbosity.VERBOSE
         self._progress = Progress(
             SpinnerColumn(),
             TextColumn("{task.description}", markup=False),  # names stand in it
@@ -45,6 +46,7 @@ class LiveProgress:
             TimeLeft(),
             console=console,
             transient=True,
+            disable=verbosity is Verbosity.QUIET,
         )
         self._overall: TaskID | None = None
         self._remaining = Remaining()
@@ -81,11 +83,8 @@ class LiveProgress:
             now = time.monotonic()
             seconds = self._remaining.seconds(now - self._begin)
             self._progress.update(self._overall, advance=1, ends_at=None if seconds is None else now + seconds)
-            if not self._only_faults or self._is_fault(event):
+            if self._lasting:
                 self._progress.console.print(self._ending(title, event))
-
-    def _is_fault(self, event: Event) -> bool:
-        return event.kind != "ended" or any(each.status != "finished" for each in self._records[event.job])
 
     def _ending(self, title: str, event: Event) -> Text:
         """The lasting line of a job."""

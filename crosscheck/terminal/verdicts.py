@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
 from rich.table import Table
@@ -11,34 +11,60 @@ from rich.text import Text
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
+from crosscheck.terminal.verbosity import Verbosity
 
-SHOWN = 20
+LINES = 7  # of what is not in order, unless all is asked for
 
 
-def print_outcome(console: Console, outcome: SessionOutcome) -> int:
-    """Show the verdicts; returns the exit code: 0 where all is as expected, else 1."""
-    if outcome.all:
+def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> int:
+    """Show the verdicts; returns the exit code: 0 where all is as expected, else 1.
+
+    Some ten lines: what there is, the gravest of what is not in order, the headline. QUIET is the headline alone,
+    VERBOSE all of it, with a table of all comparisons.
+    """
+    if verbosity is Verbosity.VERBOSE and outcome.all:
         console.print(_verdict_table(outcome.all))
-    for group in list(_groups(outcome.unexpected).values())[:SHOWN]:
+    if verbosity is not Verbosity.QUIET:
+        if outcome.all:
+            console.print(words(_inventory(outcome)), soft_wrap=True)
+        lines = list(_not_in_order(outcome))
+        shown = lines if verbosity is Verbosity.VERBOSE else lines[:LINES]
+        for line in shown:
+            console.print(line, soft_wrap=True)
+        if len(shown) < len(lines):
+            console.print(words(f"... and {len(lines) - len(shown)} lines more: --verbose shows all", "dim"))
+    colour = "green" if outcome.ok else "red"
+    console.print(words(outcome.headline, f"bold {colour}"), soft_wrap=True)
+    return 0 if outcome.ok else 1
+
+
+def _inventory(outcome: SessionOutcome) -> str:
+    """How many cases, and how many channels came out how."""
+    count = len(outcome.verdicts)
+    parts = [f"{number} {status}" for status in STATUSES if (number := outcome.counts()[status])]
+    noticed, controls = outcome.controls()
+    if controls:
+        parts.append(f"{noticed} of {controls} deliberate faults noticed")
+    return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
+
+
+def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
+    """A line for each thing that is not as it should be, the gravest first."""
+    for group in _groups(outcome.unexpected).values():
         worst = max(group, key=lambda verdict: verdict.E or 0.0)
         channels = worst.channel if len(group) == 1 else f"{len(group)} channels, worst {worst.channel}"
         where = f"{worst.case}, {worst.comparison}, {worst.pair}, {channels}"
-        text = f"{worst.status}, expected {worst.expected}: {worst.reason}"
-        console.print(marked("✕", "red", f"{where}: {text}"), soft_wrap=True)
+        yield marked("✕", "red", f"{where}: {worst.status}, expected {worst.expected}: {worst.reason}")
+    for line in outcome.broken:
+        yield marked("✕", "red", line)
     for each in outcome.lost:
-        where = f"{each.case}, {each.variant}, {each.engine}"
-        console.print(marked("–", "yellow", f"{where} {each.status}: {each.reason}"), soft_wrap=True)
+        yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
     for case in outcome.idle:
-        console.print(marked("–", "yellow", f"{case}: nothing was compared"), soft_wrap=True)
-    for verdict in outcome.worse[:SHOWN]:
-        console.print(marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}"), soft_wrap=True)
-    for verdict in outcome.unrecorded[:SHOWN] if outcome.strict else ():
-        console.print(marked("!", "yellow", f"{_place(verdict)} has no accepted figures"), soft_wrap=True)
-    for line in outcome.broken[:SHOWN]:
-        console.print(marked("✕", "red", line), soft_wrap=True)
-    colour = "green" if outcome.ok else "red"
-    console.print(words(outcome.headline, f"bold {colour}"))
-    return 0 if outcome.ok else 1
+        yield marked("–", "yellow", f"{case}: nothing was compared")
+    for verdict in outcome.worse:
+        yield marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}")
+    for verdict in outcome.unrecorded if outcome.strict else ():
+        yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
 
 
 def _place(verdict: Verdict) -> str:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Annotated
+
 import typer
 
 from flexmb.cli.advising import advise
@@ -12,7 +14,6 @@ from flexmb.cli.scenes import check, schema
 
 app = typer.Typer(
     no_args_is_help=True,
-    add_completion=False,
     rich_markup_mode="markdown",
     help="""
 Simulate trees of rigid and flexible bodies, wheels and point masses.
@@ -24,6 +25,25 @@ Find every defect of a scene: `flexmb check scene.toml`
 Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out results`
 """,
 )
+
+
+def _show_version(asked: bool) -> None:
+    if asked:
+        from flexmb.cli.versions import versions_text  # it asks the installed distributions
+
+        typer.echo(versions_text())
+        raise typer.Exit
+
+
+@app.callback()
+def everything(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show versions and end.")
+    ] = False,
+) -> None:
+    """Has no words of its own: the application's help stands above."""
+
+
 for command in (simulate, check, equivalence, advise, linearize, campbell, schema):
     app.command()(command)
 

@@ -12,7 +12,16 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from crosscheck.engines.contract import Effort, EngineMissing, MarkerPath, Run, Snapshot, Support, Trajectory
+from crosscheck.engines.contract import (
+    Effort,
+    EngineMissing,
+    MarkerPath,
+    MarkerSnapshot,
+    Run,
+    Snapshot,
+    Support,
+    Trajectory,
+)
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -44,7 +53,20 @@ class Pendulum:
         return np.array([y[1], self.mass * self.gravity * self.arm * np.cos(y[0]) / self.inertia])
 
     def evaluate(self) -> Snapshot:
-        raise NotImplementedError
+        start = self.trajectory(np.zeros(1), self.start[None], 0.0, 1)
+        angle, speed = self.start
+        turn = self.rate(0.0, self.start)[1]
+        along, inwards = np.array([-np.sin(angle), np.cos(angle), 0.0]), -np.array([np.cos(angle), np.sin(angle), 0.0])
+        markers = {
+            name: MarkerSnapshot(
+                *(part[0] for part in (path.position, path.quaternion, path.velocity)),
+                np.array([0.0, 0.0, turn, *(self.tips[name] * (turn * along + speed**2 * inwards))]),
+            )
+            for name, path in start.markers.items()
+        }
+        loads = {name: load[0] for name, load in start.loads.items()}
+        energy = {kind: float(values[0]) for kind, values in start.energy.items()}
+        return Snapshot(markers, loads, {}, {}, energy, start.momentum[0])
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         if effort.kind == "tolerance":

@@ -1,15 +1,23 @@
-"""A wheel is complete: imported from outside the checkout, it finds its own packages, templates and cases."""
+"""Distributions are complete: a wheel finds its own packages, templates and cases, installed or imported as it is.
+
+An sdist makes the same wheel. The fresh environment borrows the dependencies of this one, so that nothing is fetched.
+"""
 
 from __future__ import annotations
 
+import json
+import os
 import subprocess
 import sys
+import sysconfig
+import tarfile
+import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
-from tests.repo.project import ROOT, is_cache
+from tests.repo.project import PYPROJECT, ROOT, is_cache
 
 FROM_WHEEL = """
 import pathlib, sys
@@ -23,16 +31,51 @@ print(*sorted(case.name for case in shipped_cases()))
 """
 
 
+def built(target: str, source: Path, folder: Path) -> Path:
+    """The file that hatchling makes of a source tree."""
+    build = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(folder)]
+    subprocess.run(build, cwd=source, check=True, capture_output=True)
+    (archive,) = folder.iterdir()
+    return archive
+
+
 @pytest.fixture(scope="module")
-def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """An unpacked wheel of this checkout."""
-    folder = tmp_path_factory.mktemp("wheel")
-    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder)]
-    subprocess.run(build, cwd=ROOT, check=True, capture_output=True)
-    (archive,) = folder.glob("*.whl")
+def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A wheel of this checkout."""
+    return built("wheel", ROOT, tmp_path_factory.mktemp("wheel"))
+
+
+@pytest.fixture(scope="module")
+def wheel(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The wheel, unpacked."""
+    folder = tmp_path_factory.mktemp("unpacked") / "wheel"
     with zipfile.ZipFile(archive) as packed:
-        packed.extractall(folder / "unpacked")
-    return folder / "unpacked"
+        packed.extractall(folder)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def installed(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of the commands in a fresh environment in which the wheel is installed."""
+    home = tmp_path_factory.mktemp("fresh")
+    venv.create(home, with_pip=False, symlinks=True)
+    commands = home / ("Scripts" if os.name == "nt" else "bin")
+    python = str(commands / "python")
+    fresh = {"base": str(home), "platbase": str(home)}
+    packages = Path(sysconfig.get_path("purelib", "venv", vars=fresh))
+    (packages / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
+    install = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
+    subprocess.run([*install, "--ignore-installed", str(archive)], check=True, capture_output=True)
+    return commands
+
+
+def said(commands: Path, folder: Path, *words: str) -> str:
+    """What an installed command prints, run in an empty folder."""
+    clean = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
+    command = [str(commands / words[0]), *words[1:]]
+    run = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True, check=False)
+    assert run.returncode == 0, run.stdout + run.stderr
+    return run.stdout
 
 
 def test_ships_the_packages_and_nothing_else(wheel: Path) -> None:
@@ -57,3 +100,44 @@ def test_ships_every_data_file(wheel: Path) -> None:
     for package in ("flexmb", "crosscheck"):
         assert data(ROOT / package) <= data(wheel / package)
     assert data(wheel / "crosscheck" / "cases") == data(ROOT / "cases")
+
+
+def test_says_that_it_is_typed(wheel: Path) -> None:
+    for package in ("flexmb", "crosscheck"):
+        assert (wheel / package / "py.typed").exists()
+
+
+def test_an_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
+    sdist = built("sdist", ROOT, tmp_path / "sdist")
+    with tarfile.open(sdist) as packed:
+        packed.extractall(tmp_path / "unpacked", filter="data")
+    (source,) = (tmp_path / "unpacked").iterdir()
+    for name in ("tests/repo/test_wheel.py", "docs/ci.md", "action.yml", "CHANGELOG.md", "CITATION.cff", "LICENSE"):
+        assert (source / name).exists(), name
+    again = built("wheel", source, tmp_path / "wheel")
+    with zipfile.ZipFile(again) as packed:
+        names = {name for name in packed.namelist() if "dist-info" not in name}
+    there = {path.relative_to(wheel).as_posix() for path in wheel.rglob("*") if path.is_file()}
+    assert names == {name for name in there if "dist-info" not in name}
+
+
+def test_an_installed_wheel_lists_its_cases(installed: Path, tmp_path: Path) -> None:
+    cases = json.loads(said(installed, tmp_path, "crosscheck", "list", "--json"))
+    assert {case["name"] for case in cases} >= {"closed_chains/four_bar", "wheel_gyrostat/torque_free"}
+    assert not any(Path(case["folder"]).is_relative_to(ROOT) for case in cases)
+
+
+def test_an_installed_wheel_runs_a_case(installed: Path, tmp_path: Path) -> None:
+    """Against its stored reference; what is compiled for it is what the tests have compiled already."""
+    run = ("run", "wheel_gyrostat/torque_free", "--engine", "native", "--alone", "--out", "out", "--json")
+    results = json.loads(said(installed, tmp_path, "crosscheck", *run))
+    assert (results["exit_code"], list(results["cases"])) == (0, ["wheel_gyrostat/torque_free"])
+
+
+@pytest.mark.parametrize("command", ["crosscheck", "flexmb"])
+def test_installed_commands_say_their_version(installed: Path, tmp_path: Path, command: str) -> None:
+    assert said(installed, tmp_path, command, "--version").startswith(f"{command} {PYPROJECT['project']['version']}")
+
+
+def test_the_plug_in_of_pytest_is_found(installed: Path, tmp_path: Path) -> None:
+    assert "--crosscheck-engine" in said(installed, tmp_path, "python", "-m", "pytest", "--help")

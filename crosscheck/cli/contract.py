@@ -1,0 +1,53 @@
+"""`crosscheck contract`: whether an engine keeps what it promises."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.common import EngineWords, Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
+from crosscheck.conformance.trial import CLAUSE_LIMIT_S, try_engine, verdict_on
+from crosscheck.engines.registry import engines
+from crosscheck.terminal.clauses import print_clauses
+from flexmb.scene.problems import closest
+
+
+@app.command()
+def contract(
+    names: EngineWords,
+    time_limit: Annotated[
+        float, typer.Option("--time-limit", metavar="SECONDS", min=0.1, help="Of each clause, compiling included.")
+    ] = CLAUSE_LIMIT_S,
+    as_json: Json = False,
+    quiet: Quiet = False,
+    verbose: Verbose = False,
+) -> None:
+    """
+    Try whether engines keep the contract: names, statuses, shapes, frames, signs, reference points, repeatability.
+
+    Every clause is a sentence of the contract, tried in a process of its own kind on a small scene whose answer is
+    known. A scene that the engine refuses counts as *not offered*, with the engine's reason.
+
+    **Exit code**: 0 every clause that is offered holds, and at least one of mechanics is; 1 a clause is broken, nothing
+    was shown, or the engine's library is missing; 2 there is no such engine.
+
+    **Examples**: `crosscheck contract native` · `crosscheck contract mycode --verbose`
+    """
+    shown = verbosity(quiet, verbose)
+    known = engines()
+    for name in names:
+        if name not in known:
+            refuse(f'no engine "{name}": {closest(name, known)}; `crosscheck engines` shows them')
+    kept, tried = [], {}
+    for name in names:
+        with console.status(f"trying {name}"):
+            outcomes = list(try_engine(name, limit_s=time_limit))
+        good, text = verdict_on(outcomes)
+        kept.append(good)
+        tried[name] = {"kept": good, "headline": text, "clauses": [asdict(outcome) for outcome in outcomes]}
+        print_clauses(console, name, outcomes, shown)
+    if as_json:
+        print_json(tried)
+    raise typer.Exit(0 if all(kept) else 1)

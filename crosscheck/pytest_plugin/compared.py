@@ -1,0 +1,39 @@
+"""An engine that was compared in nothing is not green, though every item of its was skipped with a good reason."""
+
+from __future__ import annotations
+
+import pytest
+
+from crosscheck.pytest_plugin.items import PREFIX
+
+
+class NothingCompared:
+    """Counts, in the process that sees all reports, in how many items each engine was really held against something."""
+
+    def __init__(self) -> None:
+        self._compared: dict[str, int] = {}
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """Take note of an item: a skip compares nothing, an expected failure does."""
+        if not report.nodeid.startswith(f"{PREFIX}::"):
+            return
+        engine = str(dict(report.user_properties).get("engine"))
+        compared = report.when == "call" and (not report.skipped or hasattr(report, "wasxfail"))
+        self._compared[engine] = self._compared.get(engine, 0) + (compared or report.failed)
+
+    @property
+    def idle(self) -> list[str]:
+        """Engines that were asked for and compared in nothing."""
+        return [engine for engine, count in self._compared.items() if not count]
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_sessionfinish(self, session: pytest.Session, exitstatus: int) -> None:
+        """Turn the session red where an engine was compared in nothing."""
+        allowed = session.config.option.crosscheck_allow_missing
+        if self.idle and not allowed and exitstatus in (pytest.ExitCode.OK, pytest.ExitCode.NO_TESTS_COLLECTED):
+            session.exitstatus = pytest.ExitCode.TESTS_FAILED
+
+    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter) -> None:
+        """Say so."""
+        for engine in self.idle:
+            terminalreporter.write_line(f"crosscheck: {engine} was compared in nothing: all its items were skipped")

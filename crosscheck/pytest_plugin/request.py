@@ -1,0 +1,84 @@
+"""What was asked for on pytest's command line, read and checked before anything runs."""
+
+from __future__ import annotations
+
+import fnmatch
+from argparse import Namespace
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+from crosscheck.engines.registry import engines
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import Case, resolve, shipped_names
+from crosscheck.pytest_plugin.runs import SessionRuns
+from flexmb.scene.problems import closest
+
+# Marks that mean something to pytest: a tag of that name would be obeyed.
+PYTESTS_OWN = {"skip", "skipif", "xfail", "parametrize", "usefixtures", "filterwarnings", "tryfirst", "trylast"}
+
+
+@dataclass(frozen=True)
+class Request:
+    """Cases and engines, the runs that they share, and how strict to be."""
+
+    cases: tuple[Case, ...]
+    engines: tuple[str, ...]
+    contract: bool
+    strict: bool
+    allow_missing: bool
+    runs: SessionRuns
+
+    @property
+    def tags(self) -> tuple[str, ...]:
+        """Tags of the cases, which become marks."""
+        found = dict.fromkeys(tag for case in self.cases for tag in marks_of(case))
+        return tuple(found)
+
+    @property
+    def headline(self) -> str:
+        """The request in a line."""
+        count = f"{len(self.cases)} case{'' if len(self.cases) == 1 else 's'}"
+        parts = [*([count] if self.cases else []), *(["the contract"] if self.contract else [])]
+        return f"crosscheck: {' and '.join(parts)} on {', '.join(self.engines)}, records in {self.runs.folder}"
+
+
+def read_request(options: Namespace, folder: Path, session: str) -> Request:
+    """The request of a command line; pytest.UsageError says what is wrong with it and what there is."""
+    names = tuple(dict.fromkeys(options.crosscheck_engine))
+    if not names:
+        raise pytest.UsageError("--crosscheck needs --crosscheck-engine NAME: `crosscheck engines` shows them")
+    if not (options.crosscheck or options.crosscheck_contract):
+        raise pytest.UsageError("--crosscheck-engine needs --crosscheck CASES, or --crosscheck-contract, or both")
+    known = engines()
+    for name in names:
+        if name not in known and not options.crosscheck_allow_missing:
+            raise pytest.UsageError(f'--crosscheck-engine: no engine "{name}": {closest(name, known)}')
+    cases: dict[str, Case] = {}
+    for words in options.crosscheck:
+        cases |= {case.name: case for case in _cases(words)}
+    return Request(
+        cases=tuple(cases.values()),
+        engines=names,
+        contract=options.crosscheck_contract,
+        strict=options.crosscheck_strict,
+        allow_missing=options.crosscheck_allow_missing,
+        runs=SessionRuns(folder, session),
+    )
+
+
+def marks_of(case: Case) -> tuple[str, ...]:
+    """The tags of a case that can be marks."""
+    return tuple(tag for tag in case.run.tags if tag.isidentifier() and tag not in PYTESTS_OWN)
+
+
+def _cases(words: str) -> tuple[Case, ...]:
+    """The cases that a pattern of names, or a case, a tag or a folder means."""
+    names = fnmatch.filter(shipped_names(), words) if any(sign in words for sign in "*?[") else [words]
+    if not names:
+        raise pytest.UsageError(f'--crosscheck "{words}" names no case: `crosscheck list` shows them all')
+    try:
+        return resolve(tuple(names))
+    except CaseError as error:
+        raise pytest.UsageError(f"--crosscheck: {error}") from None

@@ -1,0 +1,165 @@
+"""What results.json holds: verdicts, figures, statuses and times of runs, digests of what they were made from.
+
+The file is one JSON object. Every key:
+
+- ``format`` "crosscheck results" and ``version`` 1; a reader refuses others;
+- ``sha256``: hex digest of the file as it stands without this key and its line end (`crosscheck.sealed.seal`);
+- ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
+- ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
+- ``records``: SHA-256 of the records.jsonl that was judged; ``broken``: how many of its lines are none;
+- ``cases``, by name, each with
+
+  - ``files``: SHA-256 of the case's files (run.toml, scenes, provenance, reference.csv ...) when it was run;
+  - ``scenes``: digest of the scene and the sample times of each variant;
+  - ``verdicts``: by comparison and "channel | engine (variant) | engine (variant)": ``kind`` (left out: "comparison"),
+    ``status``, ``expected`` (left out: "agree"), ``ok`` (left out: true), ``E``, ``U`` (relative; left out where there
+    is none), ``goal``, ``worse`` and, where it is not as expected, ``reason``;
+  - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
+
+Figures have four digits, times three.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import msgspec
+
+from crosscheck.judging.figures import key_of
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.results import CaseResults, Result, Session
+from crosscheck.judging.verdict import Status, Verdict, VerdictKind
+from crosscheck.library.digests import file_digest
+from crosscheck.records.kinds import RunStatus
+
+FORMAT, VERSION = "crosscheck results", 1
+
+
+class _SealedPart(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True, omit_defaults=True):
+    """Base of the parts of the file: a key that it should not have is an error, defaults are left out."""
+
+
+class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
+    """One channel of one comparison."""
+
+    status: Status
+    kind: VerdictKind = "comparison"
+    expected: Status = "agree"
+    ok: bool = True
+    E: float | None = None
+    U: float | None = None
+    goal: float = 0.0
+    worse: str = ""
+    reason: str = ""
+
+
+class SealedRun(_SealedPart, frozen=True, kw_only=True):
+    """One engine on one variant, at its finest effort; times in s."""
+
+    status: RunStatus
+    effort: str = ""
+    wall_s: float = 0.0
+    compile_s: float = 0.0
+
+
+class SealedCase(_SealedPart, frozen=True, kw_only=True):
+    """A case: digests of its files and scenes, its verdicts by comparison, its runs."""
+
+    files: dict[str, str]
+    scenes: dict[str, str]
+    verdicts: dict[str, dict[str, SealedVerdict]]
+    runs: dict[str, SealedRun]
+
+
+class Origin(_SealedPart, frozen=True, kw_only=True):
+    """When, where and with what the session was run."""
+
+    at: str = ""
+    python: str = ""
+    system: str = ""
+    processor: str = ""
+    packages: dict[str, str] = {}
+    engines: dict[str, str] = {}
+
+
+class SealedResults(_SealedPart, frozen=True, kw_only=True):
+    """The whole file, but for its seal."""
+
+    format: str = ""
+    version: int = 0
+    exit_code: int
+    headline: str
+    strict: bool = False
+    engines: tuple[str, ...] = ()
+    made: Origin
+    records: str
+    broken: int = 0
+    cases: dict[str, SealedCase]
+
+
+def results_of(session: Session, outcome: SessionOutcome, records: Path) -> SealedResults:
+    """The file's content for a judged session and the file of its records."""
+    latest = session.environments[-1] if session.environments else None
+    versions = {
+        result.engine: result.finest.version
+        for case in session.cases
+        for result in case.results.values()
+        if result.runs and result.finest.version
+    }
+    made = Origin() if latest is None else Origin(
+        at=latest.started, python=latest.python, system=latest.system, processor=latest.processor,
+        packages=latest.packages, engines=versions,
+    )  # fmt: skip
+    return SealedResults(
+        format=FORMAT,
+        version=VERSION,
+        exit_code=0 if outcome.ok else 1,
+        headline=outcome.headline,
+        strict=outcome.strict,
+        engines=() if latest is None else latest.engines,
+        made=made,
+        records=file_digest(records),
+        broken=len(outcome.broken),
+        cases={case.case.case: _case(case, outcome.verdicts[case.case.case]) for case in session.cases},
+    )
+
+
+def _case(case: CaseResults, verdicts: list[Verdict]) -> SealedCase:
+    judged: dict[str, dict[str, SealedVerdict]] = {}
+    for verdict in verdicts:
+        judged.setdefault(verdict.comparison, {})[key_of(verdict)] = _verdict(verdict)
+    mains = {key: result for key, result in case.results.items() if result.runs}
+    return SealedCase(
+        files=case.case.files,
+        scenes={variant: result.finest.scene for (variant, _, role), result in mains.items() if role == "main"},
+        verdicts=judged,
+        runs={" | ".join(key): _run(result) for key, result in case.results.items()},
+    )
+
+
+def _verdict(verdict: Verdict) -> SealedVerdict:
+    return SealedVerdict(
+        status=verdict.status,
+        kind=verdict.kind,
+        expected=verdict.expected,
+        ok=verdict.ok,
+        E=_short(verdict.E, 4),
+        U=_short(verdict.U, 4),
+        goal=verdict.goal,
+        worse=verdict.worse,
+        reason="" if verdict.ok else verdict.reason,
+    )
+
+
+def _run(result: Result) -> SealedRun:
+    if not result.runs:
+        return SealedRun(status=result.status)
+    finest = result.finest
+    wall, compiling = (_short(seconds, 3) or 0.0 for seconds in (finest.wall_s, finest.compile_s))
+    return SealedRun(status=result.status, effort=finest.effort, wall_s=wall, compile_s=compiling)
+
+
+def _short(number: float | None, digits: int) -> float | None:
+    """The number with some significant digits; None for what JSON cannot hold."""
+    return float(f"{number:.{digits}g}") if number is not None and math.isfinite(number) else None

@@ -1,0 +1,66 @@
+"""Writing and reading results.json: the text has one form only, and its digest is in it.
+
+The canonical form is what Python's ``json.dumps`` writes with sorted keys, without spaces, in ASCII. The seal is the
+SHA-256 of that form without the key ``sha256``. A file is accepted if it is the canonical form of what it says, with
+its seal, and one line end: then every changed byte is noticed. To check one by other means::
+
+    jq -cS 'del(.sha256)' results.json | tr -d '\\n' | sha256sum     # where jq prints numbers as they stand
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from crosscheck.sealed.document import FORMAT, VERSION, SealedResults
+from flexmb.scene.reading import MIB, Unreadable, read_text
+
+FILE = "results.json"
+LIMIT = 256 * MIB
+SEAL = "sha256"
+
+
+class ResultsError(ValueError):
+    """A results.json that cannot be read, is of another format, or was changed after it was written."""
+
+
+def sealed_text(results: SealedResults) -> str:
+    """The text of results.json."""
+    content = msgspec.to_builtins(results)
+    return _canonical(content | {SEAL: _seal(content)}) + "\n"
+
+
+def read_results(file: Path) -> SealedResults:
+    """The content of a results.json; ResultsError says what is wrong with the file."""
+    try:
+        text = read_text(file, LIMIT)
+        content = json.loads(text, parse_constant=_no_number)
+    except (OSError, Unreadable, ValueError, RecursionError) as error:
+        raise ResultsError(f"{file} cannot be read: {error}") from None
+    if not isinstance(content, dict) or content.get("format") != FORMAT:
+        raise ResultsError(f"{file} is no results.json of crosscheck")
+    if content.get("version") != VERSION:
+        raise ResultsError(f"{file} is of version {content.get('version')!r:.40}: this crosscheck reads {VERSION}")
+    claimed = content.pop(SEAL, None)
+    if claimed != _seal(content) or text != _canonical(content | {SEAL: claimed}) + "\n":
+        raise ResultsError(f"{file} was changed after it was written: its seal does not fit what it says")
+    try:
+        return msgspec.convert(content, SealedResults)
+    except msgspec.ValidationError as error:
+        raise ResultsError(f"{file}: {error}") from None
+
+
+def _seal(content: dict[str, Any]) -> str:
+    return hashlib.sha256(_canonical(content).encode("ascii")).hexdigest()
+
+
+def _canonical(content: dict[str, Any]) -> str:
+    return json.dumps(content, sort_keys=True, separators=(",", ":"), allow_nan=False)
+
+
+def _no_number(word: str) -> None:
+    raise ValueError(f"{word} is no number")

@@ -1,0 +1,119 @@
+"""What became worse, better, new or gone between two sessions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import pytest
+
+from crosscheck.sealed.compare import Differences, compare_results
+from crosscheck.sealed.document import FORMAT, VERSION, Origin, SealedCase, SealedResults, SealedRun, SealedVerdict
+
+PLACE = "load:pivot.force | mine (rigid) | native (rigid)"
+SOUND = SealedVerdict(status="agree", E=1e-9, U=2e-9, goal=1e-6)
+REPLACE = msgspec.structs.replace
+
+
+def made(verdict: SealedVerdict | None = SOUND, run: SealedRun | None = None, **changes: Any) -> SealedResults:
+    """A session with one verdict and one run."""
+    case = SealedCase(
+        files={"run.toml": "a"},
+        scenes={"rigid": "b"},
+        verdicts={"all": {} if verdict is None else {PLACE: verdict}},
+        runs={"rigid | mine | main": run or SealedRun(status="finished", effort="rk4 h=0.1", wall_s=1.0)},
+    )
+    found = SealedResults(
+        format=FORMAT, version=VERSION, exit_code=0, headline="", made=Origin(), records="", cases={"a/b": case}
+    )
+    return REPLACE(found, **changes)
+
+
+def directions(differences: Differences) -> list[str]:
+    return [change.direction for change in differences.changes]
+
+
+def test_nothing_changed() -> None:
+    found = compare_results(made(), made())
+    assert (found.changes, found.times, found.notes, found.same) == ((), (), (), 1)
+    assert not found.regressed
+
+
+@pytest.mark.parametrize(
+    "now",
+    [
+        REPLACE(SOUND, status="differ", ok=False, E=1e-3, reason="far apart"),
+        REPLACE(SOUND, status="unresolved", ok=False, U=1e-3),
+        REPLACE(SOUND, status="crashed", ok=False, E=None, U=None),
+        REPLACE(SOUND, status="differ", expected="differ"),  # what is expected was weakened
+        REPLACE(SOUND, U=2.1e-8),
+        REPLACE(SOUND, E=2.1e-8),
+        REPLACE(SOUND, E=None, U=None),
+        REPLACE(SOUND, ok=False),  # beyond the bounds of what is expected
+    ],
+)
+def test_worse_one_way_is_better_the_other(now: SealedVerdict) -> None:
+    forth, back = compare_results(made(), made(now)), compare_results(made(now), made())
+    assert (directions(forth), forth.regressed, forth.same) == (["worse"], True, 0)
+    assert (back.regressed, "worse" in directions(back)) == (False, False)
+    assert forth.changes[0].what == PLACE and forth.changes[0].how
+
+
+@pytest.mark.parametrize(
+    "now", [REPLACE(SOUND, U=1.9e-8), REPLACE(SOUND, E=1.9e-8), REPLACE(SOUND, E=0.0, U=0.0, goal=1e-3)]
+)
+def test_figures_within_the_factor_are_the_same_or_better(now: SealedVerdict) -> None:
+    assert not compare_results(made(), made(now)).regressed
+
+
+def test_rounding_may_grow() -> None:
+    exact = REPLACE(SOUND, E=0.0, U=1e-16)
+    assert compare_results(made(exact), made(REPLACE(exact, E=1e-13, U=1e-13))).changes == ()
+
+
+def test_a_control_that_is_missed_is_worse() -> None:
+    noticed = SealedVerdict(status="differ", kind="control", expected="differ", E=1e-2, U=1e-9)
+    assert directions(compare_results(made(noticed), made(REPLACE(noticed, E=1e-4)))) == []
+    missed = REPLACE(noticed, status="agree", ok=False)
+    assert directions(compare_results(made(noticed), made(missed))) == ["worse"]
+
+
+def test_what_is_not_judged_any_more_is_gone() -> None:
+    assert directions(compare_results(made(), made(None))) == ["gone"]
+    assert compare_results(made(), made(None)).regressed
+    assert directions(compare_results(made(None), made())) == ["new"]
+    assert not compare_results(made(None), made()).regressed
+
+
+def test_a_case_that_is_not_there_any_more_is_gone() -> None:
+    assert directions(compare_results(made(), made(cases={}))) == ["gone"]
+    assert directions(compare_results(made(cases={}), made())) == ["new"]
+
+
+def test_a_run_that_finishes_no_more_is_worse() -> None:
+    for status in ("diverged", "crashed", "refused"):
+        assert directions(compare_results(made(), made(run=SealedRun(status=status)))) == ["worse"]
+
+
+def test_a_session_that_is_green_no_more_is_worse() -> None:
+    """Though no verdict shows it: a lost run, a broken record, figures that a strict session misses."""
+    assert directions(compare_results(made(), made(exit_code=1, headline="1 run gave no result"))) == ["worse"]
+
+
+def test_times_are_told_and_judge_nothing() -> None:
+    slow = SealedRun(status="finished", effort="rk4 h=0.1", wall_s=4.0)
+    found = compare_results(made(), made(run=slow))
+    assert (found.regressed, [each.ratio for each in found.times]) == (False, [4.0])
+    assert compare_results(made(), made(run=REPLACE(slow, effort="rk4 h=0.05"))).times == ()
+    assert compare_results(made(), made(run=REPLACE(slow, wall_s=1.2))).times == ()
+
+
+def test_what_explains_a_change_is_noted() -> None:
+    other = made()
+    case = REPLACE(other.cases["a/b"], files={"run.toml": "changed", "reference.csv": "new"})
+    other = REPLACE(other, cases={"a/b": case}, made=Origin(python="3.14", packages={"numpy": "3"}), strict=True)
+    before = made(made=Origin(python="3.13", packages={"numpy": "2"}))
+    notes = "\n".join(compare_results(before, other).notes)
+    for words in ("other files than before: reference.csv, run.toml", "python: 3.13, now 3.14", "numpy was 2, now 3",
+                  "other strict"):  # fmt: skip
+        assert words in notes

@@ -1,0 +1,60 @@
+"""The GitHub Action is valid, and its script does what it says, run here with the files that a runner would give it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.crosscheck.fake_project import fake_project
+from tests.repo.project import ROOT
+
+ACTION = yaml.safe_load((ROOT / "action.yml").read_text(encoding="utf-8"))
+(STEP,) = ACTION["runs"]["steps"]
+
+
+@pytest.fixture(scope="module")
+def project(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return fake_project(tmp_path_factory.mktemp("project"))
+
+
+def act(project: Path, folder: Path, **inputs: str) -> tuple[int, str, dict[str, str]]:
+    """Run the step; its exit code, the job's summary, the outputs."""
+    values = {name: str(each.get("default", "")) for name, each in ACTION["inputs"].items()} | inputs
+    given = {name: values[text.removeprefix("${{ inputs.").removesuffix(" }}")] for name, text in STEP["env"].items()}
+    summary, outputs = folder / "summary", folder / "outputs"
+    given |= {"GITHUB_STEP_SUMMARY": str(summary), "GITHUB_OUTPUT": str(outputs)}
+    given |= {"PYTHON": sys.executable, "PYTHONPATH": os.pathsep.join([str(project), str(ROOT)])}
+    shell = ["bash", "-eo", "pipefail", "-c", STEP["run"]]  # as runners start it
+    run = subprocess.run(shell, cwd=folder, env=os.environ | given, capture_output=True, text=True, check=False)
+    lines = outputs.read_text(encoding="utf-8").splitlines() if outputs.exists() else []
+    told = summary.read_text(encoding="utf-8") if summary.exists() else run.stdout + run.stderr
+    return run.returncode, told, dict(line.split("=", 1) for line in lines)
+
+
+def test_it_is_a_composite_action() -> None:
+    assert {"name", "description", "inputs", "outputs", "runs"} <= set(ACTION)
+    assert ACTION["runs"]["using"] == "composite" and STEP["shell"] == "bash"
+    assert all(each["description"] for each in (*ACTION["inputs"].values(), *ACTION["outputs"].values()))
+    assert "${{" not in STEP["run"], "values of inputs reach the script as variables only"
+    assert {text.split(".")[1].split()[0] for text in STEP["env"].values()} == set(ACTION["inputs"])
+
+
+def test_a_sound_engine_is_green_and_a_wrong_one_red(project: Path, tmp_path: Path) -> None:
+    case = str(project / "pendulum" / "single")
+    first, second = tmp_path / "first", tmp_path / "second"
+    first.mkdir()
+    second.mkdir()
+    code, summary, outputs = act(project, first, cases=case, engines="stepper")
+    assert (code, outputs["exit-code"], outputs["results"]) == (0, "0", "out/results.json"), summary
+    assert "verdicts are as expected" in summary
+    baseline = first / outputs["results"]
+    assert json.loads(baseline.read_text(encoding="ascii"))["exit_code"] == 0
+    code, summary, _ = act(project, second, cases=case, engines="biased", baseline=str(baseline))
+    assert code == 1
+    assert "Not as expected" in summary and "worse: the session" in summary

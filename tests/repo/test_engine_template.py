@@ -1,0 +1,43 @@
+"""The template of an engine is a distribution that installs, is found, and keeps the contract."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.repo.project import ROOT
+
+TEMPLATE = ROOT / "docs" / "engine-template"
+
+
+@pytest.fixture(scope="module")
+def installed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder in which the template is installed."""
+    folder = tmp_path_factory.mktemp("template")
+    build = [sys.executable, "-m", "hatchling", "build", "--target", "wheel", "--directory", str(folder / "wheel")]
+    subprocess.run(build, cwd=TEMPLATE, check=True, capture_output=True)
+    (archive,) = (folder / "wheel").iterdir()
+    install = [sys.executable, "-m", "pip", "install", "--no-deps", "--no-index", "--target", str(folder / "site")]
+    subprocess.run([*install, str(archive)], check=True, capture_output=True)
+    return folder / "site"
+
+
+def test_it_is_found_and_keeps_the_contract(installed: Path, tmp_path: Path) -> None:
+    path = os.pathsep.join([str(installed), str(ROOT)])
+    words = [sys.executable, "-c", "from crosscheck.cli import main; main()", "contract", "pendulum", "--json"]
+    run = subprocess.run(
+        words, cwd=tmp_path, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
+    )
+    assert run.returncode == 0, run.stdout + run.stderr
+    tried = json.loads(run.stdout)["pendulum"]
+    statuses = {each["clause"]: each["status"] for each in tried["clauses"]}
+    assert tried["kept"] and "broken" not in statuses.values()
+    for clause in ("a-pendulum-swings", "a-hanging-mass-is-held-up", "a-run-begins-at-the-initial-state"):
+        assert statuses[clause] == "holds"
+    refused = [each["message"] for each in tried["clauses"] if each["status"] == "not offered"]
+    assert refused and all(refused)
