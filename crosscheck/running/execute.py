@@ -26,6 +26,7 @@ from crosscheck.engines.registry import home
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
+from crosscheck.running.film import FILM
 from crosscheck.running.plan import Done, Job
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
@@ -116,7 +117,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
     compile_s = time.perf_counter() - start
     for rung, effort in waiting:
         emit(effort.label)
-        full = rung >= rungs - FULLY_STORED
+        full = rung >= rungs - FULLY_STORED and job.role != FILM
         record = msgspec.structs.replace(
             blank,
             made_by=key,

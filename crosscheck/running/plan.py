@@ -15,8 +15,10 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.controls import mutate
 from crosscheck.library.find import Case
 from crosscheck.library.selection import select
+from crosscheck.records.drawing import Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
+from crosscheck.running.film import ENGINE, FILM, FRAMES, film, film_channels
 from crosscheck.running.pool import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene
@@ -41,7 +43,7 @@ class Job:
     """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
 
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
-    channels to store of efforts too coarse to matter for U. `provider` is "module:function" returning the engines by
+    channels to store of efforts too coarse to matter for U, and of films. `provider` is "module:function" returning the engines by
     name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
     `time_limit_s` it is stopped.
     """
@@ -83,6 +85,11 @@ def plan(
             scene, error = _attempt(case, refine(variant, variant.refined), variant.refined)
             crossing = _engines_compared_across(run, variant)
             jobs += [_job(case, run, variant, REFINED, engine, scene, error, provider) for engine in crossing]
+        filmed = _film(case, run, variant, provider)
+        if filmed is not None:
+            job, drawing = filmed
+            jobs.append(job)
+            infos[variant.name] = msgspec.structs.replace(infos[variant.name], film=drawing)
     for control in run.controls:
         variant = run.variant(control.a.variant)
         scene, error = _attempt(case, variant, control=control)
@@ -187,6 +194,33 @@ def _job(
         kept=tuple(chart.observable for chart in run.charts),
         error=error,
     )
+
+
+def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Job, Drawing] | None:
+    """The run that the variant's animation is made from; None where it has to do with what is recorded anyway."""
+    if ENGINE not in variant.engines:
+        return None
+    if variant.transform == "modal_points":  # the beams themselves, in their own modes
+        variant = msgspec.structs.replace(variant, transform="none")
+    scene, _ = _attempt(case, variant)
+    made = None if scene is None else film(scene)
+    if made is None:
+        return None
+    filmed, drawing = made
+    times = np.linspace(0.0, variant.duration_s or run.duration_s, FRAMES)
+    return Job(
+        case=case.name,
+        variant=variant.name,
+        role=FILM,
+        engine=ENGINE,
+        scene=filmed,
+        scene_id=scene_identity(filmed, times),
+        times=times,
+        provider=provider,
+        efforts=_ladder(variant, ENGINE),
+        finest_only=True,
+        kept=film_channels(drawing),
+    ), drawing
 
 
 def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:
