@@ -1,4 +1,4 @@
-"""The numbers behind the report's charts, small enough to be carried in one HTML file.
+"""The numbers behind the charts and the animation of a case's page.
 
 Signals are thinned and stored once each (see store.py); distances and drifts are computed here in double precision, and
 thinned by taking the largest of each bin so that no peak is lost. templates/charts.js draws them.
@@ -6,7 +6,6 @@ thinned by taking the largest of each bin so that no peak is lost. templates/cha
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
@@ -27,20 +26,15 @@ RUNAWAY = 20.0  # a signal this many times as large as another has run away from
 STILL, BAND = 1e-3, 0.05  # a signal that moves by less than this part of its size is still, and is shown in such a band
 
 
-def payload(cases: Iterable[tuple[CaseResults, list[Verdict]]]) -> dict[str, Any]:
-    """Everything that report.js needs: series by number, and for each case its panels, drifts, charts, animation."""
+def payload(case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
+    """Everything that the scripts of a case's page need: its panels, drifts, charts, animations, and their series."""
     store = Store()
-    described = [_case(store, case, verdicts) for case, verdicts in cases]
-    return {"cases": described, "series": store.series}
-
-
-def _case(store: Store, case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
     return {
-        "name": case.case.case,
         "panels": _panels(store, case, verdicts),
         "drifts": _drifts(store, case),
         "work": [_work(chart) for item in case.case.run.charts if (chart := work_precision(case, item)) is not None],
         "animations": animations(store, case),
+        "series": store.packed(),
     }
 
 
