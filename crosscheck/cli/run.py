@@ -12,6 +12,7 @@ from crosscheck.cli.common import (
     Jobs,
     Open,
     Out,
+    SingleFile,
     Strict,
     TimeLimit,
     app,
@@ -51,12 +52,14 @@ def run(
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
     ] = False,
     strict: Strict = False,
+    single_file: SingleFile = False,
     open_report: Open = False,
 ) -> None:
     """
     Run cases in all engines, judge them, write the report.
 
-    **Writes** into `--out`: `report.html` (open it), `verdicts.json`, `summary.md`, `junit.xml`, `records.jsonl`.
+    **Writes** into `--out`: `report/` (open its `index.html`; `report.html` leads there), `verdicts.json`, `summary.md`,
+    `junit.xml`, `records.jsonl`. With `--single-file`, `report.html` is the whole report.
     A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
@@ -87,7 +90,7 @@ def run(
             limits = Limits(jobs, time_limit)
             sweep(chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=limits, listener=live.hear)
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        _conclude(out / "records.jsonl", out, open_report, strict, last_session, failed=not done)
+        _conclude(out / "records.jsonl", out, open_report, strict, last_session, single_file, failed=not done)
 
 
 @app.command()
@@ -95,6 +98,7 @@ def report(
     records: Annotated[Path, typer.Argument(help="A records.jsonl of an earlier run, yours or anybody's.")],
     out: Out = Path("out"),
     strict: Strict = False,
+    single_file: SingleFile = False,
     open_report: Open = False,
 ) -> None:
     """
@@ -105,7 +109,7 @@ def report(
     if not records.is_file():
         refuse(f"{records} is no file")
     with sole_writer(out):
-        _conclude(records, out, open_report, strict, standing)
+        _conclude(records, out, open_report, strict, standing, single_file)
 
 
 def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
@@ -119,9 +123,17 @@ def _accept(cases: tuple[find.Case, ...], records: Path, partial: bool) -> bool:
     return True
 
 
-def _conclude(records: Path, out: Path, open_report: bool, strict: bool, chosen: Choice, failed: bool = False) -> None:
+def _conclude(
+    records: Path,
+    out: Path,
+    open_report: bool,
+    strict: bool,
+    chosen: Choice,
+    single_file: bool,
+    failed: bool = False,
+) -> None:
     """Judge, write everything, show the table, and leave with the exit code; 1 where something has `failed` before."""
-    outcome, page = write_all(records, out, strict, chosen)
+    outcome, page = write_all(records, out, strict, chosen, single_file)
     code = print_outcome(console, outcome)
     console.print(words("Report: ") + words(str(page), "bold"), soft_wrap=True)
     if open_report:

@@ -6,6 +6,8 @@ import msgspec
 
 from flexmb.scene.bodies import ZERO, Vector
 
+FILM = "film"  # the role of a run that is made to be drawn
+
 
 class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
     """A marker ("" is the World origin) and an offset in its axes (m); `tangent`, a unit vector in its axes, is the

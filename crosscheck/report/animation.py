@@ -7,11 +7,9 @@ from typing import Any
 import numpy as np
 
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.records.drawing import Drawing, DrawnWheel, Line
+from crosscheck.records.drawing import FILM, Drawing, DrawnWheel, Line
 from crosscheck.report.store import Store
 from flexmb.typing import Real
-
-FILM = "film"
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:

@@ -18,6 +18,7 @@ from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
+from flexmb.output.printable import printable
 from flexmb.run.channels import distance, family, matches, signal_range, unit
 from flexmb.typing import Real
 
@@ -51,7 +52,7 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
             if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                panels.append({"comparison": name, "title": kind.panel, "channels": views, "first": _first(views)})
+                panels.append({"comparison": printable(name), "title": kind.panel, "channels": views, "first": _first(views)})
     return panels
 
 

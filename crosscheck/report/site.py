@@ -13,7 +13,6 @@ from typing import Any
 
 import msgspec
 from markupsafe import Markup
-from plotly.offline import get_plotlyjs
 
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
@@ -31,7 +30,7 @@ SINGLE = "report.html"
 ASSETS = "assets"
 LISTING = f"{ASSETS}/pages.json"  # what the report consists of, for the next one to clear away
 SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js")
-LIBRARIES = {"plotly.min.js": "Plotly", "three.iife.min.js": "THREE"}  # loaded when first needed
+LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the folder vendor, loaded when first needed
 
 
 @dataclass(frozen=True)
@@ -52,7 +51,7 @@ def write_site(material: Material, out: Path) -> Path:
     for name in ("style.css", *SCRIPTS):
         written[f"{ASSETS}/{name}"] = str(source(name))
     for name in LIBRARIES:
-        written[f"{ASSETS}/{name}"] = _library(name)
+        written[f"{ASSETS}/{Path(name).name}"] = _library(name)
     written[INDEX] = _page("index.html.j2", material, where, root="")
     for case in material.session.cases:
         place = where[case.case.case]
@@ -115,9 +114,7 @@ def _registration(case: CaseResults, material: Material, place: Place) -> str:
 
 
 def _library(name: str) -> str:
-    if name == "plotly.min.js":
-        return get_plotlyjs()
-    return (files("crosscheck.report") / "vendor" / "three" / name).read_text(encoding="utf-8")
+    return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
 
 
 def _clear(site: Path) -> None:

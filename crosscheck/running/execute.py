@@ -23,10 +23,10 @@ from crosscheck.engines.answers import (
 )
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
 from crosscheck.engines.registry import home
+from crosscheck.records.drawing import FILM
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
-from crosscheck.running.film import FILM
 from crosscheck.running.plan import Done, Job
 from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
@@ -135,7 +135,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
 def _key(engine: Engine, version: str, job: Job, rungs: int) -> str:
     """The key of everything that the results depend on, but for scene and effort; see `made_by`."""
     code = made_by({type(engine).__module__, home(job.engine)} - {""})
-    kept = job.kept if rungs > FULLY_STORED else ()
+    kept = job.kept if rungs > FULLY_STORED or job.role == FILM else ()
     return hashlib.sha256(f"{code} {version} {kept}".encode()).hexdigest()[:16]
 
 

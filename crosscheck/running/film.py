@@ -15,7 +15,6 @@ from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, SidBody
 from flexmb.scene.schema import Marker, Scene
 from flexmb.scene.tree import rest_frames
 
-FILM = "film"  # the role of its record
 ENGINE = "native"
 FRAMES = 161
 PIECES = 6  # of a beam, between the nodes that are filmed

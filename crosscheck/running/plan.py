@@ -15,10 +15,10 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.controls import mutate
 from crosscheck.library.find import Case
 from crosscheck.library.selection import select
-from crosscheck.records.drawing import Drawing
+from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
-from crosscheck.running.film import ENGINE, FILM, FRAMES, film, film_channels
+from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.pool import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
 from flexmb.scene.check import check_scene

@@ -18,7 +18,7 @@ function chart(host, id, title, choices, draw, words, first = 0) {
   const plot = box.querySelector(".plot");
   let chosen = first;
   const redraw = async () => {
-    await library("Plotly", "plotly.min.js");
+    await library("Plotly", "plotly-basic.min.js");
     plot.setAttribute("aria-label", words(chosen));
     draw(plot, chosen, await seriesOf(id));
     plot.classList.add("drawn");

@@ -2,6 +2,8 @@
 "use strict";
 const TRAIL = 60, RING = 8, FINER = 8; // frames of a trail; sides of a tube; pieces between two nodes of a beam
 const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many bodies wide is followed by the camera
+const VIEW_DEG = 32;
+const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
 const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 
@@ -19,7 +21,7 @@ function render(scene, camera, canvas) {
 class SceneView {
   constructor(host, animations, series, title) {
     this.series = series; this.animations = animations; this.phase = 0; this.playing = false;
-    host.innerHTML = '<canvas tabindex="0" role="img"></canvas><div class="controls"><button type="button" class="play" aria-label="play">▶</button>' +
+    host.innerHTML = '<canvas tabindex="0" role="img"></canvas><div class="controls"><button type="button" class="play" aria-label="play"><svg viewBox="0 0 16 16" aria-hidden="true"><path></path></svg></button>' +
       '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div>' +
       '<div class="controls"></div><ul class="bodies" aria-label="bodies"></ul>' +
       '<p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
@@ -37,7 +39,7 @@ class SceneView {
     this.canvas.onkeydown = event => this.key(event);
     this.canvas.onfocus = () => this.hold(true);
     this.canvas.onblur = () => this.hold(false);
-    this.load(0);
+    this.sign(); this.load(0);
     new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
     dark.addEventListener("change", () => this.load(this.number));
     // It plays while it is seen, unless the reader stopped it or asks for less motion.
@@ -49,8 +51,15 @@ class SceneView {
 
   play(on) {
     if (on === this.playing) return;
-    this.playing = on; this.last = null; this.button.textContent = on ? "❚❚" : "▶"; this.button.setAttribute("aria-label", on ? "pause" : "play");
+    this.playing = on; this.last = null; this.sign();
     if (on) requestAnimationFrame(t => this.tick(t));
+  }
+
+  // The button offers what it would do.
+  sign() {
+    const offer = this.playing ? "pause" : "play";
+    this.button.setAttribute("aria-label", offer);
+    this.button.querySelector("path").setAttribute("d", SIGNS[offer]);
   }
 
   // Wheel and finger belong to the page until the picture is selected.
@@ -142,19 +151,34 @@ class SceneView {
     const way = [0.75, -1, 0.55];
     if (planar) { way.fill(0.28); way[flat] = flat === 1 ? -1 : 1; }
     else if (Math.abs(up[1]) > 0.5) [way[1], way[2]] = [0.55, 1];
-    this.camera = new THREE.PerspectiveCamera(32, 4 / 3, this.reach / 50, this.reach * 200);
+    this.camera = new THREE.PerspectiveCamera(VIEW_DEG, 4 / 3, this.reach / 50, this.reach * 200);
     this.camera.up.set(...up);
     this.fitCanvas();
-    const angle = (32 / 2) * Math.PI / 180, narrow = Math.min(1, this.camera.aspect);
-    const away = 1.08 * this.reach / Math.sin(Math.atan(Math.tan(angle) * narrow)), direction = new THREE.Vector3(...way).normalize();
+    const direction = new THREE.Vector3(...way).normalize();
     this.target = this.following ? mean([...this.points(0)]) : this.middle;
-    this.camera.position.set(...this.target).addScaledVector(direction, away);
+    this.camera.position.set(...this.target).addScaledVector(direction, this.distance(direction));
     this.controls?.dispose();
     this.controls = new THREE.OrbitControls(this.camera, this.canvas);
     this.controls.target.set(...this.target);
     this.controls.addEventListener("change", () => this.draw());
     this.controls.update();
     this.hold(document.activeElement === this.canvas);
+  }
+
+  // How far the camera must stand in a direction to have every point of the motion in the picture.
+  distance(direction) {
+    const right = this.camera.up.clone().cross(direction).normalize(), above = direction.clone().cross(right);
+    const slope = Math.tan(this.camera.fov / 2 * Math.PI / 180), step = Math.max(1, Math.floor(this.frames / 60)), offset = new THREE.Vector3();
+    let least = 1.5 * this.reach;
+    for (let f = 0; f < this.frames; f += step) {
+      const found = [...this.points(f)].filter(p => p.every(Number.isFinite)), middle = this.following ? mean(found) : this.middle;
+      for (const p of found) {
+        offset.set(...p.map((v, k) => v - middle[k]));
+        const aside = Math.max(Math.abs(offset.dot(right)) / this.camera.aspect, Math.abs(offset.dot(above)));
+        least = Math.max(least, offset.dot(direction) + aside / (0.88 * slope));
+      }
+    }
+    return least;
   }
 
   build() {
