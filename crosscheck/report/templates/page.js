@@ -62,7 +62,7 @@ function fill(section) {
   section.querySelectorAll(".animation").forEach(host => {
     if (data.animations.length) later(host, async () => {
       await library("THREE", "three.iife.min.js");
-      new SceneView(host, data.animations, await seriesOf(id), title);
+      host.view = new SceneView(host, data.animations, await seriesOf(id), title);
     });
     else host.remove();
   });

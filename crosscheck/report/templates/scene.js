@@ -25,6 +25,7 @@ class SceneView {
       '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div>' +
       '<div class="controls"></div><ul class="bodies" aria-label="bodies"></ul>' +
       '<p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
+    const first = Math.max(0, animations.findIndex(a => a.lines.some(line => line.kind === "beam"))); // something that bends
     this.canvas = host.querySelector("canvas"); this.title = title; this.names = host.querySelector(".bodies");
     this.slider = host.querySelector("input"); this.clock = host.querySelector(".clock"); this.button = host.querySelector("button");
     this.button.onclick = () => this.toggle();
@@ -33,13 +34,14 @@ class SceneView {
       const chooser = document.createElement("select");
       chooser.setAttribute("aria-label", "variant shown");
       animations.forEach((animation, i) => chooser.add(new Option(animation.title, i)));
+      chooser.value = first;
       chooser.onchange = () => this.load(Number(chooser.value));
       host.querySelectorAll(".controls")[1].append(chooser);
     } else host.querySelectorAll(".controls")[1].textContent = animations[0].title;
     this.canvas.onkeydown = event => this.key(event);
     this.canvas.onfocus = () => this.hold(true);
     this.canvas.onblur = () => this.hold(false);
-    this.sign(); this.load(0);
+    this.sign(); this.load(first);
     new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
     dark.addEventListener("change", () => this.load(this.number));
     // It plays while it is seen, unless the reader stopped it or asks for less motion.
