@@ -58,8 +58,8 @@ def run(
     """
     Run cases in all engines, judge them, write the report.
 
-    **Writes** into `--out`: `report/` (open its `index.html`; `report.html` leads there), `verdicts.json`, `summary.md`,
-    `junit.xml`, `records.jsonl`. With `--single-file`, `report.html` is the whole report.
+    **Writes** into `--out`: `report/` (open its `index.html`, to which `report.html` leads), `verdicts.json`,
+    `summary.md`, `junit.xml`, `records.jsonl`. With `--single-file`, `report.html` is the whole report.
     A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.

@@ -63,8 +63,8 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
-    `role` is "main", "refined", "control:<name>" or "film". `rung` counts the efforts of the ladder from coarse to fine out of
-    `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
+    `role` is "main", "refined", "control:<name>" or "film". `rung` counts the efforts of the ladder from coarse to fine
+    out of `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
     `made_by.py`; records of older versions have none). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
 
     `status`: "finished"; "diverged", as the engine says; "failed" where the adapter raised or broke the contract;

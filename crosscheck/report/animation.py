@@ -68,8 +68,8 @@ def _wheel(store: Store, result: Result, wheel: DrawnWheel, number: dict[str, in
 def wheel_angle(result: Result, wheel: DrawnWheel) -> Real:
     """Angle of a wheel relative to its marker (T,), rad, from the axial torque on it and its marker's motion.
 
-    With J its axial inertia and a its axis: J (omega . a + spin) changes at the rate torque . a. Where the torque is not
-    recorded the spin stays as it began.
+    With J its axial inertia and a its axis: J (omega . a + spin) changes at the rate torque . a. Where no torque
+    is recorded, the spin stays as it began.
     """
     times = result.times
     torque, turning = f"wheel_load:{wheel.name}.torque", f"marker:{wheel.marker}.angular_velocity"

@@ -10,7 +10,14 @@ from crosscheck.judging.results import CaseResults
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
 from crosscheck.report.places import Place
-from crosscheck.report.views import Block, VerdictCell, comparison_blocks, conservation_block, control_block, summary_cell
+from crosscheck.report.views import (
+    Block,
+    VerdictCell,
+    comparison_blocks,
+    conservation_block,
+    control_block,
+    summary_cell,
+)
 
 
 @dataclass(frozen=True)

@@ -52,7 +52,8 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
             if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                panels.append({"comparison": printable(name), "title": kind.panel, "channels": views, "first": _first(views)})
+                whose = {"comparison": printable(name), "title": kind.panel}
+                panels.append({**whose, "channels": views, "first": _first(views)})
     return panels
 
 

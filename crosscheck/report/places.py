@@ -11,7 +11,7 @@ INDEX = "index.html"
 
 @dataclass(frozen=True)
 class Place:
-    """`page` is the path of the case's page from the index ("" where all stands on one), `anchor` that of its section."""
+    """`page` is the path of the case's page from the index ("" where all stands on one), `anchor` its section there."""
 
     page: str
     anchor: str

@@ -58,7 +58,7 @@ def write_site(material: Material, out: Path) -> Path:
         view = _view(case, material, place)
         written[place.page] = _page("case_page.html.j2", material, where, root=place.root, case=view)
         written[place.data] = _registration(case, material, place)
-    written[LISTING] = msgspec.json.encode(sorted(written)).decode()
+    written[LISTING] = msgspec.json.encode(sorted([*written, LISTING])).decode()
     for name, text in written.items():
         folder((site / name).parent)
         (site / name).write_text(text, encoding="utf-8", errors="backslashreplace")
@@ -68,7 +68,8 @@ def write_site(material: Material, out: Path) -> Path:
 
 
 def write_single(material: Material, out: Path) -> Path:
-    """Write the whole report into one file that loads nothing; returns its path."""
+    """Write the whole report into one file that loads nothing, in the place of pages; returns its path."""
+    _clear(out / FOLDER)
     cases = material.session.cases
     where = places((case.case.case for case in cases), single=True)
     text = _page(
@@ -87,19 +88,23 @@ def write_single(material: Material, out: Path) -> Path:
 
 def _page(name: str, material: Material, where: dict[str, Place], **more: Any) -> str:
     session, outcome = material.session, material.outcome
-    return templates().get_template(name).render(
-        outcome=outcome,
-        counts=outcome.counts(),
-        statuses=STATUSES,
-        controls=outcome.controls(),
-        matrix=matrix(session, outcome, where),
-        findings=findings(outcome, where),
-        environment=session.environments[-1] if session.environments else None,
-        engines=_engines(session),
-        scores=material.scores,
-        places=where,
-        scripts_of_site=SCRIPTS,
-        **more,
+    return (
+        templates()
+        .get_template(name)
+        .render(
+            outcome=outcome,
+            counts=outcome.counts(),
+            statuses=STATUSES,
+            controls=outcome.controls(),
+            matrix=matrix(session, outcome, where),
+            findings=findings(outcome, where),
+            environment=session.environments[-1] if session.environments else None,
+            engines=_engines(session),
+            scores=material.scores,
+            places=where,
+            scripts_of_site=SCRIPTS,
+            **more,
+        )
     )
 
 

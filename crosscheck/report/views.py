@@ -119,9 +119,7 @@ def control_block(verdicts: Iterable[Verdict]) -> Block | None:
     if not group:
         return None
     note = "Deliberate faults of the scene. A comparison that does not notice them proves nothing."
-    table = _table(
-        group, lambda each: each.comparison, lambda each: f"{each.engine_a}, against {each.engine_b}"
-    )
+    table = _table(group, lambda each: each.comparison, lambda each: f"{each.engine_a}, against {each.engine_b}")
     return _block("Negative controls", note, group, table)
 
 

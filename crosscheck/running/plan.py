@@ -43,9 +43,9 @@ class Job:
     """One engine's work on one scene, done by one worker: compile once, run its efforts from coarse to fine.
 
     `efforts` replaces the engine's ladder where not empty; `finest_only` runs just its last effort. `kept` are the
-    channels to store of efforts too coarse to matter for U, and of films. `provider` is "module:function" returning the engines by
-    name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run. After
-    `time_limit_s` it is stopped.
+    channels to store of efforts too coarse to matter for U, and of films. `provider` is "module:function" returning the
+    engines by name. `done` are the runs already recorded for this very scene. A job with an `error` cannot be run.
+    After `time_limit_s` it is stopped.
     """
 
     case: str

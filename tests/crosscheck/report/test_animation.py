@@ -32,12 +32,14 @@ def test_every_body_and_wheel_is_drawn(case: Case) -> None:
         drawing = info.film or info.drawing
         if info.error or "native" not in variant.engines:
             continue
-        bodies = case.scene(variant) if variant.transform == "modal_points" else variant_scene(case.scene(variant), variant)
-        if any(isinstance(body, SidBody) for body in bodies.bodies):
+        scene = case.scene(variant)
+        if variant.transform != "modal_points":
+            scene = variant_scene(scene, variant)
+        if any(isinstance(body, SidBody) for body in scene.bodies):
             continue
         assert drawing is not None
-        assert {line.body for line in drawing.lines} == {body.name for body in bodies.bodies}, variant.name
-        assert {wheel.name for wheel in drawing.wheels} == {wheel.name for wheel in bodies.wheels}, variant.name
+        assert {line.body for line in drawing.lines} == {body.name for body in scene.bodies}, variant.name
+        assert {wheel.name for wheel in drawing.wheels} == {wheel.name for wheel in scene.wheels}, variant.name
 
 
 def test_what_is_drawn_in_whole_by_its_own_markers_needs_no_film() -> None:
