@@ -9,7 +9,7 @@ from crosscheck.judging.outcome import Absence, SessionOutcome
 from crosscheck.judging.results import CaseResults
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
-from crosscheck.report.places import Place
+from crosscheck.report.places import CasePlace
 from crosscheck.report.views import (
     Block,
     VerdictCell,
@@ -24,7 +24,7 @@ from crosscheck.report.views import (
 class CaseView:
     """A case's page."""
 
-    place: Place
+    place: CasePlace
     name: str
     title: str
     summary: str
@@ -40,7 +40,7 @@ class CaseView:
     mutation: CaseScore | None
 
 
-def case_view(case: CaseResults, outcome: SessionOutcome, place: Place, mutation: CaseScore | None) -> CaseView:
+def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, mutation: CaseScore | None) -> CaseView:
     """Everything on a case's page but the charts."""
     record = case.case
     verdicts = outcome.verdicts[record.case]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
-from crosscheck.report.places import Place
+from crosscheck.report.places import CasePlace
 from crosscheck.report.views import VerdictCell, anchor, summary_cell
 
 
@@ -35,7 +35,7 @@ class Matrix:
 
 
 @dataclass(frozen=True)
-class Finding:
+class Unexpected:
     """A verdict that is not as expected, and where it stands."""
 
     case: str
@@ -46,7 +46,7 @@ class Finding:
     reason: str
 
 
-def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, Place]) -> Matrix:
+def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> Matrix:
     """What every case found with every engine; cases that are not as expected come first."""
     everything = [verdict for verdict in outcome.all if verdict.kind == "comparison"]
     engines = list(dict.fromkeys(engine for verdict in everything for _, engine in verdict.sides))
@@ -55,10 +55,10 @@ def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, Place
     return Matrix((*engines, "Conservation", "Negative controls"), tuple(rows))
 
 
-def findings(outcome: SessionOutcome, places: Mapping[str, Place]) -> list[Finding]:
+def findings(outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> list[Unexpected]:
     """Every verdict that is not as expected, with a link to it."""
     return [
-        Finding(
+        Unexpected(
             case=case,
             link=places[case].link(anchor(number)),
             what=f"{verdict.comparison}, {verdict.channel}, {verdict.pair}",

@@ -10,7 +10,7 @@ INDEX = "index.html"
 
 
 @dataclass(frozen=True)
-class Place:
+class CasePlace:
     """`page` is the path of the case's page from the index ("" where all stands on one), `anchor` its section there."""
 
     page: str
@@ -31,9 +31,9 @@ class Place:
         return self.page.removesuffix(".html") + ".data.js"
 
 
-def places(cases: Iterable[str], single: bool) -> dict[str, Place]:
+def places(cases: Iterable[str], single: bool) -> dict[str, CasePlace]:
     """The place of every case: `<family>/<case>.html`, in letters that every file system and address takes."""
-    found: dict[str, Place] = {}
+    found: dict[str, CasePlace] = {}
     taken = {INDEX}
     for number, case in enumerate(cases):
         stem = "/".join(_plain(part) for part in case.split("/")[-2:])
@@ -42,7 +42,7 @@ def places(cases: Iterable[str], single: bool) -> dict[str, Place]:
             page = f"{stem}-{number}.html"
             stem += "-"
         taken.add(page.lower())
-        found[case] = Place("" if single else page, f"case-{number}")
+        found[case] = CasePlace("" if single else page, f"case-{number}")
     return found
 
 

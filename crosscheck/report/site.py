@@ -22,7 +22,7 @@ from crosscheck.report.charts import payload
 from crosscheck.report.html import embedded, source, templates
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
-from crosscheck.report.places import INDEX, Place, places
+from crosscheck.report.places import INDEX, CasePlace, places
 from flexmb.output.writing import folder
 
 FOLDER = "report"
@@ -86,7 +86,7 @@ def write_single(material: Material, out: Path) -> Path:
     return out / SINGLE
 
 
-def _page(name: str, material: Material, where: dict[str, Place], **more: Any) -> str:
+def _page(name: str, material: Material, where: dict[str, CasePlace], **more: Any) -> str:
     session, outcome = material.session, material.outcome
     return (
         templates()
@@ -108,11 +108,11 @@ def _page(name: str, material: Material, where: dict[str, Place], **more: Any) -
     )
 
 
-def _view(case: CaseResults, material: Material, place: Place) -> CaseView:
+def _view(case: CaseResults, material: Material, place: CasePlace) -> CaseView:
     return case_view(case, material.outcome, place, material.scores.cases.get(case.case.case))
 
 
-def _registration(case: CaseResults, material: Material, place: Place) -> str:
+def _registration(case: CaseResults, material: Material, place: CasePlace) -> str:
     """A script that hands the case's data to the page."""
     data = payload(case, material.outcome.verdicts[case.case.case])
     return f"crosscheck.register({embedded(place.anchor)}, {embedded(data)});\n"
