@@ -107,7 +107,7 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
 def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> dict[str, Any]:
     a, b = _sides(case, verdict)
     across = a.variant != b.variant
-    doubt = a.signal(channel, across).uncertainty.envelope + b.signal(channel, across).uncertainty.envelope
+    doubt = a.doubt(channel, across).envelope + b.doubt(channel, across).envelope
     return {
         "a": _label(a, across),
         "b": _label(b, across),

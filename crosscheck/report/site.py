@@ -52,11 +52,11 @@ def write_site(material: Material, out: Path) -> Path:
         written[f"{ASSETS}/{name}"] = str(source(name))
     for name in LIBRARIES:
         written[f"{ASSETS}/{Path(name).name}"] = _library(name)
-    written[INDEX] = _page("index.html.j2", material, where, root="")
+    written[INDEX] = _page("index.html.j2", material, root="", **_overview(material, where))
     for case in material.session.cases:
         place = where[case.case.case]
         view = _view(case, material, place)
-        written[place.page] = _page("case_page.html.j2", material, where, root=place.root, case=view)
+        written[place.page] = _page("case_page.html.j2", material, root=place.root, case=view)
         written[place.data] = _registration(case, material, place)
     written[LISTING] = msgspec.json.encode(sorted([*written, LISTING])).decode()
     for name, text in written.items():
@@ -75,7 +75,7 @@ def write_single(material: Material, out: Path) -> Path:
     text = _page(
         "single.html.j2",
         material,
-        where,
+        **_overview(material, where),
         root="",
         cases=[_view(case, material, where[case.case.case]) for case in cases],
         style=source("style.css"),
@@ -86,26 +86,25 @@ def write_single(material: Material, out: Path) -> Path:
     return out / SINGLE
 
 
-def _page(name: str, material: Material, where: dict[str, CasePlace], **more: Any) -> str:
+def _page(name: str, material: Material, **more: Any) -> str:
+    """A page by its template."""
+    return templates().get_template(name).render(outcome=material.outcome, scripts_of_site=SCRIPTS, **more)
+
+
+def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]:
+    """What the index shows."""
     session, outcome = material.session, material.outcome
-    return (
-        templates()
-        .get_template(name)
-        .render(
-            outcome=outcome,
-            counts=outcome.counts(),
-            statuses=STATUSES,
-            controls=outcome.controls(),
-            matrix=matrix(session, outcome, where),
-            findings=findings(outcome, where),
-            environment=session.environments[-1] if session.environments else None,
-            engines=_engines(session),
-            scores=material.scores,
-            places=where,
-            scripts_of_site=SCRIPTS,
-            **more,
-        )
-    )
+    return {
+        "counts": outcome.counts(),
+        "statuses": STATUSES,
+        "controls": outcome.controls(),
+        "matrix": matrix(session, outcome, where),
+        "findings": findings(outcome, where),
+        "environment": session.environments[-1] if session.environments else None,
+        "engines": _engines(session),
+        "scores": material.scores,
+        "places": where,
+    }
 
 
 def _view(case: CaseResults, material: Material, place: CasePlace) -> CaseView:
