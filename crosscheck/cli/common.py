@@ -115,6 +115,7 @@ SchedulerAddress = Annotated[
     ),
 ]
 Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
+SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
 

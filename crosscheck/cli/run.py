@@ -18,6 +18,7 @@ from crosscheck.cli.common import (
     Out,
     Quiet,
     SchedulerAddress,
+    SingleFile,
     Strict,
     TimeLimit,
     Verbose,
@@ -63,6 +64,7 @@ def run(
         bool, typer.Option("--accept", help="Write the figures reached into each case's accepted.toml, for review.")
     ] = False,
     strict: Strict = False,
+    single_file: SingleFile = False,
     open_report: Open = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -71,8 +73,9 @@ def run(
     """
     Run cases in all engines, judge them, write the report.
 
-    **Writes** into `--out`: `report.html` (open it), `results.json` (small and sealed, for `crosscheck compare`),
-    `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`, `records.jsonl`.
+    **Writes** into `--out`: `report/` (open its `index.html`, to which `report.html` leads), `results.json` (small and
+    sealed, for `crosscheck compare`), `verdicts.json`, `summary.md`, `junit.xml`, `badge.svg`, `badge.json`,
+    `records.jsonl`. With `--single-file`, `report.html` is the whole report.
     A run that was stopped resumes where it was: what is recorded is not run again, as long as the scene, the effort
     and everything that made it are the same: sources, libraries, machine. The report shows what this run asked for;
     `crosscheck report` shows everything that the records hold. One run at a time writes into a folder.
@@ -109,7 +112,7 @@ def run(
                 scheduler=runs_on, listener=live.hear,
             )  # fmt: skip
         done = not accept or _accept(chosen, out / "records.jsonl", partial=bool(engine))
-        outcome, page = write_all(out / "records.jsonl", out, strict, last_session)
+        outcome, page = write_all(out / "records.jsonl", out, strict, last_session, single_file)
     _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report, failed=not done)
 
 
@@ -118,6 +121,7 @@ def report(
     records: Annotated[Path, typer.Argument(help="A records.jsonl of an earlier run, yours or anybody's.")],
     out: Out = Path("out"),
     strict: Strict = False,
+    single_file: SingleFile = False,
     open_report: Open = False,
     as_json: Json = False,
     quiet: Quiet = False,
@@ -132,7 +136,7 @@ def report(
         refuse(f"{records} is no file")
     shown = verbosity(quiet, verbose)
     with sole_writer(out):
-        outcome, page = write_all(records, out, strict, standing)
+        outcome, page = write_all(records, out, strict, standing, single_file)
     _conclude(outcome, page, shown, results=out / FILE if as_json else None, open_report=open_report)
 
 

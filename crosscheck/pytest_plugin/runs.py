@@ -17,8 +17,9 @@ from crosscheck.judging.results import collect
 from crosscheck.library.find import Case
 from crosscheck.records.archive import read
 from crosscheck.records.session import last_session
+from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, sweep
+from crosscheck.running.sweep import PROVIDER, run_planned
 
 DONE, LOCK = "session", ".crosscheck.lock"
 
@@ -41,9 +42,8 @@ class SessionRuns:
             records = place / "records.jsonl"
             with self._once(place) as first:
                 if first:
-                    limits = Limits(workers=1)
-                    alone = replace(case, alone=True)
-                    sweep((alone,), (engine,), records, fresh=True, provider=self.provider, limits=limits)
+                    planned = plan(replace(case, alone=True), (engine,), self.provider)
+                    run_planned([planned], (engine,), records, fresh=True, limits=Limits(workers=1))
             self._outcomes[key] = conclude(collect(last_session(read(records))))
         return self._outcomes[key]
 

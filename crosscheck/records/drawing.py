@@ -1,29 +1,58 @@
-"""What is drawn of a scene: lines between points that markers carry, as records hold it."""
+"""What is drawn of a scene: lines, solids and wheels that markers carry, as records hold it."""
 
 from __future__ import annotations
 
 import msgspec
 
-from flexmb.scene.bodies import Vector
+from flexmb.scene.bodies import ZERO, Vector
+
+FILM = "film"  # the role of a run that is made to be drawn
 
 
 class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_fields=True):
-    """A marker ("" is the World origin) and an offset in its axes (m)."""
+    """A marker ("" is the World origin) and an offset in its axes (m); `tangent`, a unit vector in its axes, is the
+    direction in which a bent line passes, zero where it is not known."""
 
     marker: str
     offset: Vector
+    tangent: Vector = ZERO
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """A polyline of one body; `kind` chooses its style."""
+    """What is drawn of one body; `kind` says how its points are to be taken.
+
+    "solid": the eight corners of a box, the first coordinate's sign changing slowest. "arm": a straight line. "beam": a
+    line through its points that bends with their tangents. Records of older versions have "box", one edge of a box, and
+    "wheel", a rim: straight lines both.
+    """
 
     body: str
     kind: str
     points: tuple[CarriedPoint, ...]
 
 
+class DrawnWheel(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """A disc on a marker (centre and unit axis in its axes), with what its angle follows from.
+
+    The angle is relative to the marker: `angle_rad` at t = 0, where its rate is `speed_rad_s`; later the axial torque
+    on the wheel changes its axial rate in World, with `axial_inertia_kg_m2`.
+    """
+
+    name: str
+    marker: str
+    centre: Vector
+    axis: Vector
+    radius_m: float
+    width_m: float
+    axial_inertia_kg_m2: float
+    speed_rad_s: float
+    angle_rad: float
+
+
 class Drawing(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """All lines of a scene, and the markers that are worth a trail."""
+    """All that is drawn of a scene, the markers that are worth a trail, and where down is (zero without gravity)."""
 
     lines: tuple[Line, ...]
     trails: tuple[str, ...]
+    wheels: tuple[DrawnWheel, ...] = ()
+    gravity: Vector = ZERO

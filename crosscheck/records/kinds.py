@@ -38,11 +38,15 @@ class Environment(_OneRecord, frozen=True, kw_only=True, tag="environment"):
 
 
 class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What the report needs of a variant's scene: levels of its bodies, how to draw it, or why it could not be made."""
+    """What the report needs of a variant's scene: levels of its bodies, how to draw it, or why it could not be made.
+
+    `drawing` is by the markers that every run records, `film` by those of a run made to be drawn, where there is one.
+    """
 
     level: str
     drawing: Drawing | None
     error: str = ""
+    film: Drawing | None = None
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
@@ -62,8 +66,8 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     """One run of one engine at one effort, or why there is none (then `effort` is empty).
 
-    `role` is "main", "refined" or "control:<name>". `rung` counts the efforts of the ladder from coarse to fine out of
-    `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
+    `role` is "main", "refined", "control:<name>" or "film". `rung` counts the efforts of the ladder from coarse to fine
+    out of `rungs`. `scene` identifies scene and sample times, `made_by` everything else that the result depends on (see
     `made_by.py`; records of older versions have none). `compile_s` is conversion and warm-up, `wall_s` the solve alone.
 
     `status`: "finished"; "diverged", as the engine says; "failed" where the adapter raised or broke the contract;

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from crosscheck.records.kinds import Environment
 
-PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec", "plotly")
+PACKAGES = ("flexmb", "numpy", "scipy", "numba", "msgspec")
 
 
 def environment(cases: tuple[str, ...] = (), engines: tuple[str, ...] = (), confirms: bool = False) -> Environment:

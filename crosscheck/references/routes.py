@@ -22,9 +22,9 @@ from crosscheck.library.find import Case
 from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
-from crosscheck.running.plan import MAIN
+from crosscheck.running.plan import MAIN, plan
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import Listener, sweep
+from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude
 from flexmb.typing import Real
 
@@ -100,7 +100,8 @@ def _engine_results(
     )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        sweep((replace(case, run=run),), (), records, provider=provider, limits=limits, listener=listener)
+        planned = plan(replace(case, run=run), (), provider, limits.time_s)
+        run_planned([planned], (), records, limits=limits, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}
 

@@ -1,6 +1,6 @@
 """The outputs of a session, made from its records alone.
 
-verdicts.json, report.html, summary.md, junit.xml, results.json and the badge.
+verdicts.json, report/, summary.md, junit.xml, results.json and the badge.
 """
 
 from collections.abc import Callable, Sequence
@@ -12,23 +12,25 @@ from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
 from crosscheck.records.session import standing
 from crosscheck.report.ci import write_junit, write_summary, write_verdicts
-from crosscheck.report.html import write_report
+from crosscheck.report.mutations import read_scores
+from crosscheck.report.site import Material, write_single, write_site
 from crosscheck.sealed.badge import badge_json, badge_svg
 from crosscheck.sealed.document import results_of
 from crosscheck.sealed.seal import FILE, sealed_text
 from flexmb.output.writing import folder, writing
 
-__all__ = ["Choice", "Outcome", "write_all"]
+__all__ = ["Choice", "SessionOutcome", "write_all"]
 
 Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
 
 def write_all(
-    records: Path, out: Path, strict: bool = False, chosen: Choice = standing
+    records: Path, out: Path, strict: bool = False, chosen: Choice = standing, single_file: bool = False
 ) -> tuple[SessionOutcome, Path]:
     """Judge the `chosen` of a file's records and write all outputs into `out`; returns outcome and report's path.
 
-    `strict`: figures that are worse than recorded, or not recorded, are not as expected.
+    `strict`: figures that are worse than recorded, or not recorded, are not as expected. `single_file`: the report is
+    one file, `report.html`, instead of a folder of pages.
     """
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)
@@ -37,8 +39,9 @@ def write_all(
         write_verdicts(outcome, out / "verdicts.json")
         write_summary(outcome, out / "summary.md")
         write_junit(outcome, out / "junit.xml")
-        write_report(session, outcome, out / "report.html")
         (out / FILE).write_text(sealed_text(results_of(session, outcome, records)), encoding="ascii")
         (out / "badge.json").write_text(badge_json(outcome), encoding="ascii")
         (out / "badge.svg").write_text(badge_svg(outcome), encoding="utf-8")
-    return outcome, out / "report.html"
+        material = Material(session, outcome, read_scores(out))
+        page = write_single(material, out) if single_file else write_site(material, out)
+    return outcome, page

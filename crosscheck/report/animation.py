@@ -1,25 +1,28 @@
-"""The content of an animation: lines between points that markers carry, and the markers' motion."""
+"""The content of an animation: what is drawn of each body, the motion of the markers that carry it, wheels' angles."""
 
 from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.records.drawing import Drawing, Line
+from crosscheck.records.drawing import FILM, Drawing, DrawnWheel, Line
 from crosscheck.report.store import Store
+from flexmb.typing import Real
 
 
 def animations(store: Store, case: CaseResults) -> list[dict[str, Any]]:
-    """One animation for each variant that can be drawn, by the first of its engines whose finest run has samples."""
+    """One animation for each variant that can be drawn: its film, or else its markers as an engine recorded them."""
     found = []
     for variant in case.case.run.variants:
-        drawing = case.case.variants[variant.name].drawing
-        if drawing is None or not drawing.lines:
-            continue
-        results = [case.get(variant.name, engine) for engine in variant.engines]
-        shown = next((result for result in results if _drawable(result, drawing)), None)
-        if shown is not None:
-            found.append(_animation(store, shown, drawing))
+        info = case.case.variants[variant.name]
+        films = [(case.get(variant.name, engine, FILM), info.film) for engine in variant.engines]
+        mains = [(case.get(variant.name, engine), info.drawing) for engine in variant.engines]
+        for result, drawing in (*films, *mains):
+            if drawing is not None and drawing.lines and _drawable(result, drawing):
+                found.append(_animation(store, result, drawing))
+                break
     return found
 
 
@@ -38,25 +41,69 @@ def _animation(store: Store, result: Result, drawing: Drawing) -> dict[str, Any]
             for name in names
         ],
         "lines": [_line(line, number) for line in drawing.lines],
+        "wheels": [_wheel(store, result, wheel, number) for wheel in drawing.wheels],
         "trails": [number[name] for name in drawing.trails if name in number],
+        "gravity": drawing.gravity,
     }
 
 
 def _line(line: Line, number: dict[str, int]) -> dict[str, Any]:
-    """A line with its points as [marker number or -1 for the World, x, y, z]."""
-    points = [[number.get(point.marker, -1), *point.offset] for point in line.points]
+    """A line with its points as [marker number or -1 for the World, offset, tangent]."""
+    points = [[number.get(point.marker, -1), *point.offset, *point.tangent] for point in line.points]
     return {"body": line.body, "kind": line.kind, "points": points}
 
 
+def _wheel(store: Store, result: Result, wheel: DrawnWheel, number: dict[str, int]) -> dict[str, Any]:
+    return {
+        "name": wheel.name,
+        "marker": number[wheel.marker],
+        "centre": wheel.centre,
+        "axis": wheel.axis,
+        "radius": wheel.radius_m,
+        "width": wheel.width_m,
+        "angle": store.samples(wheel_angle(result, wheel)),
+    }
+
+
+def wheel_angle(result: Result, wheel: DrawnWheel) -> Real:
+    """Angle of a wheel relative to its marker (T,), rad, from the axial torque on it and its marker's motion.
+
+    With J its axial inertia and a its axis: J (omega . a + spin) changes at the rate torque . a. Where no torque
+    is recorded, the spin stays as it began.
+    """
+    times = result.times
+    torque, turning = f"wheel_load:{wheel.name}.torque", f"marker:{wheel.marker}.angular_velocity"
+    spin = np.full(len(times), wheel.speed_rad_s)
+    if torque in result.finest.channels and turning in result.finest.channels:
+        axis = _turned(result.values(f"marker:{wheel.marker}.orientation"), np.array(wheel.axis))
+        carried = np.sum(result.values(turning) * axis, axis=1)
+        impulse = _integral(np.sum(result.values(torque) * axis, axis=1), times)
+        spin = wheel.speed_rad_s + carried[0] - carried + impulse / wheel.axial_inertia_kg_m2
+    return wheel.angle_rad + _integral(spin, times)
+
+
+def _integral(values: Real, times: Real) -> Real:
+    """Integral over time from the first sample to each (T,), by the trapezoidal rule."""
+    areas = 0.5 * (values[1:] + values[:-1]) * np.diff(times)
+    return np.concatenate([[0.0], np.cumsum(areas)])
+
+
+def _turned(quaternions: Real, vector: Real) -> Real:
+    """A vector turned by each quaternion (T,4), scalar first: (T,3)."""
+    w, u = quaternions[:, :1], quaternions[:, 1:]
+    across = 2.0 * np.cross(u, vector)
+    return vector + w * across + np.cross(u, across)
+
+
 def _carriers(drawing: Drawing) -> list[str]:
-    """Markers that carry a point or leave a trail, each once."""
+    """Markers that carry something or leave a trail, each once."""
     carrying = [point.marker for line in drawing.lines for point in line.points if point.marker]
-    return list(dict.fromkeys((*carrying, *drawing.trails)))
+    return list(dict.fromkeys((*carrying, *(wheel.marker for wheel in drawing.wheels), *drawing.trails)))
 
 
 def _drawable(result: Result, drawing: Drawing) -> bool:
     """Whether the result's last run stored all markers needed; a diverged run is drawn as far as it came."""
-    if not result.runs:
+    if not result.runs or result.finest.times is None:
         return False
     stored = result.finest.channels
     wanted = (f"marker:{name}.{part}" for name in _carriers(drawing) for part in ("position", "orientation"))

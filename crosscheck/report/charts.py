@@ -1,4 +1,4 @@
-"""The numbers behind the report's charts, small enough to be carried in one HTML file.
+"""The numbers behind the charts and the animation of a case's page.
 
 Signals are thinned and stored once each (see store.py); distances and drifts are computed here in double precision, and
 thinned by taking the largest of each bin so that no peak is lost. templates/charts.js draws them.
@@ -6,7 +6,6 @@ thinned by taking the largest of each bin so that no peak is lost. templates/cha
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import asdict
 from typing import Any
 
@@ -20,6 +19,7 @@ from crosscheck.library.channels import CONSERVED, KINDS
 from crosscheck.report.animation import animations
 from crosscheck.report.store import Store
 from crosscheck.report.workprecision import WorkPrecision, work_precision
+from flexmb.output.printable import printable
 from flexmb.run.channels import distance, family, matches, signal_range, unit
 from flexmb.typing import Real
 
@@ -28,20 +28,15 @@ RUNAWAY = 20.0  # a signal this many times as large as another has run away from
 STILL, BAND = 1e-3, 0.05  # a signal that moves by less than this part of its size is still, and is shown in such a band
 
 
-def payload(cases: Iterable[tuple[CaseResults, list[Verdict]]]) -> dict[str, Any]:
-    """Everything that report.js needs: series by number, and for each case its panels, drifts, charts, animation."""
+def payload(case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
+    """Everything that the scripts of a case's page need: its panels, drifts, charts, animations, and their series."""
     store = Store()
-    described = [_case(store, case, verdicts) for case, verdicts in cases]
-    return {"cases": described, "series": store.series}
-
-
-def _case(store: Store, case: CaseResults, verdicts: list[Verdict]) -> dict[str, Any]:
     return {
-        "name": case.case.case,
         "panels": _panels(store, case, verdicts),
         "drifts": _drifts(store, case),
         "work": [_work(chart) for item in case.case.run.charts if (chart := work_precision(case, item)) is not None],
         "animations": animations(store, case),
+        "series": store.packed(),
     }
 
 
@@ -58,7 +53,8 @@ def _panels(store: Store, case: CaseResults, verdicts: list[Verdict]) -> list[di
             chosen = {key: value for key, value in channels.items() if family(key).partition(".")[0] == kind.name}
             if chosen and kind.panel:
                 views = [_channel(store, case, channel, pairs) for channel, pairs in chosen.items()]
-                panels.append({"comparison": name, "title": kind.panel, "channels": views, "first": _first(views)})
+                whose = {"comparison": printable(name), "title": kind.panel}
+                panels.append({**whose, "channels": views, "first": _first(views)})
     return panels
 
 
@@ -112,7 +108,7 @@ def _channel(store: Store, case: CaseResults, channel: str, pairs: list[Verdict]
 def _pair(store: Store, case: CaseResults, channel: str, verdict: Verdict) -> dict[str, Any]:
     a, b = _sides(case, verdict)
     across = a.variant != b.variant
-    doubt = a.signal(channel, across).uncertainty.envelope + b.signal(channel, across).uncertainty.envelope
+    doubt = a.doubt(channel, across).envelope + b.doubt(channel, across).envelope
     return {
         "a": _label(a, across),
         "b": _label(b, across),

@@ -1,8 +1,15 @@
-"""Series of numbers for the report: thinned, float32, base64, each stored once."""
+"""Series of numbers for the report: thinned, each stored once, packed so that a browser unpacks them quickly.
+
+All series of a page are one stream of float32, column by column. Of neighbours only the difference of their bit
+patterns is kept, the bytes of equal weight stand together, and the whole is deflated and set in base64:
+`templates/data.js` undoes it. Smooth signals take a third of their size so, and no digit is lost.
+"""
 
 from __future__ import annotations
 
 import base64
+import hashlib
+import zlib
 from typing import Any
 
 import numpy as np
@@ -15,27 +22,24 @@ SAMPLES = 201
 
 
 class Store:
-    """Series by number. `series[i]` is {"k": columns, "data": base64 of float32, row by row}."""
+    """Series by number; two with the same content have the same number."""
 
     def __init__(self) -> None:
-        self.series: list[dict[str, Any]] = []
-        self._signals: dict[tuple[int, str], int] = {}
-        self._times: dict[bytes, int] = {}
+        self._shapes: list[tuple[int, int]] = []
+        self._columns: list[NDArray[np.float32]] = []
+        self._numbers: dict[bytes, int] = {}
 
     def times(self, times: Real) -> int:
         """Number of the thinned sample times."""
-        key = times.tobytes()
-        if key not in self._times:
-            self._times[key] = self._add(times[_chosen(len(times))])
-        return self._times[key]
+        return self._add(times[_chosen(len(times))])
 
     def signal(self, result: Result, channel: str) -> int:
         """Number of a thinned channel (T, k) of a result's last run."""
-        key = (id(result), channel)
-        if key not in self._signals:
-            values = result.values(channel)
-            self._signals[key] = self._add(values[_chosen(len(values))])
-        return self._signals[key]
+        return self.samples(result.values(channel))
+
+    def samples(self, values: Real) -> int:
+        """Number of thinned values (T, k) or (T,)."""
+        return self._add(values[_chosen(len(values))])
 
     def peaks(self, values: Real) -> int:
         """Number of a non-negative curve (T,), each thinned sample the largest since the one before."""
@@ -43,11 +47,30 @@ class Store:
         starts = np.concatenate([[0], chosen[:-1] + 1])
         return self._add(np.maximum.reduceat(values, starts))
 
+    def packed(self) -> dict[str, Any]:
+        """All series: `shapes[i]` is [rows, columns] of series i, `data` the stream of them all."""
+        if not self._columns:
+            return {"shapes": [], "data": ""}
+        differences = np.concatenate([_differences(column) for column in self._columns])
+        planes = differences.view(np.uint8).reshape(-1, 4).T
+        data = zlib.compress(np.ascontiguousarray(planes).tobytes(), 9)
+        return {"shapes": self._shapes, "data": base64.b64encode(data).decode()}
+
     def _add(self, values: Real) -> int:
-        table = values.reshape(len(values), -1)
-        data = base64.b64encode(np.ascontiguousarray(table, dtype="<f4").tobytes()).decode()
-        self.series.append({"k": table.shape[1], "data": data})
-        return len(self.series) - 1
+        with np.errstate(over="ignore"):  # beyond float32 there is infinity
+            table = np.ascontiguousarray(values.reshape(len(values), -1), dtype="<f4")
+        key = hashlib.blake2b(f"{table.shape}".encode() + table.tobytes(), digest_size=16).digest()
+        if key not in self._numbers:
+            self._numbers[key] = len(self._shapes)
+            self._shapes.append((table.shape[0], table.shape[1]))
+            self._columns += [np.ascontiguousarray(column) for column in table.T]
+        return self._numbers[key]
+
+
+def _differences(column: NDArray[np.float32]) -> NDArray[np.uint32]:
+    """Bit patterns of a column's numbers, each less the one before, modulo 2^32."""
+    bits = column.view("<u4")
+    return np.diff(bits, prepend=np.zeros(1, dtype="<u4")).astype("<u4")
 
 
 def _chosen(count: int) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""The tables of the report: verdicts arranged by comparison, kind of channel and pair of engines."""
+"""What a page shows of verdicts: cells that summarise some, tables of cells, and blocks that fold all lines in."""
 
 from __future__ import annotations
 
@@ -23,13 +23,12 @@ SYMBOLS: dict[str, str] = {
 
 @dataclass(frozen=True)
 class VerdictCell:
-    """One cell: a status with its look ("good", "expected", "bad"), a short text, and the reasons behind it."""
+    """One cell: a status with its look ("good", "expected", "bad"), a short text, and the worst numbers behind it."""
 
     status: str
     look: str
     text: str
     numbers: str
-    reasons: tuple[str, ...]
 
     @property
     def symbol(self) -> str:
@@ -37,103 +36,147 @@ class VerdictCell:
         return SYMBOLS.get(self.status, "")
 
 
-EMPTY = VerdictCell("", "empty", "", "", ())
+EMPTY = VerdictCell("", "empty", "", "")
 
 
 @dataclass(frozen=True)
 class Row:
-    """A row of cells, one a column of its table, with rows beneath it that it summarises."""
+    """A row of cells, one a column of its table."""
 
     label: str
     cells: tuple[VerdictCell, ...]
-    rows: tuple[Row, ...] = ()
 
 
 @dataclass(frozen=True)
 class VerdictTable:
-    """A table of verdicts."""
+    """Summaries of verdicts; a table of one column needs no table."""
 
-    title: str
-    note: str
     columns: tuple[str, ...]
     rows: tuple[Row, ...]
 
 
-def overview(verdicts: dict[str, list[Verdict]]) -> VerdictTable:
-    """Cases and their comparisons against pairs of engines, controls and conservation."""
-    everything = [verdict for group in verdicts.values() for verdict in group]
-    columns = list(dict.fromkeys(_column(verdict) for verdict in everything))
-    columns.sort(key=lambda column: column in ("Conservation", "Negative controls"))
-    rows = []
-    for case, group in verdicts.items():
-        comparisons = [verdict for verdict in group if verdict.kind == "comparison"]
-        names = dict.fromkeys(verdict.comparison for verdict in comparisons)
-        below = tuple(
-            Row(name, _cells(columns, [each for each in comparisons if each.comparison == name], _column))
-            for name in names
-        )
-        rows.append(Row(case, _cells(columns, group, _column), below))
-    return VerdictTable("Verdicts", "", tuple(columns), tuple(rows))
+@dataclass(frozen=True)
+class VerdictLine:
+    """One verdict in words; `anchor` is its place on the page."""
+
+    anchor: str
+    channel: str
+    pair: str
+    cell: VerdictCell
+    E: str
+    U: str
+    goal: str
+    reason: str
 
 
-def comparison_tables(verdicts: Iterable[Verdict]) -> list[VerdictTable]:
-    """A table for each comparison: kinds of channels, with their channels beneath, against pairs."""
-    groups: dict[str, list[Verdict]] = {}
-    for verdict in verdicts:
+@dataclass(frozen=True)
+class Block:
+    """Verdicts that belong together: their summary, a table by kind and pair, and every one of them."""
+
+    title: str
+    note: str
+    cell: VerdictCell
+    figures: str
+    table: VerdictTable
+    lines: tuple[VerdictLine, ...]
+
+    @property
+    def open(self) -> bool:
+        """Whether it asks for attention."""
+        return self.cell.look == "bad"
+
+
+Numbered = tuple[int, Verdict]  # a verdict with its number among those of its case
+
+
+def anchor(number: int) -> str:
+    """Where on its page a verdict stands."""
+    return f"verdict-{number}"
+
+
+def comparison_blocks(verdicts: Iterable[Verdict]) -> list[Block]:
+    """A block for each comparison: kinds of channels against pairs of engines."""
+    groups: dict[str, list[Numbered]] = {}
+    for number, verdict in enumerate(verdicts):
         if verdict.kind == "comparison":
-            groups.setdefault(verdict.comparison, []).append(verdict)
-    return [_comparison_table(name, group) for name, group in groups.items()]
+            groups.setdefault(verdict.comparison, []).append((number, verdict))
+    return [_comparison(name, group) for name, group in groups.items()]
 
 
-def conservation_table(verdicts: list[Verdict]) -> VerdictTable | None:
+def conservation_block(verdicts: Iterable[Verdict]) -> Block | None:
     """Conserved quantities against engines."""
-    if not verdicts:
+    group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "conservation"]
+    if not group:
         return None
-    columns = tuple(dict.fromkeys(verdict.engine_a for verdict in verdicts))
-    groups: dict[str, list[Verdict]] = {}
-    for verdict in verdicts:
-        groups.setdefault(f"{verdict.comparison.capitalize()}, {verdict.variant_a}", []).append(verdict)
-    rows = tuple(Row(name, _cells(columns, group, lambda each: each.engine_a)) for name, group in groups.items())
-    return VerdictTable("Conservation", "Drift over the run, relative to the largest magnitude reached.", columns, rows)
+    note = "Drift over the run, relative to the largest magnitude reached."
+    table = _table(group, lambda each: f"{each.comparison.capitalize()}, {each.variant_a}", lambda each: each.engine_a)
+    return _block("Conservation", note, group, table)
 
 
-def control_table(verdicts: list[Verdict]) -> VerdictTable | None:
-    """Negative controls; beneath them the channels that must notice them."""
-    if not verdicts:
+def control_block(verdicts: Iterable[Verdict]) -> Block | None:
+    """Negative controls: which faults were noticed, by whom."""
+    group = [(number, verdict) for number, verdict in enumerate(verdicts) if verdict.kind == "control"]
+    if not group:
         return None
-    groups: dict[str, list[Verdict]] = {}
-    for verdict in verdicts:
-        groups.setdefault(f"{verdict.comparison} ({verdict.engine_a}, against {verdict.engine_b})", []).append(verdict)
-    rows = []
-    for name, group in groups.items():
-        below = tuple(Row(verdict.channel, (_cell([verdict]),)) for verdict in group)
-        rows.append(Row(name, (_cell(group),), below if len(below) > 1 else ()))
     note = "Deliberate faults of the scene. A comparison that does not notice them proves nothing."
-    return VerdictTable("Negative controls", note, ("The fault is",), tuple(rows))
+    table = _table(group, lambda each: each.comparison, lambda each: f"{each.engine_a}, against {each.engine_b}")
+    return _block("Negative controls", note, group, table)
 
 
-def _comparison_table(name: str, group: list[Verdict]) -> VerdictTable:
-    columns = list(dict.fromkeys(verdict.pair for verdict in group))
-    kinds = dict.fromkeys(_kind(verdict.channel) for verdict in group)
+def _comparison(name: str, group: list[Numbered]) -> Block:
+    first = group[0][1]
+    note = "" if first.expected == "agree" else f"Expected here: {first.expected}, because {first.expected_reason}"
+    return _block(name, note, group, _table(group, lambda each: _kind(each.channel), lambda each: each.pair))
+
+
+def _block(title: str, note: str, group: list[Numbered], table: VerdictTable) -> Block:
+    verdicts = [verdict for _, verdict in group]
+    order = sorted(group, key=lambda each: each[1].ok)  # what is not as expected first
+    lines = tuple(_line(number, verdict) for number, verdict in order)
+    return Block(title, note, summary_cell(verdicts), _worst(verdicts), table, lines)
+
+
+def _line(number: int, verdict: Verdict) -> VerdictLine:
+    what = verdict.comparison if verdict.kind != "comparison" else ""
+    return VerdictLine(
+        anchor=anchor(number),
+        channel=f"{what}: {verdict.channel}" if what and what != verdict.channel else verdict.channel,
+        pair=verdict.engine_a if verdict.kind == "conservation" else verdict.pair,
+        cell=summary_cell([verdict]),
+        E=_number(verdict.E),
+        U=_number(verdict.U),
+        goal=_number(verdict.goal),
+        reason=_reason(verdict),
+    )
+
+
+def _worst(verdicts: list[Verdict]) -> str:
+    """The verdict with the largest E for its goal, in numbers."""
+    judged = [verdict for verdict in verdicts if verdict.E is not None and verdict.goal > 0.0 and verdict.E >= 0.0]
+    if not judged:
+        return ""
+    worst = max(judged, key=lambda verdict: (verdict.E or 0.0) / verdict.goal)
+    doubt = "" if worst.kind == "conservation" else f", U {_number(worst.U) or 'unknown'}"
+    bound = "limit" if worst.kind == "conservation" else "goal"
+    return f"worst {worst.channel}: E {_number(worst.E)}{doubt}, {bound} {_number(worst.goal)}"
+
+
+def _number(value: float | None) -> str:
+    return "" if value is None else f"{value:.1e}"
+
+
+def _table(group: list[Numbered], row: Callable[[Verdict], str], column: Callable[[Verdict], str]) -> VerdictTable:
+    verdicts = [verdict for _, verdict in group]
+    columns = tuple(dict.fromkeys(map(column, verdicts)))
     rows = []
-    for kind in kinds:
-        inside = [verdict for verdict in group if _kind(verdict.channel) == kind]
-        channels = dict.fromkeys(verdict.channel for verdict in inside)
-        below = tuple(
-            Row(channel, _cells(columns, [each for each in inside if each.channel == channel], _pair))
-            for channel in channels
-        )
-        rows.append(below[0] if len(below) == 1 else Row(kind, _cells(columns, inside, _pair), below))
-    expected = group[0].expected
-    note = "" if expected == "agree" else f"Expected here: {expected}, because {group[0].expected_reason}"
-    return VerdictTable(name, note, tuple(columns), tuple(rows))
+    for name in dict.fromkeys(map(row, verdicts)):
+        inside = [verdict for verdict in verdicts if row(verdict) == name]
+        cells = [[verdict for verdict in inside if column(verdict) == each] for each in columns]
+        rows.append(Row(name, tuple(map(summary_cell, cells))))
+    return VerdictTable(columns, tuple(rows))
 
 
-def _cells(columns: Iterable[str], group: list[Verdict], column: Callable[[Verdict], str]) -> tuple[VerdictCell, ...]:
-    return tuple(_cell([verdict for verdict in group if column(verdict) == name]) for name in columns)
-
-
-def _cell(group: list[Verdict]) -> VerdictCell:
+def summary_cell(group: list[Verdict]) -> VerdictCell:
     """Summary of some verdicts by the gravest unexpected one, or else by the gravest."""
     if not group:
         return EMPTY
@@ -154,9 +197,7 @@ def _cell(group: list[Verdict]) -> VerdictCell:
     grown = [verdict for verdict in group if verdict.ok and verdict.worse]
     if grown:
         text += ", worse than recorded" if len(grown) == len(group) else f", {len(grown)} worse than recorded"
-    shown = bad or grown or [verdict for verdict in group if verdict.status == worst.status]
-    reasons = tuple(f"{verdict.channel}, {verdict.pair}: {_reason(verdict)}" for verdict in shown[:12])
-    return VerdictCell(worst.status, look, text, _numbers(worst), reasons)
+    return VerdictCell(worst.status, look, text, _numbers(worst))
 
 
 def _reason(verdict: Verdict) -> str:
@@ -181,15 +222,3 @@ def _numbers(verdict: Verdict) -> str:
 def _kind(channel: str) -> str:
     part = part_of(channel)
     return channel if part is None else part.title
-
-
-def _pair(verdict: Verdict) -> str:
-    return verdict.pair
-
-
-def _column(verdict: Verdict) -> str:
-    if verdict.kind == "conservation":
-        return "Conservation"
-    if verdict.kind == "control":
-        return "Negative controls"
-    return f"{verdict.engine_a} – {verdict.engine_b}"

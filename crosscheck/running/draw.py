@@ -1,28 +1,32 @@
 """How to draw a scene from its markers: every drawn point is a marker plus a fixed offset in the marker's axes.
 
 Rigid bodies become the box with the same mass and inertia, carried by any marker on the body; flexible bodies a line
-through their markers in order along the body; wheels become circles. Markers are all that runs record, so that drawing
-needs no mechanics; bodies without a marker are not drawn.
+through the nodes that carry markers, which bends with them; wheels become discs. Markers are all that runs record, so
+that drawing needs no mechanics; bodies without a marker are not drawn. `film.py` gives each body the markers it needs.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.records.drawing import CarriedPoint, Drawing, Line
-from flexmb.scene.bodies import Body, RigidBody, Vector
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
+from flexmb.scene.bodies import ZERO, Body, RigidBody, Vector
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
 LARGEST_ASPECT = 12.0
-RIM_POINTS = 24
+THINNEST_WHEEL = 0.1  # width of a wheel over its radius, where its inertias would make it thinner
 
 
-def draw(scene: Scene) -> Drawing:
-    """Lines of every body and wheel that has a marker to carry it."""
+def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
+    """Lines of every body and wheel that has a marker to carry it; `trails` are the scene's markers if not given."""
     lines: list[Line] = []
+    wheels: list[DrawnWheel] = []
     for body in scene.bodies:
         markers = [marker for marker in scene.markers if marker.body == body.name]
         if not markers:
@@ -31,34 +35,51 @@ def draw(scene: Scene) -> Drawing:
             lines += _rigid(scene, body, markers[0])
         else:
             lines.append(_flexible(scene, body, markers))
-    return Drawing(lines=tuple(lines), trails=tuple(marker.name for marker in scene.markers))
+        for wheel in scene.wheels:
+            marker = next((each for each in markers if _turns_with(body, each, wheel)), None)
+            if wheel.body == body.name and marker is not None:
+                wheels.append(_wheel(body, wheel, marker))
+    names = tuple(marker.name for marker in scene.markers) if trails is None else tuple(trails)
+    return Drawing(lines=tuple(lines), trails=names, wheels=tuple(wheels), gravity=scene.gravity_m_s2)
 
 
 def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
-    """Box of equal inertia, arms from the mass centre to the hinges, wheels as circles."""
+    """Box of equal inertia, and arms from the mass centre to where the body is joined to others."""
     position, rotation = _pose(body, marker)
 
     def carried(point: Real) -> CarriedPoint:
         return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
     com = np.array(body.com_m)
-    lines = [Line(body=body.name, kind="box", points=tuple(map(carried, edge))) for edge in _box_edges(body)]
-    for joint in _hinge_points(scene, body):
+    lines = [Line(body=body.name, kind="solid", points=tuple(map(carried, _corners(body))))]
+    for joint in _joints(scene, body):
         lines.append(Line(body=body.name, kind="arm", points=(carried(com), carried(joint))))
-    for wheel in scene.wheels:
-        if wheel.body == body.name:
-            lines.append(Line(body=body.name, kind="wheel", points=tuple(map(carried, _rim(body, wheel)))))
     return lines
 
 
 def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
-    """Line through the body's markers by distance from its origin, starting at the inboard hinge if that is carried."""
-    placed = sorted(markers, key=lambda marker: float(np.linalg.norm(_pose(body, marker)[0])))
-    points = [CarriedPoint(marker.name, (0.0, 0.0, 0.0)) for marker in placed]
+    """Line through the body's nodes with markers, by distance from its origin, from its inboard hinge if that is
+    carried."""
+    nodes = {marker.node: marker for marker in reversed(markers)}
+    placed = sorted(nodes.values(), key=lambda marker: float(np.linalg.norm(_node_point(body, marker.node, ZERO))))
+    rest = np.array([_node_point(body, marker.node, ZERO) for marker in placed])
     root = _root_point(scene, body)
-    if root is not None and np.linalg.norm(_pose(body, placed[0])[0]) > 0.0:
-        points.insert(0, root)
-    return Line(body=body.name, kind="beam", points=tuple(points))
+    from_root = root is not None and float(np.linalg.norm(rest[0])) > 0.0
+    along = np.vstack([np.zeros(3), rest]) if from_root else rest
+    tangents = _directions(along)[-len(placed) :]
+    points = [
+        CarriedPoint(marker.name, _vector(-np.array(marker.offset_m)), _vector(_pose(body, marker)[1].inv().apply(way)))
+        for marker, way in zip(placed, tangents, strict=True)
+    ]
+    return Line(body=body.name, kind="beam", points=(*([root] if root and from_root else []), *points))
+
+
+def _directions(points: Real) -> Real:
+    """Unit vectors (n,3) along a line through points (n,3), at each from its neighbours; zero for a single point."""
+    if len(points) < 2:
+        return np.zeros_like(points)
+    ways = np.gradient(points, axis=0)
+    return ways / np.maximum(np.linalg.norm(ways, axis=1, keepdims=True), np.finfo(float).tiny)
 
 
 def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
@@ -75,8 +96,8 @@ def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
     return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
 
-def _box_edges(body: RigidBody) -> list[tuple[Real, Real]]:
-    """Twelve edges of the uniform box with the body's mass and principal inertias, in the body frame.
+def _corners(body: RigidBody) -> list[Real]:
+    """Corners of the uniform box with the body's mass and principal inertias, in the body frame.
 
     Sides from I_x = m (b^2 + c^2)/12 and so on: a^2 = 6 (I_y + I_z - I_x)/m. Sides are kept within `LARGEST_ASPECT` so
     that a body of no width is still seen.
@@ -86,33 +107,48 @@ def _box_edges(body: RigidBody) -> list[tuple[Real, Real]]:
     sides = np.sqrt(np.maximum(squares, 0.0))
     sides = np.maximum(sides, sides.max(initial=0.0) / LARGEST_ASPECT)
     signs = [np.array(each) * 2 - 1 for each in np.ndindex(2, 2, 2)]
-    corners = [np.array(body.com_m) + axes @ (0.5 * sides * sign) for sign in signs]
-    neighbours = [(i, j) for i in range(8) for j in range(i + 1, 8) if np.sum(signs[i] != signs[j]) == 1]
-    return [(corners[i], corners[j]) for i, j in neighbours]
+    return [np.array(body.com_m) + axes @ (0.5 * sides * sign) for sign in signs]
 
 
-def _hinge_points(scene: Scene, body: RigidBody) -> list[Real]:
-    """Hinge points of the body, in the body frame."""
+def _joints(scene: Scene, body: RigidBody) -> list[Real]:
+    """Points at which hinges and closures join the body to others, in the body frame."""
     points = []
     for hinge in scene.hinges:
         if hinge.child == body.name:
             points.append(_node_point(body, hinge.child_node, hinge.child_position_m))
         elif hinge.parent == body.name:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
+    for closure in scene.closures:
+        if closure.body_a == body.name:
+            points.append(_node_point(body, closure.node_a, closure.position_a_m))
+        elif closure.body_b == body.name:
+            points.append(_node_point(body, closure.node_b, closure.position_b_m))
     return points
 
 
-def _rim(body: RigidBody, wheel: Wheel) -> list[Real]:
-    """Closed circle of the disc with the wheel's mass and axial inertia, r^2 = 2 J/m, in the body frame."""
-    frame = node_frame(body, wheel.node)
-    turn = _rotation(frame.quaternion)
-    axis = turn.apply(np.array(wheel.axis) / np.linalg.norm(wheel.axis))
-    centre = _node_point(body, wheel.node, wheel.offset_m)
-    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    first *= np.sqrt(2.0 * wheel.axial_inertia_kg_m2 / wheel.mass_kg) / np.linalg.norm(first)
-    second = np.cross(axis, first)
-    angles = np.linspace(0.0, 2.0 * np.pi, RIM_POINTS + 1)
-    return [centre + np.cos(angle) * first + np.sin(angle) * second for angle in angles]
+def _turns_with(body: Body, marker: Marker, wheel: Wheel) -> bool:
+    """Whether a marker of the body has the motion that a wheel on the body rides on."""
+    return isinstance(body, RigidBody) or marker.node == wheel.node
+
+
+def _wheel(body: Body, wheel: Wheel, marker: Marker) -> DrawnWheel:
+    """The disc with the wheel's mass and inertias: r^2 = 2 J/m, and width^2 = 12 (J_t - J/2)/m."""
+    position, rotation = _pose(body, marker)
+    axis = _rotation(node_frame(body, wheel.node).quaternion).apply(np.array(wheel.axis) / np.linalg.norm(wheel.axis))
+    radius = float(np.sqrt(2.0 * wheel.axial_inertia_kg_m2 / wheel.mass_kg))
+    spin = None if wheel.prescribed_rad is None else profile(wheel.prescribed_rad)(0.0)
+    width = 12.0 * (wheel.transverse_inertia_kg_m2 - wheel.axial_inertia_kg_m2 / 2.0) / wheel.mass_kg
+    return DrawnWheel(
+        name=wheel.name,
+        marker=marker.name,
+        centre=_vector(rotation.inv().apply(_node_point(body, wheel.node, wheel.offset_m) - position)),
+        axis=_vector(rotation.inv().apply(axis)),
+        radius_m=radius,
+        width_m=max(float(np.sqrt(max(width, 0.0))), THINNEST_WHEEL * radius),
+        axial_inertia_kg_m2=wheel.axial_inertia_kg_m2,
+        speed_rad_s=wheel.speed_rad_s if spin is None else spin.rate,
+        angle_rad=wheel.angle_rad if spin is None else spin.value,
+    )
 
 
 def _node_point(body: Body, node: str, offset: Vector) -> Real:

@@ -16,8 +16,10 @@ from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
 from crosscheck.library.selection import alone, select
+from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
+from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
@@ -79,9 +81,12 @@ class Job:
 
 
 def plan(
-    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None
+    case: Case, asked: tuple[str, ...], provider: str, time_limit_s: float | None = None, films: bool = False
 ) -> tuple[CaseRecord, list[Job]]:
-    """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own."""
+    """The record of a case, reduced to the engines asked for, and its jobs; `time_limit_s` replaces the case's own.
+
+    With `films` every variant has a run more, from which its animation is made.
+    """
     run = (alone if case.alone else select)(case.run, asked)
     infos: dict[str, VariantInfo] = {}
     jobs: list[Job] = []
@@ -93,6 +98,11 @@ def plan(
             scene, error = _attempt(case, refine(variant, variant.refined), variant.refined)
             crossing = _engines_compared_across(run, variant)
             jobs += [_job(case, run, variant, REFINED, engine, scene, error, provider) for engine in crossing]
+        filmed = _film(case, run, variant, provider) if films else None
+        if filmed is not None:
+            job, drawing = filmed
+            jobs.append(job)
+            infos[variant.name] = msgspec.structs.replace(infos[variant.name], film=drawing)
     for control in run.controls:
         variant = run.variant(control.a.variant)
         scene, error = _attempt(case, variant, control=control)
@@ -199,6 +209,34 @@ def _job(
         kept=tuple(chart.observable for chart in run.charts),
         error=error,
     )
+
+
+def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Job, Drawing] | None:
+    """The run that the variant's animation is made from; None where it has to do with what is recorded anyway."""
+    if ENGINE not in variant.engines:
+        return None
+    if variant.transform == "modal_points":  # the beams themselves, in their own modes
+        variant = msgspec.structs.replace(variant, transform="none")
+    scene, _ = _attempt(case, variant)
+    made = None if scene is None else film(scene)
+    if made is None:
+        return None
+    filmed, drawing = made
+    times = np.linspace(0.0, variant.duration_s or run.duration_s, FRAMES)
+    return Job(
+        case=case.name,
+        variant=variant.name,
+        role=FILM,
+        engine=ENGINE,
+        scene=filmed,
+        scene_id=scene_identity(filmed, times),
+        times=times,
+        provider=provider,
+        efforts=_ladder(variant, ENGINE),
+        finest_only=True,
+        kept=film_channels(drawing),
+        lean=True,
+    ), drawing
 
 
 def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:

@@ -34,14 +34,15 @@ def sweep(
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run cases and append to the file `records`; what it already holds is confirmed, not run again, unless `fresh`.
+    """Run cases, with films for their report, and append to the file `records`.
 
-    What it holds counts where scene, effort and all that made it are the same (`made_by`). `asked` are the engines
+    What it already holds is confirmed and not run again, unless `fresh`: it counts where scene, effort and all that
+    made it are the same (`made_by`). `asked` are the engines
     (none: all). An engine that exceeds one of the `limits` on a scene is stopped; a case may have its own limit of
     time. `listener` hears every event, with the list of jobs. However this ends, by Ctrl-C or by an error of the
     scheduler, the records are whole, and the next call goes on from there.
     """
-    plans = [plan(case, asked, provider, limits.time_s) for case in cases]
+    plans = [plan(case, asked, provider, limits.time_s, films=True) for case in cases]
     run_planned(plans, asked, records, fresh=fresh, limits=limits, scheduler=scheduler, listener=listener)
 
 
@@ -55,7 +56,7 @@ def run_planned(
     scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> None:
-    """Run cases that are planned already, as `sweep` does: what is recorded is confirmed, the rest run and appended."""
+    """Run what is planned already, as `sweep` does; what is not planned, such as films, is not run."""
     if fresh:
         records.unlink(missing_ok=True)
     known = read(records) if records.exists() else []

@@ -25,9 +25,9 @@ from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import current_reference, has_reference
 from crosscheck.records.archive import read
-from crosscheck.running.plan import MAIN, sample_times, variant_scene
+from crosscheck.running.plan import MAIN, plan, sample_times, variant_scene
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import PROVIDER, sweep
+from crosscheck.running.sweep import PROVIDER, run_planned
 from crosscheck.verify.causes import likely_cause
 from crosscheck.verify.columns import Columns, VerifyError, read_columns, short_names
 from flexmb.run.channels import distance, signal_range
@@ -224,7 +224,7 @@ def _run(case: Case, variant: Variant, engine: str, provider: str) -> Result:
     )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        sweep((replace(case, run=run),), (), records, provider=provider, limits=Limits(workers=1))
+        run_planned([plan(replace(case, run=run), (), provider)], (), records, limits=Limits(workers=1))
         (results,) = collect(read(records)).cases
     result = results.get(variant.name, engine, MAIN)
     if result.status != "finished":

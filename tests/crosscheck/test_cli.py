@@ -33,11 +33,11 @@ def runner(monkeypatch: pytest.MonkeyPatch) -> CliRunner:
 def test_run_writes_everything_and_ends_with_zero(runner: CliRunner, tmp_path: Path) -> None:
     result = runner.invoke(cli.app, ["run", str(CASE), "--out", str(tmp_path)], env=WIDE)
     assert result.exit_code == 0, result.output
-    assert {"report.html", "verdicts.json", "summary.md", "junit.xml", "records.jsonl"} <= {
+    assert {"report", "report.html", "verdicts.json", "summary.md", "junit.xml", "records.jsonl"} <= {
         file.name for file in tmp_path.iterdir()
     }
     assert "All 15 verdicts are as expected" in result.output
-    assert f"Report: {tmp_path / 'report.html'}" in result.output
+    assert f"Report: {tmp_path / 'report' / 'index.html'}" in result.output
     again = runner.invoke(cli.app, ["report", str(tmp_path / "records.jsonl"), "--out", str(tmp_path / "b")], env=WIDE)
     assert again.exit_code == 0
     assert (tmp_path / "b" / "verdicts.json").read_bytes() == (tmp_path / "verdicts.json").read_bytes()
@@ -169,7 +169,8 @@ def test_a_run_reports_what_it_was_asked_for_and_report_shows_all(runner: CliRun
     for case in (folder, other):
         assert runner.invoke(cli.app, ["run", str(case), "--out", str(out)], env=WIDE).exit_code == 0
     assert "pendulum/single" not in (out / "summary.md").read_text(encoding="utf-8")
-    assert "pendulum/other; engines: all that the cases name" in (out / "report.html").read_text(encoding="utf-8")
+    index = (out / "report" / "index.html").read_text(encoding="utf-8")
+    assert "pendulum/other; engines: all that the cases name" in index
     assert runner.invoke(cli.app, ["report", str(out / "records.jsonl"), "--out", str(out)], env=WIDE).exit_code == 0
     summary = (out / "summary.md").read_text(encoding="utf-8")
     assert "pendulum/single" in summary and "pendulum/other" in summary

@@ -129,7 +129,7 @@ def test_a_broken_record_is_named_and_run_again(runner: CliRunner, tmp_path: Pat
     reported = runner.invoke(cli.app, ["report", str(file), "--out", str(tmp_path / "b")], env=WIDE)
     assert reported.exit_code == 1
     assert "line 5: not a record of this version" in reported.output
-    for name in ("report.html", "summary.md", "junit.xml"):
+    for name in ("report/index.html", "summary.md", "junit.xml"):
         assert "line 5" in (tmp_path / "b" / name).read_text(encoding="utf-8"), name
     again = runner.invoke(cli.app, run, env=WIDE)
     assert again.exit_code == 0, again.output

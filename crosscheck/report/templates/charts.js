@@ -1,13 +1,15 @@
 // Charts of the report: overlays with distances and uncertainties, drifts, work-precision. Data: see charts.py.
+// Curves have colours of middle lightness, which stand out from a white and from a dark page.
 "use strict";
-const COLOURS = { native: "#1b62a5", "native-frisch": "#4aa8e0", "native-frisch-as-printed": "#6b7785",
-  pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c98a00", "exudyn-beam": "#7a4fb5" };
+const COLOURS = { native: "#1d69b1", "native-frisch": "#2c9adb", "native-frisch-as-printed": "#6b7785",
+  pinocchio: "#d1495b", mujoco: "#2a9d6f", exudyn: "#c38600", "exudyn-beam": "#7c52b6" };
 const SHIPPED = Object.keys(COLOURS).length;
-const SPARE = ["#0f8b8d", "#a44a3f", "#5b6675", "#b5179e", "#3f6212"];
+const SPARE = ["#0f8b8d", "#a74b40", "#5d6877", "#b917a1", "#497215"];
 const SYMBOLS = ["circle", "square", "diamond", "triangle-up", "triangle-down", "cross", "star", "hexagon"];
 const DASHES = ["solid", "dash", "dot"];
-const PAIRS = ["#44546a", "#c2410c", "#6d28d9", "#0e7490", "#9d174d", "#4d7c0f", "#92400e", "#1e40af"];
-const CONFIG = { displayModeBar: false, responsive: true };
+const PAIRS = ["#556984", "#c2410c", "#7f42de", "#0e7490", "#c61d61", "#4d7c0f", "#aa4b10", "#345cdc"];
+const CONFIG = { displayModeBar: false, responsive: true, scrollZoom: false };
+const DRAG = matchMedia("(pointer: coarse)").matches ? false : "zoom"; // a finger on a chart scrolls the page
 
 function colour(name) {
   if (!(name in COLOURS)) COLOURS[name] = SPARE[(Object.keys(COLOURS).length - SHIPPED) % SPARE.length];
@@ -17,25 +19,14 @@ function colour(name) {
 // Plotly takes text for markup and for a template: names are written in character references.
 const plain = text => String(text).replace(/[&<>%${}]/g, c => "&#" + c.charCodeAt(0) + ";");
 
-function decode(series) {
-  if (!series.values) {
-    const bytes = Uint8Array.from(atob(series.data), c => c.charCodeAt(0));
-    series.values = new Float32Array(bytes.buffer);
-  }
-  return series.values;
-}
-
-function column(series, j) {
-  const values = decode(series), out = [];
-  for (let i = j; i < values.length; i += series.k) out.push(values[i]);
-  return out;
-}
+const column = (series, j) => Array.from(series[j]);
 
 function layout(extra) {
-  const axis = { gridcolor: "#e8ecf0", zerolinecolor: "#c9d0d8", linecolor: "#c9d0d8", ticks: "outside", tickcolor: "#c9d0d8" };
+  const line = tone("edge"), axis = { gridcolor: tone("line"), zerolinecolor: line, linecolor: line, ticks: "outside", tickcolor: line };
   const base = {
-    margin: { l: 64, r: 12, t: 8, b: 40 }, font: { family: "system-ui, sans-serif", size: 11.5, color: "#1c2430" },
-    paper_bgcolor: "#fff", plot_bgcolor: "#fff", hovermode: "x unified", legend: { orientation: "h", y: -0.16, yanchor: "top", font: { size: 11 } },
+    margin: { l: 64, r: 12, t: 8, b: 40 }, font: { family: "system-ui, sans-serif", size: 11.5, color: tone("ink") },
+    paper_bgcolor: tone("page"), plot_bgcolor: tone("page"), dragmode: DRAG,
+    hoverlabel: { bgcolor: tone("wash"), font: { color: tone("ink") } }, hovermode: "x unified", legend: { orientation: "h", y: -0.16, yanchor: "top", font: { size: 11 } },
   };
   for (const key of Object.keys(extra)) base[key] = /axis/.test(key) ? { ...axis, ...extra[key] } : extra[key];
   return base;
@@ -50,7 +41,6 @@ function sides(channel, series) {
     x: column(series[side.times], 0), y: column(series[side.values], j), type: "scatter", mode: "lines",
     name: plain(side.label), legendgroup: side.label, showlegend: j === 0, hovertemplate: "%{y:.6g}",
     line: { color: colour(side.engine + (side.label === side.engine ? "" : side.label)), width: 1.4 + 2.2 * (wide - 1 - i), dash: DASHES[j % 3] },
-    opacity: i === wide - 1 ? 1 : 0.55,
   })));
   return traces;
 }
@@ -89,8 +79,8 @@ function drawDrift(node, drift, series) {
   }));
   Plotly.react(node, traces, layout({
     xaxis: { title: { text: "time, s", standoff: 4 } }, yaxis: { type: "log", exponentformat: "power", title: { text: "relative drift" } },
-    shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: drift.limit, y1: drift.limit, line: { color: "#b3261e", width: 1, dash: "dash" } }],
-    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(drift.limit), yanchor: "bottom", showarrow: false, text: "limit", font: { color: "#b3261e", size: 10.5 } }],
+    shapes: [{ type: "line", xref: "paper", x0: 0, x1: 1, y0: drift.limit, y1: drift.limit, line: { color: tone("bad"), width: 1, dash: "dash" } }],
+    annotations: [{ xref: "paper", x: 1, xanchor: "right", y: Math.log10(drift.limit), yanchor: "bottom", showarrow: false, text: "limit", font: { color: tone("bad"), size: 10.5 } }],
     legend: { orientation: "h", y: -0.24, yanchor: "top" },
   }), CONFIG);
 }
@@ -118,17 +108,17 @@ function drawWork(node, work) {
   }
   const front = work.points.filter(p => p.best && p.error > 0);
   traces.unshift({ x: front.map(wall), y: front.map(p => p.error), name: "Pareto front", type: "scatter", mode: "lines",
-    line: { color: "#c3cad3", width: 7, shape: "hv" }, hoverinfo: "skip" });
+    line: { color: tone("edge"), width: 7, shape: "hv" }, hoverinfo: "skip" });
   Plotly.react(node, traces, layout({
     hovermode: "closest", margin: { l: 70, r: 12, t: 26, b: 44 },
     xaxis: { type: "log", title: { text: "wall time of the solve, s (compile time apart)", standoff: 4 }, exponentformat: "power" },
     yaxis: { type: "log", title: { text: "error of " + plain(work.observable) + ", relative to " + work.scale.toPrecision(3) + " " + work.unit }, exponentformat: "power",
       range: [low, Math.log10(margin) + 0.4], dtick: Math.ceil((Math.log10(margin) - low) / 12) },
-    shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: "#eef1f4", line: { width: 0 }, layer: "below" }],
+    shapes: [{ type: "rect", xref: "paper", x0: 0, x1: 1, y0: 1e-18, y1: work.doubt, fillcolor: tone("wash"), line: { width: 0 }, layer: "below" }],
     annotations: [
-      { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: "#5b6675" },
+      { xref: "paper", x: 0.01, xanchor: "left", y: Math.log10(work.doubt), yanchor: "top", showarrow: false, font: { size: 10.5, color: tone("soft") },
         text: "below the reference's own uncertainty (" + plain(work.reference) + ")" },
-      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: "#5b6675" }, text: "× at the top: failed runs" }],
+      { xref: "paper", x: 0, xanchor: "left", yref: "paper", y: 1.06, showarrow: false, font: { size: 10.5, color: tone("soft") }, text: "× at the top: failed runs" }],
     legend: { orientation: "h", y: -0.19, yanchor: "top", font: { size: 11 } },
   }), CONFIG);
 }

@@ -1,74 +1,85 @@
-// The page: tables that open, reasons on request, charts drawn when they come into view.
+// A case's page: charts and animation are made when they come into view, what an address names is opened.
 "use strict";
-const DATA = JSON.parse(document.getElementById("data").textContent);
 const pending = new Map();
 const seen = new IntersectionObserver(entries => entries.forEach(entry => {
-  if (!entry.isIntersecting) return;
-  seen.unobserve(entry.target);
-  pending.get(entry.target)();
-}), { rootMargin: "400px" });
+  if (!entry.isIntersecting || !pending.has(entry.target)) return;
+  const make = pending.get(entry.target);
+  pending.delete(entry.target); seen.unobserve(entry.target);
+  make().catch(error => { entry.target.textContent = "Nothing can be drawn here: " + error.message; console.error(error); });
+}), { rootMargin: "300px" });
 
-function later(node, draw) { pending.set(node, draw); seen.observe(node); }
+function later(node, make) { pending.set(node, make); seen.observe(node); }
 
-function chart(host, title, choices, draw, first = 0) {
+// A chart in a box, with a choice of what it shows where there are several; `words` describe a choice.
+function chart(host, id, title, choices, draw, words, first = 0) {
   const box = document.createElement("div"); box.className = "chart";
-  box.innerHTML = '<div class="head"><span></span></div><div class="plot"></div>';
-  box.querySelector("span").textContent = title;
+  box.innerHTML = '<div class="head"><span></span></div><div class="plot" role="img"></div>';
+  box.querySelector("span").textContent = title + (choices.length === 1 && choices[0] ? ": " + choices[0] : "");
   const plot = box.querySelector(".plot");
   let chosen = first;
+  const redraw = async () => {
+    await library("Plotly", "plotly-basic.min.js");
+    plot.setAttribute("aria-label", words(chosen));
+    draw(plot, chosen, await seriesOf(id));
+    plot.classList.add("drawn");
+  };
   if (choices.length > 1) {
     const select = document.createElement("select");
+    select.setAttribute("aria-label", "channel shown in " + title);
     choices.forEach((name, i) => select.add(new Option(name, i)));
     select.value = first;
-    select.onchange = () => { chosen = Number(select.value); draw(plot, chosen); };
+    select.onchange = () => { chosen = Number(select.value); redraw(); };
     box.querySelector(".head").append(select);
-  } else box.querySelector("span").textContent = title + (choices[0] ? ": " + choices[0] : "");
-  host.append(box);
-  later(plot, () => draw(plot, chosen));
-}
-
-document.querySelectorAll(".panels").forEach(host => {
-  for (const panel of DATA.cases[host.dataset.case].panels)
-    if (panel.comparison === host.dataset.comparison)
-      chart(host, panel.title, panel.channels.map(c => c.name), (node, i) => drawChannel(node, panel.channels[i], DATA.series), panel.first);
-});
-document.querySelectorAll(".drifts").forEach(host => {
-  for (const drift of DATA.cases[host.dataset.case].drifts) chart(host, drift.title, [""], node => drawDrift(node, drift, DATA.series));
-});
-document.querySelectorAll(".work").forEach(host => {
-  const charts = DATA.cases[host.dataset.case].work;
-  for (const work of charts) chart(host, work.title, [""], node => drawWork(node, work));
-  if (!charts.length) host.textContent = "No chart: its reference did not finish, or the case declares none.";
-});
-document.querySelectorAll(".animation").forEach(host => {
-  const animations = DATA.cases[host.dataset.case].animations;
-  if (animations.length) new SceneView(host, animations, DATA.series);
-});
-
-document.querySelectorAll(".verdicts tr.parent").forEach(row => {
-  const level = Number(row.className.match(/level-(\d)/)[1]), button = row.querySelector("button");
-  button.onclick = () => {
-    const open = button.getAttribute("aria-expanded") !== "true";
-    button.setAttribute("aria-expanded", open); button.textContent = open ? "▾" : "▸";
-    for (let next = row.nextElementSibling; next && (next.classList.contains("reason") || Number(next.className.match(/level-(\d)/)[1]) > level); next = next.nextElementSibling)
-      next.hidden = !open;
-  };
-});
-
-function reasons(cell) {
-  const row = cell.parentElement, next = row.nextElementSibling;
-  if (next && next.classList.contains("reason")) {
-    const same = next.dataset.column === String(cell.cellIndex);
-    next.remove();
-    if (same) return;
   }
-  const line = document.createElement("tr"); line.className = "reason"; line.dataset.column = cell.cellIndex;
-  line.innerHTML = "<th></th><td></td>";
-  line.querySelector("td").colSpan = row.cells.length - 1;
-  line.querySelector("td").textContent = cell.dataset.reasons;
-  row.after(line);
+  host.append(box);
+  later(plot, redraw);
+  dark.addEventListener("change", () => { if (plot.classList.contains("drawn")) redraw(); });
 }
-document.querySelectorAll(".verdicts td[tabindex]").forEach(cell => {
-  cell.onclick = () => reasons(cell);
-  cell.onkeydown = e => { if (e.key === "Enter" || e.key === " ") { e.preventDefault(); reasons(cell); } };
+
+const listed = names => [...new Set(names)].join(", ");
+
+function fill(section) {
+  const id = section.dataset.case, data = crosscheck.cases.get(id), title = section.querySelector(".title").childNodes[1].textContent.trim();
+  section.querySelectorAll(".panels").forEach(host => {
+    for (const panel of data.panels) if (panel.comparison === host.dataset.comparison) {
+      const about = i => `Chart: ${panel.channels[i].name} over time, by ${listed(panel.channels[i].sides.map(s => s.label))}, with distances and uncertainties`;
+      chart(host, id, panel.title, panel.channels.map(c => c.name), (node, i, series) => drawChannel(node, panel.channels[i], series), about, panel.first);
+    }
+  });
+  section.querySelectorAll(".drifts").forEach(host => {
+    for (const drift of data.drifts) {
+      const about = () => `Chart: drift of ${drift.title} over time, by ${listed(drift.curves.map(c => c.engine))}`;
+      chart(host, id, drift.title, [""], (node, i, series) => drawDrift(node, drift, series), about);
+    }
+  });
+  section.querySelectorAll(".work").forEach(host => {
+    for (const work of data.work) {
+      const about = () => `Chart: error of ${work.observable} against wall time, by ${listed(work.points.map(p => p.engine))}`;
+      chart(host, id, work.title, [""], node => drawWork(node, work), about);
+    }
+    if (!data.work.length) host.textContent = "No chart: its reference did not finish, or the case declares none.";
+  });
+  section.querySelectorAll(".animation").forEach(host => {
+    if (data.animations.length) later(host, async () => {
+      await library("THREE", "three.iife.min.js");
+      host.view = new SceneView(host, data.animations, await seriesOf(id), title);
+    });
+    else host.remove();
+  });
+}
+
+// What stands in closed details is opened for whoever is sent there.
+function reveal() {
+  const target = location.hash && document.getElementById(decodeURIComponent(location.hash.slice(1)));
+  if (!target) return;
+  for (let node = target; node; node = node.parentElement) if (node.tagName === "DETAILS") node.open = true;
+  const next = target.tagName === "H3" && target.nextElementSibling;
+  if (next && next.tagName === "DETAILS") next.open = true;
+  target.scrollIntoView();
+}
+
+document.addEventListener("DOMContentLoaded", () => {
+  document.querySelectorAll("section.case").forEach(fill);
+  addEventListener("hashchange", reveal);
+  reveal();
 });

@@ -1,120 +1,344 @@
-// Animation of a scene: lines between points carried by markers, in a parallel projection that the mouse turns.
+// Animation of a scene by three.js: solids, arms, wheels and bent beams that markers carry. Data: see animation.py.
 "use strict";
-const STYLES = { box: ["#7d8fa3", 1.1], arm: ["#1c2430", 2.2], wheel: ["#c98a00", 2], beam: ["#1b62a5", 3] };
-const LOOP_S = 8, TRAIL = 60;
+const TRAIL = 60, RING = 8, FINER = 8; // frames of a trail; sides of a tube; pieces between two nodes of a beam
+const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many bodies wide is followed by the camera
+const VIEW_DEG = 32;
+const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
+const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
+const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
+
+// One WebGL context draws for all views, whose canvases get copies: browsers allow few contexts on a page.
+let stage = null;
+function render(scene, camera, canvas) {
+  stage = stage || new THREE.WebGLRenderer({ alpha: true, antialias: true });
+  stage.setSize(canvas.width, canvas.height, false);
+  stage.render(scene, camera);
+  const paper = canvas.getContext("2d");
+  paper.clearRect(0, 0, canvas.width, canvas.height);
+  paper.drawImage(stage.domElement, 0, 0);
+}
 
 class SceneView {
-  constructor(host, animations, series) {
-    this.series = series; this.animations = animations; this.yaw = -0.6; this.pitch = 0.35; this.phase = 0; this.playing = false;
-    host.innerHTML = '<canvas width="840" height="630"></canvas><div class="controls"><button type="button" class="play" aria-label="play or pause">▶</button>' +
-      '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div><div class="controls"></div>';
-    this.canvas = host.querySelector("canvas"); this.context = this.canvas.getContext("2d");
+  constructor(host, animations, series, title) {
+    this.series = series; this.animations = animations; this.phase = 0; this.playing = false;
+    host.innerHTML = '<canvas tabindex="0" role="img"></canvas><div class="controls"><button type="button" class="play" aria-label="play"><svg viewBox="0 0 16 16" aria-hidden="true"><path></path></svg></button>' +
+      '<input type="range" min="0" max="1" step="0.001" value="0" aria-label="time"><span class="clock"></span></div>' +
+      '<div class="controls"></div><ul class="bodies" aria-label="bodies"></ul>' +
+      '<p class="hint">Select the picture to turn it (drag, or shift and arrows) and to zoom (wheel, or + and -); space plays, arrows step.</p>';
+    const first = Math.max(0, animations.findIndex(a => a.lines.some(line => line.kind === "beam"))); // something that bends
+    this.canvas = host.querySelector("canvas"); this.title = title; this.names = host.querySelector(".bodies");
     this.slider = host.querySelector("input"); this.clock = host.querySelector(".clock"); this.button = host.querySelector("button");
-    this.button.onclick = () => { this.wanted = !this.playing; this.play(this.wanted); };
+    this.button.onclick = () => this.toggle();
     this.slider.oninput = () => { this.phase = Number(this.slider.value); this.draw(); };
-    const chooser = document.createElement("select");
-    animations.forEach((animation, i) => chooser.add(new Option(animation.title, i)));
-    chooser.onchange = () => this.load(Number(chooser.value));
-    host.querySelectorAll(".controls")[1].append(chooser);
-    this.listen(); this.load(0);
+    if (animations.length > 1) {
+      const chooser = document.createElement("select");
+      chooser.setAttribute("aria-label", "variant shown");
+      animations.forEach((animation, i) => chooser.add(new Option(animation.title, i)));
+      chooser.value = first;
+      chooser.onchange = () => this.load(Number(chooser.value));
+      host.querySelectorAll(".controls")[1].append(chooser);
+    } else host.querySelectorAll(".controls")[1].textContent = animations[0].title;
+    this.canvas.onkeydown = event => this.key(event);
+    this.canvas.onfocus = () => this.hold(true);
+    this.canvas.onblur = () => this.hold(false);
+    this.sign(); this.load(first);
+    new ResizeObserver(() => { this.fitCanvas(); this.draw(); }).observe(this.canvas);
+    dark.addEventListener("change", () => this.load(this.number));
     // It plays while it is seen, unless the reader stopped it or asks for less motion.
-    this.wanted = !matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.wanted = !calm.matches;
     new IntersectionObserver(([entry]) => this.play(this.wanted && entry.isIntersecting)).observe(this.canvas);
   }
 
+  toggle() { this.wanted = !this.playing; this.play(this.wanted); }
+
   play(on) {
     if (on === this.playing) return;
-    this.playing = on; this.last = null; this.button.textContent = on ? "❚❚" : "▶";
+    this.playing = on; this.last = null; this.sign();
     if (on) requestAnimationFrame(t => this.tick(t));
   }
 
-  listen() {
-    let grip = null;
-    this.canvas.onpointerdown = e => { grip = [e.clientX, e.clientY]; this.canvas.setPointerCapture(e.pointerId); };
-    this.canvas.onpointerup = () => { grip = null; };
-    this.canvas.onpointermove = e => {
-      if (!grip) return;
-      this.yaw += (e.clientX - grip[0]) * 0.01;
-      this.pitch = Math.max(-1.57, Math.min(1.57, this.pitch + (e.clientY - grip[1]) * 0.01));
-      grip = [e.clientX, e.clientY]; this.draw();
-    };
+  // The button offers what it would do.
+  sign() {
+    const offer = this.playing ? "pause" : "play";
+    this.button.setAttribute("aria-label", offer);
+    this.button.querySelector("path").setAttribute("d", SIGNS[offer]);
   }
 
-  load(i) {
-    const a = this.scene = this.animations[i];
-    this.times = decode(this.series[a.times]);
-    this.paths = a.markers.map(m => [decode(this.series[m.position]), decode(this.series[m.orientation])]);
-    this.frames = this.times.length;
-    let low = [0, 0, 0], high = [0, 0, 0];
-    for (let f = 0; f < this.frames; f += Math.max(1, Math.floor(this.frames / 40)))
-      for (const line of a.lines) for (const point of line.points) {
-        const p = this.place(point, f);
-        for (let k = 0; k < 3; k++) { low[k] = Math.min(low[k], p[k]); high[k] = Math.max(high[k], p[k]); }
-      }
-    this.centre = low.map((v, k) => (v + high[k]) / 2);
-    this.reach = Math.max(1e-9, Math.hypot(...high.map((v, k) => v - low[k])) / 2);
+  // Wheel and finger belong to the page until the picture is selected.
+  hold(on) {
+    this.controls.enableZoom = on;
+    this.canvas.style.touchAction = on ? "none" : "pan-y";
+  }
+
+  key(event) {
+    const step = { ArrowLeft: -1, ArrowRight: 1, ArrowUp: 1, ArrowDown: -1 }[event.key];
+    if (event.key === " ") this.toggle();
+    else if (event.key === "+" || event.key === "-") this.camera.position.sub(this.controls.target).multiplyScalar(event.key === "+" ? 0.9 : 1.11).add(this.controls.target);
+    else if (step && event.shiftKey) this.turn(step, event.key.endsWith("Up") || event.key.endsWith("Down"));
+    else if (step) this.phase = Math.min(1, Math.max(0, this.phase + step / Math.max(1, this.frames - 1)));
+    else return;
+    event.preventDefault(); this.controls.update(); this.draw();
+  }
+
+  turn(step, tilt) {
+    const offset = this.camera.position.clone().sub(this.controls.target);
+    const axis = tilt ? this.camera.up.clone().cross(offset).normalize() : this.camera.up;
+    this.camera.position.copy(this.controls.target).add(offset.applyAxisAngle(axis, (tilt ? -0.1 : 0.1) * step));
+  }
+
+  fitCanvas() {
+    const ratio = Math.min(2, devicePixelRatio || 1), { clientWidth, clientHeight } = this.canvas;
+    this.canvas.width = Math.max(1, Math.round(clientWidth * ratio)); this.canvas.height = Math.max(1, Math.round(clientHeight * ratio));
+    this.camera.aspect = this.canvas.width / this.canvas.height; this.camera.updateProjectionMatrix();
+  }
+
+  load(number) {
+    const a = this.animations[number];
+    this.number = number; this.shown = a;
+    this.times = this.series[a.times][0]; this.frames = this.times.length;
+    this.paths = a.markers.map(m => [this.series[m.position], this.series[m.orientation]]);
+    this.loop = Math.min(LONGEST_LOOP_S, Math.max(SHORTEST_LOOP_S, this.times[this.frames - 1]));
+    this.canvas.setAttribute("aria-label", `Animation of ${this.title}: ${a.title}, ${this.frames} frames to ${this.times[this.frames - 1].toPrecision(3)} s`);
+    this.measure();
+    this.build();
+    this.aim();
     this.draw();
   }
 
-  // Position of a carried point at a whole frame: marker position + R(quaternion) offset.
-  place([m, x, y, z], f) {
-    if (m < 0) return [x, y, z];
-    const [p, q] = this.paths[m], w = q[4 * f], a = q[4 * f + 1], b = q[4 * f + 2], c = q[4 * f + 3];
-    const u = 2 * (b * z - c * y), v = 2 * (c * x - a * z), t = 2 * (a * y - b * x);
-    return [p[3 * f] + x + w * u + b * t - c * v, p[3 * f + 1] + y + w * v + c * u - a * t, p[3 * f + 2] + z + w * t + a * v - b * u];
+  // Position and orientation [w, x, y, z] of a marker between frames; -1 is the World.
+  pose(m, s) {
+    if (m < 0) return [[0, 0, 0], [1, 0, 0, 0]];
+    const f = Math.min(Math.floor(s), this.frames - 1), g = Math.min(f + 1, this.frames - 1), r = s - f, [p, q] = this.paths[m];
+    const sign = q.reduce((sum, c) => sum + c[f] * c[g], 0) < 0 ? -1 : 1;
+    const turned = q.map(c => c[f] + r * (sign * c[g] - c[f])), size = Math.hypot(...turned) || 1;
+    return [p.map(c => c[f] + r * (c[g] - c[f])), turned.map(v => v / size)];
   }
 
-  between(point, s) {
-    const f = Math.min(Math.floor(s), this.frames - 1), g = Math.min(f + 1, this.frames - 1), r = s - f;
-    const a = this.place(point, f), b = this.place(point, g);
-    return a.map((v, k) => v + r * (b[k] - v));
+  // A carried point and its tangent in World axes.
+  place([m, x, y, z, tx = 0, ty = 0, tz = 0], s) {
+    const [p, q] = this.pose(m, s), at = rotated(q, x, y, z);
+    return [at.map((v, k) => v + p[k]), rotated(q, tx, ty, tz)];
   }
 
-  project(p) {
-    const [x, y, z] = p.map((v, k) => v - this.centre[k]), cy = Math.cos(this.yaw), sy = Math.sin(this.yaw);
-    const right = cy * x - sy * z, away = sy * x + cy * z, up = Math.cos(this.pitch) * y - Math.sin(this.pitch) * away;
-    const scale = 0.46 * Math.min(this.canvas.width, this.canvas.height) / this.reach;
-    return [this.canvas.width / 2 + scale * right, this.canvas.height / 2 - scale * up];
+  // The points that the scene covers at a frame.
+  *points(s) {
+    for (const line of this.shown.lines) for (const point of line.points) yield this.place(point, s)[0];
+    for (const wheel of this.shown.wheels) yield this.place([wheel.marker, ...wheel.centre], s)[0];
   }
 
-  stroke(points, style, width) {
-    const c = this.context; c.strokeStyle = style; c.lineWidth = width * 1.6; c.lineJoin = c.lineCap = "round"; c.beginPath();
-    points.map(p => this.project(p)).forEach(([x, y], i) => (i ? c.lineTo(x, y) : c.moveTo(x, y)));
-    c.stroke();
+  // Middle and reach of the whole motion, or of the bodies alone where they go far.
+  measure() {
+    const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], step = Math.max(1, Math.floor(this.frames / 60));
+    this.size = 1e-9;
+    for (let f = 0; f < this.frames; f += step) {
+      const found = [...this.points(f)].filter(p => p.every(Number.isFinite)), middle = mean(found);
+      for (const p of found) {
+        p.forEach((v, k) => { low[k] = Math.min(low[k], v); high[k] = Math.max(high[k], v); });
+        this.size = Math.max(this.size, Math.hypot(...p.map((v, k) => v - middle[k])));
+      }
+    }
+    this.extents = low.map((v, k) => Math.max(0, high[k] - v) || 0);
+    this.middle = low.map((v, k) => (v + high[k]) / 2 || 0);
+    this.reach = 1e-9;
+    for (let f = 0; f < this.frames; f += step)
+      for (const p of this.points(f)) this.reach = Math.max(this.reach, Math.hypot(...p.map((v, k) => v - this.middle[k])) || 0);
+    this.following = this.reach > FAR * this.size;
+    if (this.following) this.reach = this.size;
   }
 
-  axes() {
-    const size = 0.22 * this.reach, names = ["x", "y", "z"], tones = ["#c62828", "#2e7d32", "#1565c0"];
-    names.forEach((name, k) => {
-      const tip = [0, 0, 0]; tip[k] = size;
-      this.stroke([[0, 0, 0], tip], tones[k], 1);
-      const [x, y] = this.project(tip); this.context.fillStyle = tones[k]; this.context.font = "20px system-ui"; this.context.fillText(name, x + 5, y - 5);
+  aim() {
+    const { extents, shown } = this, widest = Math.max(...extents), flat = extents.indexOf(Math.min(...extents));
+    const heavy = Math.hypot(...shown.gravity) > 0, up = heavy ? shown.gravity.map(v => -v / Math.hypot(...shown.gravity)) : flat === 2 ? [0, 1, 0] : [0, 0, 1];
+    const planar = extents[flat] < 0.15 * widest && Math.abs(up[flat]) < 0.5;
+    const way = [0.75, -1, 0.55];
+    if (planar) { way.fill(0.28); way[flat] = flat === 1 ? -1 : 1; }
+    else if (Math.abs(up[1]) > 0.5) [way[1], way[2]] = [0.55, 1];
+    this.camera = new THREE.PerspectiveCamera(VIEW_DEG, 4 / 3, this.reach / 50, this.reach * 200);
+    this.camera.up.set(...up);
+    this.fitCanvas();
+    const direction = new THREE.Vector3(...way).normalize();
+    this.target = this.following ? mean([...this.points(0)]) : this.middle;
+    this.camera.position.set(...this.target).addScaledVector(direction, this.distance(direction));
+    this.controls?.dispose();
+    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
+    this.controls.target.set(...this.target);
+    this.controls.addEventListener("change", () => this.draw());
+    this.controls.update();
+    this.hold(document.activeElement === this.canvas);
+  }
+
+  // How far the camera must stand in a direction to have every point of the motion in the picture.
+  distance(direction) {
+    const right = this.camera.up.clone().cross(direction).normalize(), above = direction.clone().cross(right);
+    const slope = Math.tan(this.camera.fov / 2 * Math.PI / 180), step = Math.max(1, Math.floor(this.frames / 60)), offset = new THREE.Vector3();
+    let least = 1.5 * this.reach;
+    for (let f = 0; f < this.frames; f += step) {
+      const found = [...this.points(f)].filter(p => p.every(Number.isFinite)), middle = this.following ? mean(found) : this.middle;
+      for (const p of found) {
+        offset.set(...p.map((v, k) => v - middle[k]));
+        const aside = Math.max(Math.abs(offset.dot(right)) / this.camera.aspect, Math.abs(offset.dot(above)));
+        least = Math.max(least, offset.dot(direction) + aside / (0.88 * slope));
+      }
+    }
+    return least;
+  }
+
+  build() {
+    this.world = new THREE.Scene();
+    this.world.add(new THREE.AmbientLight(0xffffff, 1.6));
+    const sun = new THREE.DirectionalLight(0xffffff, 1.8); sun.position.set(0.4, -0.7, 1); this.world.add(sun);
+    const thin = 0.008 * this.reach, bodies = [...new Set(this.shown.lines.map(line => line.body))], colour = new Map(bodies.map((b, i) => [b, BODIES[i % BODIES.length]]));
+    this.carriers = new Map(); this.tubes = []; this.spinning = [];
+    for (const line of this.shown.lines) {
+      const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body), side: THREE.DoubleSide });
+      if (line.kind === "solid") this.carrier(line.points[0][0]).add(...solid(line.points.map(p => p.slice(1, 4)), material));
+      else this.tubes.push(new Tube(this.world, line, line.kind === "beam" ? 1.8 * thin : thin, material));
+    }
+    for (const wheel of this.shown.wheels) {
+      const disc = wheelMesh(wheel, thin); this.carrier(wheel.marker).add(disc);
+      this.spinning.push([disc, wheel, this.series[wheel.angle][0]]);
+    }
+    AXES.forEach((tone, k) => {
+      const tip = [0, 0, 0]; tip[k] = 0.2 * this.reach;
+      this.world.add(new THREE.Line(lineGeometry([[0, 0, 0], tip]), new THREE.LineBasicMaterial({ color: tone })));
     });
+    this.trails = this.shown.trails.map(m => {
+      const geometry = new THREE.BufferGeometry(), line = new THREE.Line(geometry, new THREE.LineBasicMaterial({ color: TRAIL_TONE }));
+      geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * (TRAIL + 2)), 3)); line.frustumCulled = false;
+      this.world.add(line);
+      return [m, geometry];
+    });
+    const names = [...bodies.map(b => [b, colour.get(b)]), ...this.shown.wheels.map(w => [w.name, WHEEL])];
+    this.names.replaceChildren(...names.map(([name, tone]) => {
+      const item = document.createElement("li"), chip = document.createElement("i");
+      chip.style.background = tone; item.append(chip, name);
+      return item;
+    }));
+  }
+
+  // What one marker carries without bending; -1 is the World.
+  carrier(m) {
+    if (!this.carriers.has(m)) { const group = new THREE.Group(); this.carriers.set(m, group); this.world.add(group); }
+    return this.carriers.get(m);
   }
 
   draw() {
     const s = this.phase * (this.frames - 1), whole = Math.floor(s);
-    this.context.clearRect(0, 0, this.canvas.width, this.canvas.height);
-    this.axes();
-    for (const m of this.scene.trails) {
-      const trail = [];
-      for (let f = Math.max(0, whole - TRAIL); f <= whole; f++) trail.push(this.place([m, 0, 0, 0], f));
-      trail.push(this.between([m, 0, 0, 0], s));
-      this.stroke(trail, "rgba(209, 73, 91, 0.35)", 1);
+    for (const [m, group] of this.carriers) {
+      const [p, [w, x, y, z]] = this.pose(m, s);
+      group.position.set(...p); group.quaternion.set(x, y, z, w);
     }
-    for (const line of this.scene.lines) this.stroke(line.points.map(p => this.between(p, s)), ...STYLES[line.kind]);
-    for (const m of this.scene.trails) {
-      const [x, y] = this.project(this.between([m, 0, 0, 0], s)); this.context.fillStyle = "#d1495b";
-      this.context.beginPath(); this.context.arc(x, y, 5, 0, 7); this.context.fill();
+    for (const tube of this.tubes) tube.bend(tube.line.points.map(point => this.place(point, s)));
+    const g = Math.min(whole + 1, this.frames - 1);
+    for (const [disc, , angle] of this.spinning) disc.children[0].rotation.y = angle[whole] + (s - whole) * (angle[g] - angle[whole]);
+    for (const [m, geometry] of this.trails) {
+      const first = Math.max(0, whole - TRAIL), points = geometry.attributes.position;
+      for (let f = first; f <= whole; f++) points.setXYZ(f - first, ...this.pose(m, f)[0]);
+      points.setXYZ(whole + 1 - first, ...this.pose(m, s)[0]);
+      points.needsUpdate = true; geometry.setDrawRange(0, whole + 2 - first);
     }
+    if (this.following) {
+      const now = mean([...this.points(s)]), moved = new THREE.Vector3(...now).sub(new THREE.Vector3(...this.target));
+      this.camera.position.add(moved); this.controls.target.add(moved); this.target = now; this.camera.updateMatrixWorld();
+    }
+    render(this.world, this.camera, this.canvas);
     this.slider.value = this.phase;
-    const f = Math.min(whole, this.frames - 1), g = Math.min(f + 1, this.frames - 1);
-    this.clock.textContent = (this.times[f] + (s - f) * (this.times[g] - this.times[f])).toFixed(2) + " s";
+    this.clock.textContent = (this.times[whole] + (s - whole) * (this.times[g] - this.times[whole])).toFixed(2) + " s";
   }
 
   tick(now) {
     if (!this.playing) return;
-    if (this.last !== null) this.phase = (this.phase + (now - this.last) / 1000 / LOOP_S) % 1;
+    if (this.last !== null) this.phase = (this.phase + (now - this.last) / 1000 / this.loop) % 1;
     this.last = now; this.draw(); requestAnimationFrame(t => this.tick(t));
   }
+}
+
+const WHEEL = "#8a7fd0";
+
+function mean(points) {
+  const sum = points.reduce((total, p) => total.map((v, k) => v + p[k]), [0, 0, 0]);
+  return sum.map(v => v / Math.max(1, points.length));
+}
+
+function rotated([w, a, b, c], x, y, z) {
+  const u = 2 * (b * z - c * y), v = 2 * (c * x - a * z), t = 2 * (a * y - b * x);
+  return [x + w * u + b * t - c * v, y + w * v + c * u - a * t, z + w * t + a * v - b * u];
+}
+
+function lineGeometry(points) {
+  const geometry = new THREE.BufferGeometry();
+  geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(points.flat()), 3));
+  return geometry;
+}
+
+// A box by its corners, translucent so that wheels inside are seen, with its edges.
+function solid(corners, material) {
+  const geometry = lineGeometry(corners);
+  geometry.setIndex([0, 1, 3, 0, 3, 2, 4, 6, 7, 4, 7, 5, 0, 4, 5, 0, 5, 1, 2, 3, 7, 2, 7, 6, 0, 2, 6, 0, 6, 4, 1, 5, 7, 1, 7, 3]);
+  const faces = geometry.toNonIndexed(); faces.computeVertexNormals();
+  material.transparent = true; material.opacity = 0.55; material.depthWrite = false;
+  return [new THREE.Mesh(faces, material), new THREE.LineSegments(new THREE.EdgesGeometry(faces), new THREE.LineBasicMaterial({ color: tone("soft") }))];
+}
+
+// A disc about its axis with a spoke on either face, so that its turning is seen.
+function wheelMesh(wheel, thin) {
+  const outer = new THREE.Group(), turning = new THREE.Group(), radius = Math.max(wheel.radius, 3 * thin), width = Math.max(wheel.width, thin);
+  turning.add(new THREE.Mesh(new THREE.CylinderGeometry(radius, radius, width, 32), new THREE.MeshLambertMaterial({ color: WHEEL })));
+  turning.add(new THREE.Mesh(new THREE.BoxGeometry(2 * radius, 1.15 * width, 0.16 * radius), new THREE.MeshLambertMaterial({ color: TRAIL_TONE })));
+  outer.add(turning);
+  outer.position.set(...wheel.centre);
+  outer.quaternion.setFromUnitVectors(new THREE.Vector3(0, 1, 0), new THREE.Vector3(...wheel.axis).normalize());
+  return outer;
+}
+
+// A tube through points whose tangents bend it (cubic Hermite; where a tangent is not known, as straight as may be).
+class Tube {
+  constructor(world, line, radius, material) {
+    this.line = line; this.radius = radius; this.curved = line.kind === "beam";
+    this.rings = (line.points.length - 1) * (this.curved ? FINER : 1) + 1;
+    this.geometry = new THREE.BufferGeometry();
+    this.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * RING * this.rings), 3));
+    this.geometry.setAttribute("normal", new THREE.BufferAttribute(new Float32Array(3 * RING * this.rings), 3));
+    const faces = [];
+    for (let i = 0; i + 1 < this.rings; i++) for (let j = 0; j < RING; j++) {
+      const a = i * RING + j, b = i * RING + (j + 1) % RING;
+      faces.push(a, b, a + RING, b, b + RING, a + RING);
+    }
+    this.geometry.setIndex(faces);
+    const mesh = new THREE.Mesh(this.geometry, material); mesh.frustumCulled = false;
+    world.add(mesh);
+  }
+
+  bend(placed) {
+    const spine = this.curved ? hermite(placed) : placed.map(([p]) => p);
+    const { position, normal } = this.geometry.attributes, side = new THREE.Vector3(0, 0, 0), way = new THREE.Vector3(), other = new THREE.Vector3();
+    spine.forEach((p, i) => {
+      const from = spine[Math.max(0, i - 1)], to = spine[Math.min(spine.length - 1, i + 1)];
+      way.set(...to.map((v, k) => v - from[k])).normalize();
+      if (i === 0) side.set(Math.abs(way.x) < 0.8 ? 1 : 0, Math.abs(way.x) < 0.8 ? 0 : 1, 0);
+      side.addScaledVector(way, -side.dot(way)).normalize(); // the last ring's side, carried along
+      other.crossVectors(way, side);
+      for (let j = 0; j < RING; j++) {
+        const c = Math.cos(2 * Math.PI * j / RING), d = Math.sin(2 * Math.PI * j / RING);
+        const n = [c * side.x + d * other.x, c * side.y + d * other.y, c * side.z + d * other.z];
+        position.setXYZ(i * RING + j, ...p.map((v, k) => v + this.radius * n[k])); normal.setXYZ(i * RING + j, ...n);
+      }
+    });
+    position.needsUpdate = normal.needsUpdate = true;
+  }
+}
+
+function hermite(placed) {
+  const spine = [placed[0][0]];
+  for (let i = 0; i + 1 < placed.length; i++) {
+    const [p, t] = placed[i], [q, u] = placed[i + 1], chord = q.map((v, k) => v - p[k]), length = Math.hypot(...chord);
+    let m = t.map(v => v * length), n = u.map(v => v * length);
+    if (!t.some(Boolean)) m = chord.map((v, k) => u.some(Boolean) ? 1.5 * v - 0.5 * n[k] : v);
+    if (!u.some(Boolean)) n = chord.map((v, k) => t.some(Boolean) ? 1.5 * v - 0.5 * m[k] : v);
+    for (let j = 1; j <= FINER; j++) {
+      const x = j / FINER, y = 1 - x;
+      spine.push(p.map((v, k) => (1 + 2 * x) * y * y * v + x * y * y * m[k] + x * x * (3 - 2 * x) * q[k] - x * x * y * n[k]));
+    }
+  }
+  return spine;
 }

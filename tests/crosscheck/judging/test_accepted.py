@@ -153,7 +153,7 @@ def test_accepting_and_being_strict_on_the_command_line(
     assert (code, "13 figures accepted: review" in output) == (0, True), output
     assert len(load_case(folder).accepted["rigid, all engines"]) == 11
     assert crosscheck("--strict")[0] == 0
-    page = (tmp_path / "out" / "report.html").read_text(encoding="utf-8")
+    page = next((tmp_path / "out" / "report").glob("*/*.html")).read_text(encoding="utf-8")
     assert "(accepted: E" in page
 
     text = run.read_text(encoding="utf-8")

@@ -39,6 +39,8 @@ WITHOUT_PART = {
     "crosscheck.running.plan": "makes the scene, which is in the record's own key",
     "crosscheck.records.machine": "tells the reader of a report about the machine",
     "crosscheck.running.draw": "draws",
+    "crosscheck.running.film": "makes a scene too",
+    "crosscheck.engines.functions_of_time": "says to the drawing how a wheel starts; native evaluates functions itself",
     "crosscheck.records.drawing": "holds what was drawn",
     "crosscheck.records.held": "holds the stored reference, which is made of other runs",
     "crosscheck.running.held": "holds the stored reference, which is made of other runs",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from pathlib import Path
@@ -15,11 +14,13 @@ import pytest
 from crosscheck.library.case import Transform, Variant
 from crosscheck.library.find import load_case, resolve
 from crosscheck.report import SessionOutcome, write_all
-from crosscheck.report.html import _code, _transformation
+from crosscheck.report.case_view import transformation
+from crosscheck.report.html import code
 from crosscheck.report.store import SAMPLES, Store
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
+from tests.crosscheck.report.reading import data_of, series_of
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case
 
 MIXED = """
@@ -56,41 +57,43 @@ def mixed(tmp_path_factory: pytest.TempPathFactory) -> tuple[SessionOutcome, Pat
     return session(folder, copy_case(folder, MIXED))
 
 
-def data(page: Path) -> dict:
-    text = re.search(r'id="data">(.*?)</script>', page.read_text(encoding="utf-8"), re.DOTALL).group(1)
-    return json.loads(text.replace("<\\/", "</"))
+def case_page(index: Path) -> str:
+    return (index.parent / "pendulum" / "single.html").read_text(encoding="utf-8")
 
 
-def test_the_report_is_one_file_that_loads_nothing(sound: tuple[SessionOutcome, Path]) -> None:
-    page = sound[1].read_text(encoding="utf-8")
+def test_the_single_file_loads_nothing(sound: tuple[SessionOutcome, Path], tmp_path: Path) -> None:
+    _, file = write_all(sound[1].parents[1] / "records.jsonl", tmp_path, single_file=True)
+    page = file.read_text(encoding="utf-8")
     markup = re.sub(r"<script>.*?</script>", "", page, flags=re.DOTALL)
+    assert file.name == "report.html"
     assert not FOREIGN.search(markup)
-    assert page.count("plotly.js v") == 1
-    assert len(page) < 15e6
+    assert page.count("plotly.js (basic - minified) v") == page.count("SPDX-License-Identifier: MIT") == 1
+    assert len(page) < 3e6
     assert "All 15 verdicts are as expected" in markup
 
 
 def test_the_report_names_what_did_not_run_and_why(mixed: tuple[SessionOutcome, Path]) -> None:
-    markup = re.sub(r"<script.*?</script>", "", mixed[1].read_text(encoding="utf-8"), flags=re.DOTALL)
-    assert "the library is not installed; install the extra `absent`" in markup
-    assert "diverged at t = 0.9 s" in markup
-    assert 'class="cell good"' in markup
-    row = re.search(r"<th scope=\"row\">marker:tip.position</th>(.*?)</tr>", markup, re.DOTALL).group(1)
+    index, page = mixed[1].read_text(encoding="utf-8"), case_page(mixed[1])
+    for markup in (index, page):
+        assert "the library is not installed; install the extra `absent`" in markup
+        assert "diverged at t = 0.9 s" in markup
+    assert 'class="cell good"' in page
+    row = re.search(r"<th scope=\"row\">Marker positions</th>(.*?)</tr>", page, re.DOTALL).group(1)
     looks = re.findall(r'class="cell (\w+)".*?</span>([a-z ]+)<?', row)
     assert looks[0] == ("good", "agree")
     assert {look for look, status in looks if status in ("did not run", "failed")} == {"bad"}
 
 
 def test_charts_carry_the_recorded_numbers(mixed: tuple[SessionOutcome, Path]) -> None:
-    content = data(mixed[1])
-    (case,) = content["cases"]
+    case = data_of(mixed[1].parent / "pendulum" / "single.data.js")
     panel = next(panel for panel in case["panels"] if panel["title"] == "Motion")
     sides = {side["label"]: side for side in panel["channels"][0]["sides"]}
     assert set(sides) == {"fine", "stepper", "diverger"}
 
+    stored = series_of(case["series"])
+
     def series(number: int) -> np.ndarray:
-        stored = content["series"][number]
-        return np.frombuffer(base64.b64decode(stored["data"]), dtype="<f4").reshape(-1, stored["k"])
+        return stored[number]
 
     assert series(sides["fine"]["times"])[-1] == 2.0
     assert series(sides["diverger"]["times"])[-1] == pytest.approx(0.9)
@@ -100,21 +103,21 @@ def test_charts_carry_the_recorded_numbers(mixed: tuple[SessionOutcome, Path]) -
     (work,) = case["work"]
     assert {point["engine"] for point in work["points"] if point["error"] is None} == {"diverger"}
     (animation,) = case["animations"]
-    assert {line["kind"] for line in animation["lines"]} == {"box", "arm"}
+    assert {line["kind"] for line in animation["lines"]} == {"solid", "arm"}
 
 
 def test_peaks_survive_thinning() -> None:
     store = Store()
     values = np.zeros(10 * SAMPLES)
     values[1234] = 7.0
-    series = store.series[store.peaks(values)]
-    thinned = np.frombuffer(base64.b64decode(series["data"]), dtype="<f4")
+    number = store.peaks(values)
+    thinned = series_of(store.packed())[number]
     assert len(thinned) == SAMPLES
     assert thinned.max() == 7.0
 
 
 def test_verdicts_json(mixed: tuple[SessionOutcome, Path]) -> None:
-    verdicts = json.loads(mixed[1].with_name("verdicts.json").read_text(encoding="utf-8"))
+    verdicts = json.loads((mixed[1].parents[1] / "verdicts.json").read_text(encoding="utf-8"))
     assert len(verdicts) == len(mixed[0].all)
     needed = {"case", "channel", "engine_a", "engine_b", "level", "status", "expected", "E", "U", "goal", "reason"}
     assert needed <= set(verdicts[0])
@@ -122,7 +125,7 @@ def test_verdicts_json(mixed: tuple[SessionOutcome, Path]) -> None:
 
 
 def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[SessionOutcome, Path]) -> None:
-    (suite,) = ElementTree.parse(mixed[1].with_name("junit.xml")).getroot()
+    (suite,) = ElementTree.parse(mixed[1].parents[1] / "junit.xml").getroot()
     passed = [test for test in suite if not len(test)]
     assert len(passed) == sum(verdict.ok for verdict in mixed[0].all) > 0
     assert not any("absent" in test.get("name") or "diverger" in test.get("name") for test in passed)
@@ -134,21 +137,21 @@ def test_junit_counts_nothing_as_passed_that_did_not_run(mixed: tuple[SessionOut
 
 
 def test_the_summary_says_it_all(mixed: tuple[SessionOutcome, Path], sound: tuple[SessionOutcome, Path]) -> None:
-    bad = mixed[1].with_name("summary.md").read_text(encoding="utf-8")
+    bad = (mixed[1].parents[1] / "summary.md").read_text(encoding="utf-8")
     assert bad.startswith("# ❌")
     assert "**did not run** pendulum/single, rigid, absent" in bad
-    good = sound[1].with_name("summary.md").read_text(encoding="utf-8")
+    good = (sound[1].parents[1] / "summary.md").read_text(encoding="utf-8")
     assert good.startswith("# ✅ All 15 verdicts are as expected")
     assert "Not as expected" not in good
 
 
 def test_backticks_become_code_and_nothing_else_becomes_markup() -> None:
-    assert _code("as `a < b`, <b>not</b> bold") == "as <code>a &lt; b</code>, &lt;b&gt;not&lt;/b&gt; bold"
+    assert code("as `a < b`, <b>not</b> bold") == "as <code>a &lt; b</code>, &lt;b&gt;not&lt;/b&gt; bold"
 
 
 @pytest.mark.parametrize("transform", get_args(Transform))
 def test_every_transformation_has_words(transform: str) -> None:
-    words = _transformation(Variant(name="a", engines=("native",), transform=transform, segments=7, pieces=7))
+    words = transformation(Variant(name="a", engines=("native",), transform=transform, segments=7, pieces=7))
     assert bool(words) == (transform != "none") and ("7" in words) == (transform in ("segments", "substructures"))
 
 

@@ -4,7 +4,7 @@ import subprocess
 import sys
 
 LATER = (
-    "scipy.linalg", "scipy.spatial", "scipy.interpolate", "scipy.sparse", "scipy.optimize", "matplotlib", "plotly",
+    "scipy.linalg", "scipy.spatial", "scipy.interpolate", "scipy.sparse", "scipy.optimize", "matplotlib",
     "rich", "typer", "jinja2", "psutil", "filelock", "flexmb.dense.dense_system", "flexmb.jain.operators",
     "flexmb.frisch.evaluation", "flexmb.closure.closures", "flexmb.advisor", "flexmb.linear",
 )  # fmt: skip

@@ -1,0 +1,109 @@
+"""What a case's page says in words and tables; its charts are in `charts.py`."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from crosscheck.judging.outcome import Absence, SessionOutcome
+from crosscheck.judging.results import CaseResults
+from crosscheck.library.case import Provenance
+from crosscheck.report.mutations import CaseScore
+from crosscheck.report.places import CasePlace
+from crosscheck.report.views import (
+    Block,
+    VerdictCell,
+    comparison_blocks,
+    conservation_block,
+    control_block,
+    summary_cell,
+)
+
+
+@dataclass(frozen=True)
+class CaseView:
+    """A case's page."""
+
+    place: CasePlace
+    name: str
+    title: str
+    summary: str
+    provenance: Provenance | None
+    variants: list[dict[str, Any]]
+    ok: bool
+    whole: VerdictCell
+    comparisons: list[Block]
+    conservation: Block | None
+    controls: Block | None
+    absences: list[Absence]
+    timings: list[dict[str, Any]]
+    mutation: CaseScore | None
+
+
+def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, mutation: CaseScore | None) -> CaseView:
+    """Everything on a case's page but the charts."""
+    record = case.case
+    verdicts = outcome.verdicts[record.case]
+    lost = any(absence.case == record.case for absence in outcome.lost)
+    return CaseView(
+        place=place,
+        name=record.case,
+        title=record.run.title,
+        summary=_first_paragraph(record.readme),
+        provenance=record.provenance,
+        variants=[_variant_view(case, variant) for variant in record.run.variants],
+        ok=bool(verdicts) and all(verdict.ok for verdict in verdicts) and not lost,
+        whole=summary_cell(verdicts),
+        comparisons=comparison_blocks(verdicts),
+        conservation=conservation_block(verdicts),
+        controls=control_block(verdicts),
+        absences=[absence for absence in outcome.absences if absence.case == record.case],
+        timings=_timings(case),
+        mutation=mutation,
+    )
+
+
+def _variant_view(case: CaseResults, variant: Any) -> dict[str, Any]:
+    info = case.case.variants[variant.name]
+    return {
+        "name": variant.name,
+        "level": info.level,
+        "engines": ", ".join(variant.engines),
+        "how": transformation(variant),
+        "duration": variant.duration_s or case.case.run.duration_s,
+        "note": info.error or variant.note,
+    }
+
+
+def transformation(variant: Any) -> str:
+    return {
+        "none": "",
+        "rigidify": "flexible bodies made rigid",
+        "modal_points": "beams as points and modes",
+        "segments": f"{variant.segments} rigid segments per beam",
+        "substructures": f"{variant.pieces} flexible pieces per beam",
+    }[variant.transform]
+
+
+def _timings(case: CaseResults) -> list[dict[str, Any]]:
+    """Compile and solve time of each finest run."""
+    return [
+        {
+            "engine": engine,
+            "variant": variant,
+            "effort": result.finest.effort,
+            "compile_s": result.finest.compile_s,
+            "wall_s": result.finest.wall_s,
+            "evaluations": result.finest.evaluations,
+            "support": result.finest.support,
+        }
+        for (variant, engine, role), result in case.results.items()
+        if role == "main" and result.runs
+    ]
+
+
+def _first_paragraph(readme: str) -> str:
+    """The README's first paragraph of plain text."""
+    paragraphs = [part.strip() for part in readme.split("\n\n")]
+    text = [part for part in paragraphs if part and not part.startswith(("#", "!", "|", "`", "-", "<"))]
+    return " ".join(text[0].split()) if text else ""

@@ -1,0 +1,96 @@
+"""The index: cases against engines, what is not as expected first."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.results import CaseResults, Session
+from crosscheck.judging.verdict import Verdict
+from crosscheck.report.places import CasePlace
+from crosscheck.report.views import VerdictCell, anchor, summary_cell
+
+
+@dataclass(frozen=True)
+class CaseRow:
+    """One case of the matrix; `look` is that of its gravest verdict, `words` what a search finds it by."""
+
+    name: str
+    title: str
+    link: str
+    look: str
+    status: str
+    verdicts: int
+    words: str
+    cells: tuple[VerdictCell, ...]
+
+
+@dataclass(frozen=True)
+class Matrix:
+    """Cases against engines, then conservation and negative controls."""
+
+    columns: tuple[str, ...]
+    rows: tuple[CaseRow, ...]
+
+
+@dataclass(frozen=True)
+class Unexpected:
+    """A verdict that is not as expected, and where it stands."""
+
+    case: str
+    link: str
+    what: str
+    status: str
+    expected: str
+    reason: str
+
+
+def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> Matrix:
+    """What every case found with every engine; cases that are not as expected come first."""
+    everything = [verdict for verdict in outcome.all if verdict.kind == "comparison"]
+    engines = list(dict.fromkeys(engine for verdict in everything for _, engine in verdict.sides))
+    rows = [_row(case, outcome, engines, places[case.case.case].link()) for case in session.cases]
+    rows.sort(key=lambda row: row.look != "bad")
+    return Matrix((*engines, "Conservation", "Negative controls"), tuple(rows))
+
+
+def findings(outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> list[Unexpected]:
+    """Every verdict that is not as expected, with a link to it."""
+    return [
+        Unexpected(
+            case=case,
+            link=places[case].link(anchor(number)),
+            what=f"{verdict.comparison}, {verdict.channel}, {verdict.pair}",
+            status=verdict.status,
+            expected=verdict.expected,
+            reason=verdict.reason,
+        )
+        for case, verdicts in outcome.verdicts.items()
+        for number, verdict in enumerate(verdicts)
+        if not verdict.ok
+    ]
+
+
+def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: str) -> CaseRow:
+    name, run = case.case.case, case.case.run
+    verdicts = outcome.verdicts[name]
+    lost = any(absence.case == name for absence in outcome.lost)
+    whole = summary_cell(verdicts)
+    look = "bad" if lost or not verdicts else whole.look
+    groups = [[each for each in verdicts if each.kind == "comparison" and _takes_part(each, key)] for key in engines]
+    groups += [[each for each in verdicts if each.kind == kind] for kind in ("conservation", "control")]
+    return CaseRow(
+        name=name,
+        title=run.title,
+        link=link,
+        look=look,
+        status="worse" if any(each.ok and each.worse for each in verdicts) and look != "bad" else look,
+        verdicts=len(verdicts),
+        words=" ".join((name, run.title, *run.tags)).lower(),
+        cells=tuple(map(summary_cell, groups)),
+    )
+
+
+def _takes_part(verdict: Verdict, engine: str) -> bool:
+    return any(side == engine for _, side in verdict.sides)

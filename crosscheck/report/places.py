@@ -1,0 +1,50 @@
+"""Where each case stands in the report: a page of its own, or a section of the single file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+INDEX = "index.html"
+
+
+@dataclass(frozen=True)
+class CasePlace:
+    """`page` is the path of the case's page from the index ("" where all stands on one), `anchor` its section there."""
+
+    page: str
+    anchor: str
+
+    def link(self, part: str = "") -> str:
+        """The address, from the index, of the case or of a part of it."""
+        return f"{self.page}#{self.anchor}{'-' if part else ''}{part}"
+
+    @property
+    def root(self) -> str:
+        """The way from the case's page back to the folder of the index."""
+        return "../" * self.page.count("/")
+
+    @property
+    def data(self) -> str:
+        """The path of the case's data from the index."""
+        return self.page.removesuffix(".html") + ".data.js"
+
+
+def places(cases: Iterable[str], single: bool) -> dict[str, CasePlace]:
+    """The place of every case: `<family>/<case>.html`, in letters that every file system and address takes."""
+    found: dict[str, CasePlace] = {}
+    taken = {INDEX}
+    for number, case in enumerate(cases):
+        stem = "/".join(_plain(part) for part in case.split("/")[-2:])
+        page = f"{stem}.html"
+        while page.lower() in taken:  # names that differ in what was replaced
+            page = f"{stem}-{number}.html"
+            stem += "-"
+        taken.add(page.lower())
+        found[case] = CasePlace("" if single else page, f"case-{number}")
+    return found
+
+
+def _plain(part: str) -> str:
+    return re.sub(r"[^A-Za-z0-9_-]+", "-", part).strip("-")[:80] or "case"

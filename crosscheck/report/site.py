@@ -1,0 +1,142 @@
+"""The report: an index with a page for each case and its data beside it, or all of it in a single file.
+
+Pages open from a disk as from a server: scripts and data are classic scripts, which a browser loads from `file://` too.
+A page loads its case's data only, and plotly and three.js when a chart or an animation comes into view.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from markupsafe import Markup
+
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.results import CaseResults, Session
+from crosscheck.judging.verdict import STATUSES
+from crosscheck.report.case_view import CaseView, case_view
+from crosscheck.report.charts import payload
+from crosscheck.report.html import embedded, source, templates
+from crosscheck.report.mutations import Scores
+from crosscheck.report.overview import findings, matrix
+from crosscheck.report.places import INDEX, CasePlace, places
+from flexmb.output.writing import folder
+
+FOLDER = "report"
+SINGLE = "report.html"
+ASSETS = "assets"
+LISTING = f"{ASSETS}/pages.json"  # what the report consists of, for the next one to clear away
+SCRIPTS = ("data.js", "charts.js", "scene.js", "page.js", "index.js")
+LIBRARIES = ("plotly/plotly-basic.min.js", "three/three.iife.min.js")  # of the folder vendor, loaded when first needed
+
+
+@dataclass(frozen=True)
+class Material:
+    """What the pages show."""
+
+    session: Session
+    outcome: SessionOutcome
+    scores: Scores
+
+
+def write_site(material: Material, out: Path) -> Path:
+    """Write `report/` with its index and pages, and a `report.html` that leads there; returns the index's path."""
+    site = out / FOLDER
+    _clear(site)
+    where = places((case.case.case for case in material.session.cases), single=False)
+    written: dict[str, str] = {}
+    for name in ("style.css", *SCRIPTS):
+        written[f"{ASSETS}/{name}"] = str(source(name))
+    for name in LIBRARIES:
+        written[f"{ASSETS}/{Path(name).name}"] = _library(name)
+    written[INDEX] = _page("index.html.j2", material, root="", **_overview(material, where))
+    for case in material.session.cases:
+        place = where[case.case.case]
+        view = _view(case, material, place)
+        written[place.page] = _page("case_page.html.j2", material, root=place.root, case=view)
+        written[place.data] = _registration(case, material, place)
+    written[LISTING] = msgspec.json.encode(sorted([*written, LISTING])).decode()
+    for name, text in written.items():
+        folder((site / name).parent)
+        (site / name).write_text(text, encoding="utf-8", errors="backslashreplace")
+    leading = templates().get_template("leading.html.j2").render(outcome=material.outcome, index=f"{FOLDER}/{INDEX}")
+    (out / SINGLE).write_text(leading, encoding="utf-8", errors="backslashreplace")
+    return site / INDEX
+
+
+def write_single(material: Material, out: Path) -> Path:
+    """Write the whole report into one file that loads nothing, in the place of pages; returns its path."""
+    _clear(out / FOLDER)
+    cases = material.session.cases
+    where = places((case.case.case for case in cases), single=True)
+    text = _page(
+        "single.html.j2",
+        material,
+        **_overview(material, where),
+        root="",
+        cases=[_view(case, material, where[case.case.case]) for case in cases],
+        style=source("style.css"),
+        scripts=[*(Markup(_library(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
+        data=[Markup(_registration(case, material, where[case.case.case])) for case in cases],
+    )
+    (out / SINGLE).write_text(text, encoding="utf-8", errors="backslashreplace")
+    return out / SINGLE
+
+
+def _page(name: str, material: Material, **more: Any) -> str:
+    """A page by its template."""
+    return templates().get_template(name).render(outcome=material.outcome, scripts_of_site=SCRIPTS, **more)
+
+
+def _overview(material: Material, where: dict[str, CasePlace]) -> dict[str, Any]:
+    """What the index shows."""
+    session, outcome = material.session, material.outcome
+    return {
+        "counts": outcome.counts(),
+        "statuses": STATUSES,
+        "controls": outcome.controls(),
+        "matrix": matrix(session, outcome, where),
+        "findings": findings(outcome, where),
+        "environment": session.environments[-1] if session.environments else None,
+        "engines": _engines(session),
+        "scores": material.scores,
+        "places": where,
+    }
+
+
+def _view(case: CaseResults, material: Material, place: CasePlace) -> CaseView:
+    return case_view(case, material.outcome, place, material.scores.cases.get(case.case.case))
+
+
+def _registration(case: CaseResults, material: Material, place: CasePlace) -> str:
+    """A script that hands the case's data to the page."""
+    data = payload(case, material.outcome.verdicts[case.case.case])
+    return f"crosscheck.register({embedded(place.anchor)}, {embedded(data)});\n"
+
+
+def _library(name: str) -> str:
+    return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
+
+
+def _clear(site: Path) -> None:
+    """Remove what an earlier report wrote, and nothing else."""
+    try:
+        listed = msgspec.json.decode((site / LISTING).read_bytes(), type=list[str])
+    except (OSError, ValueError):
+        return
+    for name in listed:
+        file = site / name
+        if file.resolve().is_relative_to(site.resolve()):
+            file.unlink(missing_ok=True)
+
+
+def _engines(session: Session) -> list[tuple[str, str]]:
+    """Engines with the versions that ran."""
+    found: dict[str, set[str]] = {}
+    for case in session.cases:
+        for (_, engine, _), result in case.results.items():
+            found.setdefault(engine, set()).update(run.version for run in result.runs)
+    return [(engine, ", ".join(sorted(versions)) or "did not run") for engine, versions in sorted(found.items())]

@@ -1,0 +1,67 @@
+"""The run that an animation is made from: the scene with markers on every body, and more of them along bent ones.
+
+The markers that a case records are those it judges, and many bodies have none. A film is a run of its own, by the
+library's own engine, so that what is judged stays as the case says; it is drawn and never judged.
+"""
+
+from __future__ import annotations
+
+import msgspec
+import numpy as np
+
+from crosscheck.records.drawing import Drawing
+from crosscheck.running.draw import draw
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, SidBody
+from flexmb.scene.schema import Marker, Scene
+from flexmb.scene.tree import rest_frames
+
+ENGINE = "native"
+FRAMES = 161
+PIECES = 6  # of a beam, between the nodes that are filmed
+ADDED = "drawn"
+
+
+def film(scene: Scene) -> tuple[Scene, Drawing] | None:
+    """The scene to run and how to draw it; None where the scene's own markers show as much, or nodes are in files."""
+    if any(isinstance(body, SidBody) for body in scene.bodies):
+        return None
+    carried = {marker.body for marker in scene.markers}
+    if all(isinstance(body, RigidBody) and body.name in carried for body in scene.bodies):
+        return None
+    filmed = scene
+    for body in scene.bodies:
+        filmed = _with_markers(filmed, body)
+    return filmed, draw(filmed, trails=[marker.name for marker in scene.markers])
+
+
+def film_channels(drawing: Drawing) -> tuple[str, ...]:
+    """The channels that the drawing needs."""
+    carriers = {point.marker for line in drawing.lines for point in line.points if point.marker}
+    found = [
+        f"marker:{name}.{part}"
+        for name in dict.fromkeys((*sorted(carriers), *drawing.trails, *(wheel.marker for wheel in drawing.wheels)))
+        for part in ("position", "orientation")
+    ]
+    for wheel in drawing.wheels:
+        found += [f"marker:{wheel.marker}.angular_velocity", f"wheel_load:{wheel.name}.torque"]
+    return tuple(dict.fromkeys(found))
+
+
+def _with_markers(scene: Scene, body: Body) -> Scene:
+    """The scene with a marker on every node of the body that is drawn."""
+    if isinstance(body, BeamBody):
+        inside = np.linspace(0.0, body.length_m, PIECES + 1)[1:-1]
+        added = tuple(BeamNode(name=f"{ADDED} {i}", x_m=float(x)) for i, x in enumerate(inside, start=1))
+        longer = msgspec.structs.replace(body, nodes=(*body.nodes, *added))
+        bodies = tuple(longer if each.name == body.name else each for each in scene.bodies)
+        scene, body = msgspec.structs.replace(scene, bodies=bodies), longer
+    nodes = ["origin"] if isinstance(body, RigidBody) else list(rest_frames(body))
+    seen = {(marker.body, marker.node) for marker in scene.markers}
+    if isinstance(body, RigidBody) and any(name == body.name for name, _ in seen):
+        return scene
+    markers = tuple(
+        Marker(name=f"{body.name} {node} {ADDED}", body=body.name, node=node)
+        for node in nodes
+        if (body.name, node) not in seen
+    )
+    return msgspec.structs.replace(scene, markers=scene.markers + markers)

@@ -1,0 +1,153 @@
+"""What an animation shows: every body of every shipped case, and wheels at the angle that mechanics gives them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.library.find import Case, load_case, resolve, shipped_cases
+from crosscheck.records.archive import read
+from crosscheck.records.drawing import FILM, Drawing, DrawnWheel
+from crosscheck.records.kinds import RunRecord
+from crosscheck.records.packing import pack
+from crosscheck.report.animation import animations, wheel_angle
+from crosscheck.report.store import Store
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import plan, variant_scene
+from crosscheck.running.sweep import PROVIDER
+from flexmb.scene.bodies import SidBody
+from flexmb.typing import Real
+from tests.crosscheck.sessions import CASE
+
+
+@pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
+def test_every_body_and_wheel_is_drawn(case: Case) -> None:
+    record, _ = plan(case, (), PROVIDER, films=True)
+    for variant in record.run.variants:
+        info = record.variants[variant.name]
+        drawing = info.film or info.drawing
+        if info.error or "native" not in variant.engines:
+            continue
+        scene = case.scene(variant)
+        if variant.transform != "modal_points":
+            scene = variant_scene(scene, variant)
+        if any(isinstance(body, SidBody) for body in scene.bodies):
+            continue
+        assert drawing is not None
+        assert {line.body for line in drawing.lines} == {body.name for body in scene.bodies}, variant.name
+        assert {wheel.name for wheel in drawing.wheels} == {wheel.name for wheel in scene.wheels}, variant.name
+
+
+def test_what_is_drawn_in_whole_by_its_own_markers_needs_no_film() -> None:
+    record, jobs = plan(load_case(CASE), (), "tests.crosscheck.fake_engines:engines", films=True)
+    assert all(info.film is None for info in record.variants.values())
+    assert FILM not in {job.role for job in jobs}
+
+
+@pytest.fixture(scope="module")
+def four_bar() -> tuple[CaseResults, Drawing]:
+    """The rigid four-bar, run and filmed in this process."""
+    (case,) = resolve(("closed_chains/four_bar",))
+    record, jobs = plan(case, ("native",), PROVIDER, films=True)
+    records: list[object] = [record]
+    for job in jobs:
+        if job.role in ("main", FILM):
+            execute(job, lambda each: records.append(each) if isinstance(each, RunRecord) else None)
+    (results,) = collect(records).cases  # type: ignore[arg-type]
+    drawing = record.variants["rigid"].film
+    assert drawing is not None
+    return results, drawing
+
+
+def placed(result: Result, marker: str, offset: Real) -> Real:
+    """A carried point over time (T,3)."""
+    turned = Rotation.from_quat(result.values(f"marker:{marker}.orientation")[:, [1, 2, 3, 0]])
+    return result.values(f"marker:{marker}.position") + turned.apply(offset)
+
+
+def test_a_film_is_the_motion_that_is_judged(four_bar: tuple[CaseResults, Drawing]) -> None:
+    results, _ = four_bar
+    main, film = results.get("rigid", "native"), results.get("rigid", "native", FILM)
+    assert film.times[-1] == main.times[-1]
+    for name in ("marker:joint.position", "marker:joint.orientation"):
+        np.testing.assert_allclose(film.values(name)[-1], main.values(name)[-1], atol=1e-9)
+
+
+def test_a_closed_loop_is_drawn_closed(four_bar: tuple[CaseResults, Drawing]) -> None:
+    """Every joint of the mechanism is where arms of two bodies end, or of one body at the ground, at all times."""
+    results, drawing = four_bar
+    film = results.get("rigid", "native", FILM)
+    arms = [line for line in drawing.lines if line.kind == "arm"]
+    ends = [placed(film, line.points[1].marker, np.array(line.points[1].offset)) for line in arms]
+    met = [sum(np.abs(one - other).max() < 1e-7 for other in ends) for one in ends]
+    fixed = [np.ptp(one, axis=0).max() < 1e-7 for one in ends]
+    assert len(ends) == 6 and sum(fixed) == 2
+    assert all(count == 2 for count, still in zip(met, fixed, strict=True) if not still)
+
+
+def test_the_film_is_shown_and_the_markers_where_there_is_none(four_bar: tuple[CaseResults, Drawing]) -> None:
+    results, drawing = four_bar
+    (shown,) = animations(Store(), results)
+    assert {line["body"] for line in shown["lines"]} == {"crank", "coupler", "rocker"}
+    without = CaseResults(results.case, {key: each for key, each in results.results.items() if key[2] != FILM})
+    (shown,) = animations(Store(), without)
+    assert {line["body"] for line in shown["lines"]} == {"coupler", "rocker"}
+    assert drawing.gravity != (0.0, 0.0, 0.0)
+
+
+def ridden(turning: Real, torque: Real, quaternions: Real, times: Real) -> Result:
+    channels = {
+        "marker:m.orientation": pack(quaternions),
+        "marker:m.angular_velocity": pack(turning),
+        "wheel_load:w.torque": pack(torque),
+    }
+    run = RunRecord(
+        case="c", variant="v", role=FILM, engine="e", version="", scene="", status="finished", times=pack(times),
+        channels=channels,
+    )  # fmt: skip
+    return Result("v", "e", "finished", "", (run,))
+
+
+def test_a_wheel_keeps_its_axial_momentum_while_its_bearing_turns() -> None:
+    """A free wheel whose body turns about the wheel's axis at the rate 0.3 t keeps its rate in World."""
+    times = np.linspace(0.0, 2.0, 401)
+    turning = np.stack([0.0 * times, 0.0 * times, 0.3 * times], axis=1)
+    half = 0.5 * 0.15 * times**2
+    quaternions = np.stack([np.cos(half), 0.0 * times, 0.0 * times, np.sin(half)], axis=1)
+    result = ridden(turning, np.zeros((len(times), 3)), quaternions, times)
+    angle = wheel_angle(result, wheel(speed=5.0))
+    np.testing.assert_allclose(angle, 0.25 + 5.0 * times - 0.15 * times**2, atol=1e-5)
+
+
+def test_a_motor_spins_a_wheel_up_about_an_axis_that_is_turned() -> None:
+    """On a body turned by 90 degrees about x, the wheel's z axis lies along -y of World."""
+    times = np.linspace(0.0, 2.0, 401)
+    quaternions = np.tile([np.sqrt(0.5), np.sqrt(0.5), 0.0, 0.0], (len(times), 1))
+    torque = np.tile([0.0, -0.4, 7.0], (len(times), 1))
+    result = ridden(np.zeros((len(times), 3)), torque, quaternions, times)
+    angle = wheel_angle(result, wheel(speed=0.0))
+    np.testing.assert_allclose(angle, 0.25 + 0.5 * 0.4 / 0.1 * times**2, atol=1e-4)
+
+
+def wheel(speed: float) -> DrawnWheel:
+    return DrawnWheel(
+        name="w", marker="m", centre=(0.0, 0.0, 0.0), axis=(0.0, 0.0, 1.0), radius_m=0.1, width_m=0.02,
+        axial_inertia_kg_m2=0.1, speed_rad_s=speed, angle_rad=0.25,
+    )  # fmt: skip
+
+
+def test_records_of_older_versions_are_drawn(tmp_path: Path) -> None:
+    """Their points have no tangents, their boxes are edges, and there are no films."""
+    line = (
+        b'{"record":"case","case":"a/b","run":{"title":"t","duration_s":1,"samples":2,"variant":[{"name":"v",'
+        b'"engines":["e"]}]},"provenance":null,"readme":"","variants":{"v":{"level":"rigid","drawing":{"lines":'
+        b'[{"body":"x","kind":"box","points":[["m",[0,0,0]],["m",[1,0,0]]]}],"trails":["m"]}}}}\n'
+    )
+    (tmp_path / "records.jsonl").write_bytes(line)
+    (record,) = read(tmp_path / "records.jsonl")
+    drawing = record.variants["v"].drawing
+    assert drawing.lines[0].points[1].tangent == (0.0, 0.0, 0.0) and drawing.wheels == ()
