@@ -1,8 +1,7 @@
 """A body of a scene with the sums of a SID file: a few masses and modes that have all of them.
 
 Every sum of masses in a SID file is a sum m a b of two fields a, b on the points: 1, coordinates of r, coordinates of
-phi_n. Their matrix is a Gram matrix, and any factor of it gives masses, positions and mode shapes with these sums. So
-the body's dynamics is that of the file at every level up to "full". Geometric stiffness, which a SID file holds as
+phi_n. So the masses of `flexmb.interchange.gram` have the dynamics of the file at every level up to "full". Geometric stiffness, which a SID file holds as
 slopes of Ct, Cr and Oe, is handed over as `gravity_stiffness` and `gradient_stiffness`, for level "stiffened".
 """
 
@@ -13,6 +12,7 @@ from dataclasses import dataclass
 import msgspec
 import numpy as np
 
+from flexmb.interchange.gram import EquivalentMasses, NoMasses, equivalent_masses
 from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
 from flexmb.interchange.sid.from_body import COLUMNS, ROWS
 from flexmb.interchange.sid.reader import read_sid
@@ -26,7 +26,6 @@ from flexmb.typing import Real
 
 PRINTED = 1e-6
 """Blocks that follow from each other agree this well in files of single precision."""
-ROUNDING = 1e-13  # share of the Gram matrix below which a direction is rounding
 
 
 @dataclass(frozen=True)
@@ -132,12 +131,8 @@ class _Sums:
         return Q + (sid.Me.zero - _trace(Q))[..., None, None] * np.outer([1.0, 0.0, 0.0], [1.0, 0.0, 0.0])
 
 
-def _points(sid: Sid, sums: _Sums) -> tuple[Real, Real, Real]:
-    """Equal masses (n,), positions (n,3) and mode shapes (n,3,m) with the sums of the file.
-
-    Rows of a factor X of the Gram matrix, X'X, are fields at the points times the root of the mass. A reflection turns
-    the column of the field 1 into equal numbers.
-    """
+def _points(sid: Sid, sums: _Sums) -> EquivalentMasses:
+    """Masses with the sums of the file."""
     m = sums.m
     gram = np.zeros((4 + 3 * m, 4 + 3 * m))
     gram[0, 0] = sid.mass
@@ -146,23 +141,13 @@ def _points(sid: Sid, sums: _Sums) -> tuple[Real, Real, Real]:
     gram[0, 4:] = sid.Ct.zero.ravel()
     gram[1:4, 4:] = sums.P.reshape(3 * m, 3).T
     gram[4:, 4:] = sums.Q.transpose(0, 2, 1, 3).reshape(3 * m, 3 * m)
-    gram = np.triu(gram) + np.triu(gram, 1).T
-    size = np.sqrt(np.abs(np.diag(gram)))
-    size[size == 0.0] = 1.0
-    values, vectors = np.linalg.eigh(gram / np.outer(size, size))
-    if values[0] < -PRINTED * values[-1]:
-        field = int(np.argmax(np.abs(vectors[:, 0])))
-        culprit = "mass, mdCM and J" if field < 4 else f"Me, Gr and Oe of mode {(field - 4) // 3 + 1}"
-        remedy = "write the file with M1 of Gr" if np.any(sums.change) and sid.Gr.first is None else "correct their signs"
-        raise SidError(f"no distribution of mass has {culprit}: {remedy}")
-    kept = values > ROUNDING * values[-1]
-    X = np.sqrt(values[kept])[:, None] * vectors[:, kept].T * size
-    r = len(X)
-    normal = X[:, 0] - np.sqrt(sid.mass / r)
-    if np.any(normal):
-        X = X - 2.0 * np.outer(normal, normal @ X) / (normal @ normal)
-    fields = X / np.sqrt(sid.mass / r)
-    return np.full(r, sid.mass / r), fields[:, 1:4], fields[:, 4:].reshape(r, m, 3).transpose(0, 2, 1)
+    try:
+        return equivalent_masses(gram)
+    except NoMasses as error:
+        of = "mass, mdCM and J" if error.field < 4 else f"Me, Gr and Oe of mode {(error.field - 4) // 3 + 1}"
+        mixed = np.any(sums.change) and sid.Gr.first is None
+        remedy = "write the file with M1 of Gr" if mixed else "correct their signs"
+        raise SidError(f"no distribution of mass has {of}: {remedy}") from None
 
 
 def _geometric_stiffness(sid: Sid, sums: _Sums) -> dict[str, Real]:
