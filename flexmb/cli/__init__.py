@@ -6,6 +6,7 @@ import typer
 
 from flexmb.cli.advising import advise
 from flexmb.cli.appendages import equivalence
+from flexmb.cli.interchanging import export, import_, reduce
 from flexmb.cli.linearising import campbell, linearize
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
@@ -24,8 +25,9 @@ Find every defect of a scene: `flexmb check scene.toml`
 Run it, write CSV and charts: `flexmb simulate scene.toml --t-end 10 --out results`
 """,
 )
-for command in (simulate, check, equivalence, advise, linearize, campbell, schema):
+for command in (simulate, check, equivalence, advise, linearize, campbell, export, reduce, schema):
     app.command()(command)
+app.command("import")(import_)  # as a function it cannot have this name
 
 
 def main() -> None:

@@ -1,8 +1,8 @@
-"""A few equal masses that have given sums of products of their fields: 1, coordinates of r, coordinates of mode shapes.
+"""A few equal masses that have given sums of products of their fields: 1, coordinates of r, and of mode shapes.
 
-All that the kinetic energy of masses needs are sums m a b of two of these 4 + 3 m fields: their Gram matrix. The rows of
-any factor X of it, X'X, are the fields at points times the root of the point's mass. A reflection turns the column of
-the field 1 into equal numbers, so that all points have the same mass.
+All that the kinetic energy of masses needs are sums m a b of two of these 4 + 3 m fields: their Gram matrix. The rows
+of any factor X of it, X'X, are the fields at points times the root of the point's mass. A reflection turns the column
+of the field 1 into equal numbers, so that all points have the same mass.
 """
 
 from __future__ import annotations

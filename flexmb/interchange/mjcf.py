@@ -18,7 +18,6 @@ from flexmb.scene.build import SceneBuilder
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.reading import regular_size
 from flexmb.scene.tree import GROUND
-from flexmb.typing import Real
 
 FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
 
@@ -75,7 +74,7 @@ class _Model:
             self._hinge(builder, j, parent, child, at)
             parent, at = child, {"parent_position": np.zeros(3), "parent_quaternion": np.array([1.0, 0.0, 0.0, 0.0])}
 
-    def _hinge(self, builder: SceneBuilder, j: int, parent: str, child: str, at: dict[str, Real]) -> None:
+    def _hinge(self, builder: SceneBuilder, j: int, parent: str, child: str, at: dict[str, Any]) -> None:
         m, name, dof = self.m, self._joint_name(j), int(self.m.jnt_dofadr[j])
         kind, anchor = int(m.jnt_type[j]), m.jnt_pos[j]
         if kind == FREE:
@@ -92,7 +91,7 @@ class _Model:
         place = int(m.jnt_qposadr[j])
         rest = float(m.qpos_spring[place] - m.qpos0[place])
         make = builder.prismatic if kind == SLIDE else builder.revolute
-        make(name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping, **frames)  # type: ignore[arg-type]
+        make(name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping, **frames)
 
     def _body_name(self, k: int) -> str:
         if k == 0:
@@ -114,16 +113,19 @@ class _Model:
         ):
             if count:
                 self._fail(f"it has {count} {what}, which no scene has", remedy)
-        for j in np.flatnonzero(m.dof_armature):
-            joint = self._joint_name(int(m.dof_jntid[j]))
-            self._fail(f'joint "{joint}" has the rotor inertia {m.dof_armature[j]:g} (armature)', "add a wheel to the scene, and set it to zero")
+        for dof in np.flatnonzero(m.dof_armature):
+            joint = self._joint_name(int(m.dof_jntid[dof]))
+            self._fail(
+                f'joint "{joint}" has the rotor inertia {m.dof_armature[dof]:g} (armature)',
+                "add a wheel to the scene, and set it to zero",
+            )
         if m.opt.density or m.opt.viscosity or np.any(m.opt.wind):
             self._fail("option has density, viscosity or wind, and scenes have no fluid", "set them to zero")
         for k in np.flatnonzero(m.body_gravcomp):
             self._fail(f'body "{self._body_name(int(k))}" has gravity compensation', "remove gravcomp, or add a force")
         for j in range(m.njnt):
-            dof, place = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
-            if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[dof : dof + 6])):
+            first, place = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
+            if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[first : first + 6])):
                 self._fail(f'free joint "{self._joint_name(j)}" has a spring or damper', "remove it")
             turned = not np.array_equal(m.qpos_spring[place : place + 4], m.qpos0[place : place + 4])
             if m.jnt_type[j] == BALL and m.jnt_stiffness[j] and turned:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 
 from flexmb.interchange.imported import ImportedScene, ModelError, listed
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.options import Placement
 from flexmb.scene.quaternions import about, quaternion_of
 from flexmb.scene.reading import Unreadable, read_text
 from flexmb.scene.tree import GROUND
@@ -73,7 +74,9 @@ class _Robot:
         for name, link in self.links.items():
             self._body(builder, name, link)
         taken = set(self.joints)
-        base = next(name for name in ("base", "base_joint", f"{root}_to_ground", *map(str, range(9))) if name not in taken)
+        base = next(
+            name for name in ("base", "base_joint", f"{root}_to_ground", *map(str, range(9))) if name not in taken
+        )
         (builder.free if free_base else builder.weld)(base, GROUND, root)
         for name, joint in self.joints.items():
             self._hinge(builder, name, joint)
@@ -117,7 +120,9 @@ class _Robot:
             return
         R, com = self._origin(place, inertial)
         mass = self._number(place, inertial, "mass", "value")
-        xx, yy, zz, xy, xz, yz = (self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz"))
+        xx, yy, zz, xy, xz, yz = (
+            self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
         turned = R @ tensor @ R.T
         builder.rigid_body(name, mass=mass, com=com, inertia=0.5 * (turned + turned.T))
@@ -129,7 +134,7 @@ class _Robot:
             what = "it mimics another joint, and no hinge of a scene follows another"
             self._fail(place, what, "prescribe both coordinates, or close the mechanism by a closure")
         R, p = self._origin(place, joint)
-        at = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
+        at: Placement = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
         axis = self._axis(place, joint) if kind in ("revolute", "continuous", "prismatic", "planar") else Z
         match kind:
             case "fixed":
@@ -142,8 +147,8 @@ class _Robot:
                 builder.free(name, parent, child, **at)
             case "planar":  # in the plane across the axis: z of turned frames on both sides
                 across = _upright(axis)
-                turned = {"parent_quaternion": quaternion_of(R @ across), "child_quaternion": quaternion_of(across)}
-                builder.planar(name, parent, child, parent_position=p, **turned)
+                inner, outer = quaternion_of(R @ across), quaternion_of(across)
+                builder.planar(name, parent, child, parent_position=p, parent_quaternion=inner, child_quaternion=outer)
             case _:
                 self._fail(place, f'its type is "{kind}"', f"types are fixed, {', '.join(MOVING)}")
         for tag in IGNORED:
@@ -178,7 +183,9 @@ class _Robot:
         text = None if element is None else element.get(key)
         value = math.nan if text is None else _real(text)
         if not math.isfinite(value):
-            self._fail(place, f'{tag} {key} is {"missing" if text is None else repr(text)}', "give a number in SI units")
+            self._fail(
+                place, f"{tag} {key} is {'missing' if text is None else repr(text)}", "give a number in SI units"
+            )
         return value
 
     def _notes(self) -> Iterable[str]:

@@ -14,8 +14,9 @@ w_q = (w_x^2, w_y^2, w_z^2, w_x w_y, w_y w_z, w_z w_x):
     ksigma m x 1   modal force of initial stress, M1 its slope
     Ke, De m x m   stiffness and damping
 
-M1 holds derivatives by the modal coordinates, with geometric stiffness where the file has it: in Ct (unit accelerations),
-Cr (unit angular accelerations), Oe (products of angular velocities), and phi and psi of the nodes (unit loads there).
+M1 holds derivatives by the modal coordinates, with geometric stiffness where the file has it: in Ct (unit
+accelerations), Cr (unit angular accelerations), Oe (products of angular velocities), and phi and psi of the nodes (unit
+loads there).
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ class Taylor:
 
 @dataclass(frozen=True, eq=False)
 class SidNode:
-    """A node: origin (3,1) m, shape functions phi and psi (3,m), rotation AP (3,3) node to body, stresses sigma (6,1)."""
+    """A node: origin (3,1) m, shapes phi and psi (3,m), rotation AP (3,3) node to body, stresses sigma (6,1)."""
 
     name: str
     origin: Taylor

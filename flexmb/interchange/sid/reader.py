@@ -65,7 +65,9 @@ class _Reader:
             elif line.key in known:
                 blocks[self._new(known[line.key], blocks)] = self._taylor(known[line.key], shapes(self.modes))
             else:
-                self._fail(f'"{line.word}" is no block of a modal body', f"blocks are frame, {', '.join(known.values())}")
+                self._fail(
+                    f'"{line.word}" is no block of a modal body', f"blocks are frame, {', '.join(known.values())}"
+                )
         return Sid(mass=mass, modes=names, nodes=tuple(nodes), **self._complete(blocks, shapes(self.modes), "the body"))
 
     def _refmod(self) -> tuple[float, tuple[str, ...]]:
@@ -119,7 +121,9 @@ class _Reader:
             elif line.key in ("order", "nrow", "ncol", "nq", "nqn", "structure"):
                 head[line.key] = self._whole(line.value)
             else:
-                self._fail(f'"{line.word}" does not belong into {name}', "it holds order, nrow, ..., m0(i,j), m1(i,k,j)")
+                self._fail(
+                    f'"{line.word}" does not belong into {name}', "it holds order, nrow, ..., m0(i,j), m1(i,k,j)"
+                )
         rows, columns = expected[name]
         structure, order = head.get("structure", GENERAL), head.get("order", 0)
         if name == "ksigma" and head.get("ncol") == self.modes and head.get("nrow") == 1:
@@ -137,7 +141,9 @@ class _Reader:
         for line, value in elements:
             target = zero if line.key == "m0" else first
             assert target is not None
-            if len(line.indices) != target.ndim or not all(1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)):
+            if len(line.indices) != target.ndim or not all(
+                1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
+            ):
                 self.line = line
                 size = " x ".join(map(str, target.shape))
                 self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
@@ -145,8 +151,14 @@ class _Reader:
             target[place] = value
         if structure == SYMMETRIC:
             zero = _mirrored(zero)
-            first = None if first is None else np.moveaxis(np.array([_mirrored(each) for each in np.moveaxis(first, 1, 0)]), 0, 1)
-        return Taylor(zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1))
+            first = (
+                None
+                if first is None
+                else np.moveaxis(np.array([_mirrored(each) for each in np.moveaxis(first, 1, 0)]), 0, 1)
+            )
+        return Taylor(
+            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        )
 
     def _complete(self, found: dict[str, Taylor], expected: dict[str, tuple[int, int]], of: str) -> dict[str, Taylor]:
         for name, shape in expected.items():

@@ -1,8 +1,9 @@
 """A body of a scene with the sums of a SID file: a few masses and modes that have all of them.
 
 Every sum of masses in a SID file is a sum m a b of two fields a, b on the points: 1, coordinates of r, coordinates of
-phi_n. So the masses of `flexmb.interchange.gram` have the dynamics of the file at every level up to "full". Geometric stiffness, which a SID file holds as
-slopes of Ct, Cr and Oe, is handed over as `gravity_stiffness` and `gradient_stiffness`, for level "stiffened".
+phi_n. So the masses of `flexmb.interchange.gram` have the dynamics of the file at every level up to "full". Geometric
+stiffness, which a SID file holds as slopes of Ct, Cr and Oe, is handed over as `gravity_stiffness` and
+`gradient_stiffness`, for level "stiffened".
 """
 
 from __future__ import annotations
@@ -17,7 +18,7 @@ from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor
 from flexmb.interchange.sid.from_body import COLUMNS, ROWS
 from flexmb.interchange.sid.reader import read_sid
 from flexmb.modal.cross import cross_matrix
-from flexmb.scene.bodies import Level, ModalBody, ModalNode, SidBody
+from flexmb.scene.bodies import Level, ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.modal_data import inertia_points
 from flexmb.scene.quaternions import quaternion_of
@@ -111,7 +112,9 @@ class _Sums:
         else:
             self.Q = self._at_rest(sid)
         if sid.Me.slope is not None and np.max(np.abs(sid.Me.slope)) > PRINTED * np.max(np.abs(sid.Me.zero)):
-            notes.append("Me has a slope, from inertia that turns with its points: of that only geometric stiffness is carried")
+            notes.append(
+                "Me has a slope, from inertia that turns with its points: of that only geometric stiffness is carried"
+            )
 
     def _separate(self, sid: Sid, second: Real, notes: list[str]) -> None:
         """Q from Oe and Ge; what the modal masses leave of Oe's trace is geometric stiffness along the longest axis."""

@@ -12,7 +12,7 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.typing import Real
 
 RIGID = 1e-6
-"""Forces of a rigid-body motion of the free structure, as a share of the forces of its parts, that pass for rounding."""
+"""Forces of a rigid-body motion, as a share of the forces of the structure's parts, that pass for rounding."""
 ALIKE = 1e-6  # share by which the mass in x, y and z, and two halves of a symmetric matrix, may differ
 MOTIONS = ("translation x", "translation y", "translation z", "rotation x", "rotation y", "rotation z")
 
@@ -84,7 +84,9 @@ def _symmetric(name: str, given: ArrayLike) -> Real:
     gap = np.abs(matrix - matrix.T)
     if np.max(gap, initial=0.0) > ALIKE * np.max(np.abs(matrix), initial=0.0):
         i, j = np.unravel_index(int(np.argmax(gap)), gap.shape)
-        raise SuperElementError(f"{name} is not symmetric: [{i + 1},{j + 1}] and [{j + 1},{i + 1}] differ: write both halves")
+        raise SuperElementError(
+            f"{name} is not symmetric: [{i + 1},{j + 1}] and [{j + 1},{i + 1}] differ: write both halves"
+        )
     return 0.5 * (matrix + matrix.T)
 
 
@@ -94,7 +96,9 @@ def _places(ids: NDArray[np.int64], dofs: list[str]) -> NDArray[np.int64]:
     place, row = np.full((len(ids), 6), -1, dtype=np.int64), 0
     for i, digits in enumerate(dofs):
         if not digits or any(digit not in "123456" for digit in digits) or len(set(digits)) != len(digits):
-            raise SuperElementError(f'node {ids[i]} has the dofs "{digits}": write digits 1 to 6, such as 123 or 123456')
+            raise SuperElementError(
+                f'node {ids[i]} has the dofs "{digits}": write digits 1 to 6, such as 123 or 123456'
+            )
         for digit in digits:
             place[i, int(digit) - 1] = row
             row += 1
@@ -108,8 +112,8 @@ def _check_stiffness(element: SuperElement) -> None:
     worst = int(np.argmax(share))
     if share[worst] > RIGID:
         raise SuperElementError(
-            f"K resists the rigid-body {MOTIONS[worst]} ({share[worst]:.1g} of its forces do not cancel): write K without "
-            "supports, without springs to the ground, and check coordinates, axes and units of the nodes"
+            f"K resists the rigid-body {MOTIONS[worst]} ({share[worst]:.1g} of its forces do not cancel): write K "
+            "without supports, without springs to the ground, and check coordinates, axes and units of the nodes"
         )
 
 

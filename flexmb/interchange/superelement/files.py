@@ -56,7 +56,9 @@ def _matrix(path: Path, letter: str) -> NamedMatrix:
         chosen = found if len(found) == 1 else [each for each in found if each.name.upper().startswith(letter)]
         if len(chosen) != 1:
             names = ", ".join(each.name for each in found) or "none"
-            raise SuperElementError(f"{path}: which matrix is {letter}? it holds {names}: give a file with one that begins so")
+            raise SuperElementError(
+                f"{path}: which matrix is {letter}? it holds {names}: give a file with one that begins so"
+            )
         return chosen[0]
     if ending not in MATRIX_MARKET + HARWELL_BOEING:
         known = ", ".join(MATRIX_MARKET + HARWELL_BOEING + OP4 + DMIG)
@@ -89,8 +91,8 @@ def _by_scipy(path: Path, market: bool) -> Real:
 def refuse_large(file: str, rows: int, columns: int) -> None:
     if max(rows, columns) > LARGEST:
         raise SuperElementError(
-            f"{file}: {rows} x {columns} is too large for dense matrices ({LARGEST} rows): reduce it statically where it "
-            "was made, or condense rotations and inner nodes"
+            f"{file}: {rows} x {columns} is too large for dense matrices ({LARGEST} rows): reduce it statically where "
+            "it was made, or condense rotations and inner nodes"
         )
 
 
@@ -136,7 +138,9 @@ def _by_labels(K: NamedMatrix, M: NamedMatrix, table: Nodes) -> tuple[NamedMatri
     ids = list(dict.fromkeys(node for node, _ in rows))
     strange = [node for node in ids if node not in known]
     if strange:
-        raise SuperElementError(f"the matrices have rows of node {strange[0]}, which the table of nodes does not list: add it")
+        raise SuperElementError(
+            f"the matrices have rows of node {strange[0]}, which the table of nodes does not list: add it"
+        )
     dofs = ["".join(str(component) for node, component in rows if node == each) for each in ids]
     at = {row: i for i, row in enumerate(rows)}
 

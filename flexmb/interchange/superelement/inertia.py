@@ -34,13 +34,16 @@ class NodalInertia:
         fields = np.column_stack([np.ones(n), position + self.offset, shapes.transpose(0, 2, 1).reshape(n, 3 * m)])
         turned = cross_matrix(rotation.transpose(0, 2, 1)).reshape(n, 3 * m, 3)  # of masses at unit arms
         arms = np.concatenate([np.zeros((n, 1, 3)), np.broadcast_to(np.eye(3), (n, 3, 3)), turned], axis=1)
-        return fields.T @ self.kernel @ fields + np.einsum("iac,icd,ibd->ab", arms, self.second_moment, arms, optimize=True)
+        return fields.T @ self.kernel @ fields + np.einsum(
+            "iac,icd,ibd->ab", arms, self.second_moment, arms, optimize=True
+        )
 
 
 def nodal_inertia(element: SuperElement) -> NodalInertia:
     """The inertia of M: as it is where it has one kernel or lumps at nodes; else lumped, with a note.
 
-    Lumps keep mass and mass centre of the structure. SuperElementError for a node that has mass in some directions only.
+    Lumps keep the mass and mass centre of the structure. SuperElementError for a node with mass in some directions
+    only.
     """
     full, blocks = _by_nodes(element)
     largest = _max(element.M)
@@ -62,7 +65,9 @@ def _by_nodes(element: SuperElement) -> tuple[Real, Real]:
     n = len(element.ids)
     there = element.place >= 0
     full = np.zeros((6 * n, 6 * n))
-    full[np.ix_(np.flatnonzero(there), np.flatnonzero(there))] = element.M[np.ix_(element.place[there], element.place[there])]
+    full[np.ix_(np.flatnonzero(there), np.flatnonzero(there))] = element.M[
+        np.ix_(element.place[there], element.place[there])
+    ]
     by_nodes = full.reshape(n, 6, n, 6)
     return by_nodes, by_nodes[np.arange(n), :, np.arange(n), :]
 
@@ -83,7 +88,9 @@ def _lumps(element: SuperElement, blocks: Real, note: str) -> NodalInertia:
     uneven = np.max(np.abs(blocks[:, :3, :3] - mass[:, None, None] * np.eye(3)), axis=(1, 2))
     if np.max(uneven) > slack:
         worst = element.ids[int(np.argmax(uneven))]
-        raise SuperElementError(f"node {worst} has other mass in x than in y or z: give mass that acts in all directions")
+        raise SuperElementError(
+            f"node {worst} has other mass in x than in y or z: give mass that acts in all directions"
+        )
     first = 0.5 * (blocks[:, 3:, :3] - blocks[:, :3, 3:])
     moment = np.stack([first[:, 2, 1], first[:, 0, 2], first[:, 1, 0]], axis=1)
     offset = np.where(mass[:, None] > slack, moment / np.where(mass > slack, mass, 1.0)[:, None], 0.0)

@@ -67,7 +67,7 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
         try:
             if "." in line:
                 values = [_real(line[i : i + width]) for i in range(0, len(line.rstrip()), width)]
-                if not (0 <= column < columns and 0 <= row and row + len(values) <= rows):
+                if not (0 <= column < columns and row >= 0 and row + len(values) <= rows):
                     raise ValueError("an element outside of the matrix")
                 matrix[row : row + len(values), column] = values
                 row += len(values)
@@ -78,7 +78,9 @@ def _op4(file: str, lines: list[str], at: int) -> tuple[NamedMatrix, int]:
         if len(whole) == 3:
             column, row = whole[0] - 1, whole[1] - 1
             if column == columns:
-                return NamedMatrix(name, matrix, None), number + (2 if "." in "".join(lines[number + 1 : number + 2]) else 1)
+                return NamedMatrix(name, matrix, None), number + (
+                    2 if "." in "".join(lines[number + 1 : number + 2]) else 1
+                )
         elif len(whole) == 2:
             row = whole[1] - 1
         elif len(whole) == 1:
@@ -131,7 +133,8 @@ def _cards(text: str) -> Iterator[tuple[int, list[str]]]:
 
     Field 0 is the card's name; from field 5 on, elements take four fields each: node, displacement, real, imaginary.
     """
-    begun, card = 0, []
+    begun = 0
+    card: list[str] = []
     for number, raw in enumerate(text.split("\n"), 1):
         line = raw.split("$")[0].rstrip()
         if not line:

@@ -108,12 +108,14 @@ def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64
 
 
 def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
-    """Static modes of the interface, then the lowest modes of the structure held there, as columns (N, held + modes)."""
+    """Static modes of the interface and the lowest modes of the structure held there: columns (N, held + modes)."""
     from scipy.linalg import cho_factor, cho_solve, eigh
 
     inside = np.setdiff1d(np.arange(len(K)), held)
     if not 0 <= modes <= len(inside):
-        raise SuperElementError(f"{modes} modes are asked for, and the structure held at its interface has {len(inside)}")
+        raise SuperElementError(
+            f"{modes} modes are asked for, and the structure held at its interface has {len(inside)}"
+        )
     T = np.zeros((len(K), len(held) + modes))
     T[held, np.arange(len(held))] = 1.0
     if len(inside) == 0:

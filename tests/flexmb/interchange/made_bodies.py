@@ -13,8 +13,11 @@ from flexmb.scene.shapes import beam_section
 
 STRIP = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=5e-10, rho=2700)
 LUMP = TipMass(
-    x_m=0.5, mass_kg=0.1, com_m=(0.0, 0.02, 0.03), inertia_kg_m2=((1e-4, 1e-5, 0.0), (1e-5, 1.2e-4, 0.0), (0.0, 0.0, 1.5e-4))
-)  # fmt: skip
+    x_m=0.5,
+    mass_kg=0.1,
+    com_m=(0.0, 0.02, 0.03),
+    inertia_kg_m2=((1e-4, 1e-5, 0.0), (1e-5, 1.2e-4, 0.0), (0.0, 0.0, 1.5e-4)),
+)
 
 
 def beam(**options: object) -> BeamBody:
@@ -36,14 +39,18 @@ def swinging(body: Body, inner: str, outer: str) -> Scene:
         .add(body)
         .rigid_body("load", mass=0.3, com=(0.02, 0.0, 0.01), inertia=(1e-3, 2e-3, 2.5e-3))
         .universal(
-            "pivot", "ground", body.name, child_node=inner, first=angular(angle=0.3, rate=5.0),
+            "pivot",
+            "ground",
+            body.name,
+            child_node=inner,
+            first=angular(angle=0.3, rate=5.0),
             second=angular(angle=0.5, rate=-3.0),
         )
         .revolute("wrist", body.name, "load", parent_node=outer, axis=(0, 0, 1), angle=0.4, rate=7.0)
         .modal_state(body.name, coordinates=0.003 * np.cos(np.arange(5.0)), rates=np.sin(np.arange(5.0)))
         .marker("end", body.name, node=outer)
         .scene()
-    )  # fmt: skip
+    )
 
 
 def at_level(body: BeamBody, level: str) -> BeamBody:

@@ -12,22 +12,27 @@ def link(name: str, seed: int) -> str:
     squares = a @ a.T * 1e-2
     J = np.trace(squares) * np.eye(3) - squares
     xyz, rpy = rng.normal(size=3) * 0.1, rng.normal(size=3)
-    numbers = " ".join(f'i{n}="{J[i, j]:.17g}"' for n, i, j in (("xx", 0, 0), ("xy", 0, 1), ("xz", 0, 2), ("yy", 1, 1), ("yz", 1, 2), ("zz", 2, 2)))
+    numbers = " ".join(
+        f'i{n}="{J[i, j]:.17g}"'
+        for n, i, j in (("xx", 0, 0), ("xy", 0, 1), ("xz", 0, 2), ("yy", 1, 1), ("yz", 1, 2), ("zz", 2, 2))
+    )
     return (
         f'<link name="{name}"><inertial><origin xyz="{_words(xyz)}" rpy="{_words(rpy)}"/>'
         f'<mass value="{1.0 + rng.random():.17g}"/><inertia {numbers}/></inertial>'
         '<visual><geometry><mesh filename="package://nowhere/shape.stl"/></geometry></visual></link>'
-    )  # fmt: skip
+    )
 
 
 def joint(name: str, kind: str, parent: str, child: str, seed: int, extra: str = "") -> str:
     rng = np.random.default_rng(1000 + seed)
     xyz, rpy, axis = rng.normal(size=3) * 0.3, rng.normal(size=3), rng.normal(size=3)
-    along = f'<axis xyz="{_words(axis / np.linalg.norm(axis))}"/>' if kind not in ("fixed", "floating", "planar") else ""
+    along = (
+        f'<axis xyz="{_words(axis / np.linalg.norm(axis))}"/>' if kind not in ("fixed", "floating", "planar") else ""
+    )
     return (
         f'<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>'
         f'<origin xyz="{_words(xyz)}" rpy="{_words(rpy)}"/>{along}{extra}</joint>'
-    )  # fmt: skip
+    )
 
 
 LIMIT = '<limit effort="10" velocity="3" lower="-2" upper="2"/>'
@@ -35,7 +40,12 @@ LIMIT = '<limit effort="10" velocity="3" lower="-2" upper="2"/>'
 
 def arm() -> str:
     """Six axes of all kinds in turned frames, a massless flange, a welded tool."""
-    parts = ['<link name="base"/>', *(link(f"link{k}", k) for k in range(1, 7)), '<link name="flange"/>', link("tool", 9)]
+    parts = [
+        '<link name="base"/>',
+        *(link(f"link{k}", k) for k in range(1, 7)),
+        '<link name="flange"/>',
+        link("tool", 9),
+    ]
     kinds = ["revolute", "continuous", "prismatic", "revolute", "continuous", "revolute"]
     names = ["base", *(f"link{k}" for k in range(1, 7))]
     for k, kind in enumerate(kinds):

@@ -79,16 +79,23 @@ def test_what_is_left_out_is_said(tmp_path):
 
 
 BAD = {
-    "armature": (MJCF.replace('name="pitch"', 'name="pitch" armature="0.1"'), 'joint "pitch" has the rotor inertia 0.1'),
-    "equality": (MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'), "1 equality"),
+    "armature": (
+        MJCF.replace('name="pitch"', 'name="pitch" armature="0.1"'),
+        'joint "pitch" has the rotor inertia 0.1',
+    ),
+    "equality": (
+        MJCF.replace("</mujoco>", '<equality><weld body1="foot" body2="tail"/></equality></mujoco>'),
+        "1 equality",
+    ),
     "tendon": (
-        MJCF.replace("</mujoco>", '<tendon><fixed><joint joint="roll" coef="1"/></fixed></tendon></mujoco>'), "1 tendons"
+        MJCF.replace("</mujoco>", '<tendon><fixed><joint joint="roll" coef="1"/></fixed></tendon></mujoco>'),
+        "1 tendons",
     ),
     "fluid": (MJCF.replace("<option", '<option density="1.2"'), "no fluid"),
     "levity": (MJCF.replace('name="foot"', 'name="foot" gravcomp="1"'), 'body "foot" has gravity compensation'),
     "no model": ("<mujoco><worldbody><body><joint/></body></worldbody></mujoco>", "MuJoCo refuses"),
     "no xml": ("hello", "MuJoCo refuses"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", BAD)

@@ -92,7 +92,9 @@ def _loaded_frequencies(body: fm.Body, load: str) -> np.ndarray:
     pull = (20.0, 0.0, 0.0) if load == "gravity" else (0.0, 0.0, 0.0)
     builder = fm.SceneBuilder("rotor", gravity=pull).add(body).revolute("shaft", "ground", "rod", axis=(0, 0, 1))
     scene = builder.scene()
-    about = fm.steady_spin(scene, "shaft", 20.0).linearize if load == "spin" else lambda: fm.linearize(fm.compile(scene))
+    about = (
+        fm.steady_spin(scene, "shaft", 20.0).linearize if load == "spin" else lambda: fm.linearize(fm.compile(scene))
+    )
     return np.sort(np.abs(np.linalg.eigvals(about().A)))
 
 
@@ -136,7 +138,9 @@ def test_files_of_other_writers_are_read(tmp_path):
 
     def other_hand(text: str) -> str:
         text = re.sub(r"(= -?[\d.]+)e([+-]\d+)", r"\1D\2", text)
-        text = text.replace("    mdCM\n", "\n% centre of mass\n    MDCM   ! a comment\n\n").replace("m0(1,1)", "M0(  1,   1)")
+        text = text.replace("    mdCM\n", "\n% centre of mass\n    MDCM   ! a comment\n\n").replace(
+            "m0(1,1)", "M0(  1,   1)"
+        )
         head, ke, tail = re.split(r"(    Ke\n.*    end Ke\n)", text, flags=re.DOTALL)
         return head.replace("    frame\n", ke + "    frame\n") + tail
 
@@ -194,12 +198,15 @@ def negated(block: str):
 
 
 CONTRADICTIONS = {
-    "a sign of Gr": (negated("Gr"), "Gr and Cr"), "a sign of Ct": (negated("Ct"), "mdCM and Ct"),
-    "a sign of Oe": (negated("Oe"), "Oe and Gr"), "a sign of Cr": (negated("Cr"), "Gr and Cr"),
-    "masses": (negated("Me"), "Gr and Me"), "inertia": (negated("J"), "no distribution of mass"),
+    "a sign of Gr": (negated("Gr"), "Gr and Cr"),
+    "a sign of Ct": (negated("Ct"), "mdCM and Ct"),
+    "a sign of Oe": (negated("Oe"), "Oe and Gr"),
+    "a sign of Cr": (negated("Cr"), "Gr and Cr"),
+    "masses": (negated("Me"), "Gr and Me"),
+    "inertia": (negated("J"), "no distribution of mass"),
     "stress": (lambda sid: replace(sid, ksigma=Taylor(np.ones((5, 1)))), "ksigma has an M0"),
     "stiffness": (lambda sid: replace(sid, Ke=Taylor(sid.Ke.zero, np.ones((5, 5, 5)))), "Ke has an M1"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", CONTRADICTIONS)
@@ -216,13 +223,16 @@ BROKEN = {
     "an element outside": (lambda text: text.replace("m0(1,1)", "m0(9,1)", 1), r"\(9, 1\) is no element of"),
     "a missing block": (lambda text: re.sub(r"    Me\n.*    end Me\n", "", text, flags=re.DOTALL), "no block Me"),
     "an unknown block": (lambda text: text.replace("    Me\n", "    Mx\n"), '"Mx" is no block'),
-    "a block twice": (lambda text: text.replace("    Ke\n", "    De\n").replace("end Ke", "end De"), "De is there twice"),
+    "a block twice": (
+        lambda text: text.replace("    Ke\n", "    De\n").replace("end Ke", "end De"),
+        "De is there twice",
+    ),
     "a wrong size": (lambda text: text.replace("nrow = 6", "nrow = 7"), "sigma is 7 x 1 .* 6 x 1"),
     "modes beyond memory": (lambda text: text.replace("nelastq = 5", "nelastq = 99999999"), "nelastq"),
     "no SID": (lambda text: "hello", "no block refmod"),
     "empty": (lambda text: "", "no block refmod"),
     "no mass": (lambda text: re.sub(r"mass = .*", "mass = 0", text), "no mass above zero"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", BROKEN)

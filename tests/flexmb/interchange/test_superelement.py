@@ -22,9 +22,11 @@ BEAM = super_element(STIFFNESS, frames.lumped(POSITION, MEMBERS, rotary=1e-7), P
 GRID, BARS = frames.panel()
 PANEL_STIFFNESS = frames.frame(GRID, BARS)
 MASSES = {
-    "lumped": frames.lumped(GRID, BARS), "tensors": frames.lumped(GRID, BARS, rotary=1e-5),
-    "one kernel": frames.linear(GRID, BARS), "coupled": frames.consistent(GRID, BARS),
-}  # fmt: skip
+    "lumped": frames.lumped(GRID, BARS),
+    "tensors": frames.lumped(GRID, BARS, rotary=1e-5),
+    "one kernel": frames.linear(GRID, BARS),
+    "coupled": frames.consistent(GRID, BARS),
+}
 
 
 def clamped(element, first: int = 0) -> np.ndarray:
@@ -49,18 +51,24 @@ def test_few_modes_give_the_low_frequencies_of_the_whole_and_never_lower_ones():
 
 
 def test_frequencies_are_those_of_the_closed_form_and_of_flexmbs_beam():
-    """Cantilever: (beta L)² = 3.516, 22.03; half the mass of the last element is lumped at the tip: error ~ 1/(2 n²)."""
+    """Cantilever: (beta L)² = 3.516, 22.03; half an element is lumped at the tip, an error ~ 1/(2 n²)."""
     found = reduced(BEAM, [1, TIP], 8).frequencies
     line = frames.RHO * frames.A
     exact = sorted(
-        beta**2 * np.sqrt(frames.E * I / line) / (2.0 * np.pi) for beta in (1.8751041, 4.6940911) for I in (frames.IY, frames.IZ)
+        beta**2 * np.sqrt(frames.E * I / line) / (2.0 * np.pi)
+        for beta in (1.8751041, 4.6940911)
+        for I in (frames.IY, frames.IZ)
     )
     assert relative(found[:2], exact[:2]) < 1.0 / 20**2
     assert relative(found[2:4], exact[2:4]) < 22.0 / 3.5 / 20**2
     section = fm.BeamStation(
-        x_m=0.0, EA_N=frames.E * frames.A, EIy_Nm2=frames.E * frames.IY, EIz_Nm2=frames.E * frames.IZ,
-        GJ_Nm2=frames.G * frames.J, mass_per_length_kg_m=line,
-    )  # fmt: skip
+        x_m=0.0,
+        EA_N=frames.E * frames.A,
+        EIy_Nm2=frames.E * frames.IY,
+        EIz_Nm2=frames.E * frames.IZ,
+        GJ_Nm2=frames.G * frames.J,
+        mass_per_length_kg_m=line,
+    )
     modes = fm.Modes(count=4, families=("bending_y", "bending_z"))
     builder = fm.SceneBuilder("own").beam(
         "rod", length=LENGTH, elements=20, section=section, modes=modes, mass="lumped", points="line"
@@ -129,12 +137,14 @@ def test_gyroscopic_sums_are_those_of_the_moving_nodes():
 def assembled(made, base: str) -> fm.Scene:
     """The structure on a hinge, a rigid body at its far node."""
     return (
-        fm.SceneBuilder("arm").add(made.body)
+        fm.SceneBuilder("arm")
+        .add(made.body)
         .rigid_body("load", mass=0.2, com=(0.03, 0.0, 0.0), inertia=(1e-3, 2e-3, 2e-3))
         .revolute("pivot", "ground", "body", child_node=base, axis=(0, 1, 0), stiffness=50.0)
         .revolute("wrist", "body", "load", parent_node="21", axis=(0, 0, 1), stiffness=1.0)
-        .marker("end", "body", node="21").scene()
-    )  # fmt: skip
+        .marker("end", "body", node="21")
+        .scene()
+    )
 
 
 def test_free_and_clamped_modes_give_the_same_assembled_system():
@@ -154,9 +164,13 @@ def test_a_tip_load_bends_it_by_the_closed_form_and_comes_back_at_the_root():
     made = reduced(BEAM, [1, TIP], 2)
     force = 1e-3
     scene = (
-        fm.SceneBuilder("loaded").add(made.body).weld("root", "ground", "body", child_node="1")
-        .force("pull", "body", node="21", direction=(0, 1, 0), function=fm.Constant(value=force)).marker("end", "body", node="21").scene()
-    )  # fmt: skip
+        fm.SceneBuilder("loaded")
+        .add(made.body)
+        .weld("root", "ground", "body", child_node="1")
+        .force("pull", "body", node="21", direction=(0, 1, 0), function=fm.Constant(value=force))
+        .marker("end", "body", node="21")
+        .scene()
+    )
     system = fm.compile(scene)
     rest = fm.equilibrium(system)
     deflection = system.evaluate(rest.t, rest.q, rest.u).markers["end"].position[1]
@@ -186,11 +200,15 @@ def cut(K):
 
 
 BAD = {
-    "held": (lambda: super_element(spring_to_ground(STIFFNESS), BEAM.M, POSITION), "resists the rigid-body translation x"),
+    "held": (
+        lambda: super_element(spring_to_ground(STIFFNESS), BEAM.M, POSITION),
+        "resists the rigid-body translation x",
+    ),
     "moved node": (lambda: super_element(STIFFNESS, BEAM.M, POSITION[:, [1, 0, 2]]), "resists the rigid-body rotation"),
     "not symmetric": (lambda: super_element(np.triu(STIFFNESS), BEAM.M, POSITION), "K is not symmetric"),
     "mass in x only": (
-        lambda: super_element(STIFFNESS, BEAM.M * np.tile([1, 0, 0, 1, 1, 1], 21), POSITION), "M is not symmetric|mass of M"
+        lambda: super_element(STIFFNESS, BEAM.M * np.tile([1, 0, 0, 1, 1, 1], 21), POSITION),
+        "M is not symmetric|mass of M",
     ),
     "sizes": (lambda: super_element(STIFFNESS[6:, 6:], BEAM.M, POSITION), "K has 120 rows, M 126"),
     "no such node": (lambda: reduced(BEAM, [1, 22], 2), "there is no node 22: the nodes are 1, 2"),
@@ -198,7 +216,7 @@ BAD = {
     "loose part": (lambda: reduced(super_element(cut(STIFFNESS), BEAM.M, POSITION), [1], 2), "move without force"),
     "no interface": (lambda: reduced(BEAM, [], 2), "no interface node"),
     "nan": (lambda: super_element(STIFFNESS * np.nan, BEAM.M, POSITION), "finite numbers"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", BAD)

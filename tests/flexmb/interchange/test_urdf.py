@@ -28,8 +28,9 @@ def planar() -> str:
     return (
         f'<robot name="sledge"><link name="world"/>{link("body", 1)}{link("rod", 2)}'
         + joint("slide", "planar", "world", "body", 1, '<axis xyz="0 0 1"/>')
-        + joint("pin", "continuous", "body", "rod", 2) + "</robot>"
-    )  # fmt: skip
+        + joint("pin", "continuous", "body", "rod", 2)
+        + "</robot>"
+    )
 
 
 @pytest.mark.parametrize("robot", ["arm", "quadruped", "planar"])
@@ -65,7 +66,9 @@ class Theirs(NamedTuple):
 def _same_motion(system, model, rng) -> tuple[tuple[np.ndarray, np.ndarray], Theirs]:
     """A random motion as (q, u) of ours and as theirs."""
     q, u = system.initial_state.q.copy(), rng.normal(size=system.nu)
-    theirs = Theirs(np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv, int), np.eye(model.nv), np.zeros(model.nv))
+    theirs = Theirs(
+        np.zeros(model.nq), np.zeros(model.nv), np.zeros(model.nv, int), np.eye(model.nv), np.zeros(model.nv)
+    )
     for name in model.names[1:]:
         each = model.joints[model.getJointId(name)]
         hinge = "base" if name == "root_joint" else name
@@ -94,14 +97,20 @@ def _same_motion(system, model, rng) -> tuple[tuple[np.ndarray, np.ndarray], The
 
 def test_frames_are_where_the_file_says(tmp_path):
     text = (
-        f'<robot name="r"><link name="a"/>{link("b", 4)}<joint name="j" type="revolute"><parent link="a"/><child link="b"/>'
+        f'<robot name="r"><link name="a"/>{link("b", 4)}<joint name="j" type="revolute">'
+        '<parent link="a"/><child link="b"/>'
         '<origin xyz="1 2 3" rpy="0.1 0.2 0.3"/><axis xyz="0 0 2"/></joint></robot>'
     )
     (hinge,) = [each for each in read(text, tmp_path).scene.hinges if each.name == "j"]
     cx, sx, cy, sy, cz, sz = (f(a) for a in (0.1, 0.2, 0.3) for f in (np.cos, np.sin))
-    turns = [np.array(each) for each in (
-        [[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]], [[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]], [[1, 0, 0], [0, cx, -sx], [0, sx, cx]],
-    )]  # fmt: skip
+    turns = [
+        np.array(each)
+        for each in (
+            [[cz, -sz, 0], [sz, cz, 0], [0, 0, 1]],
+            [[cy, 0, sy], [0, 1, 0], [-sy, 0, cy]],
+            [[1, 0, 0], [0, cx, -sx], [0, sx, cx]],
+        )
+    ]
     assert np.allclose(rotation_matrix(hinge.parent_quaternion), turns[0] @ turns[1] @ turns[2], atol=1e-15)
     assert hinge.parent_position_m == (1.0, 2.0, 3.0)
     assert hinge.axis == (0.0, 0.0, 1.0)
@@ -125,7 +134,10 @@ BAD = {
     "mimic": (SINGLE.replace("<axis", '<mimic joint="k"/><axis'), 'joint "j": it mimics'),
     "kind": (SINGLE.replace('"revolute"', '"screw"'), 'its type is "screw"'),
     "loop": (SINGLE.replace("</robot>", joint("k", "fixed", "b", "a", 2) + "</robot>"), "0 links are no joint's child"),
-    "two parents": (SINGLE.replace("</robot>", joint("k", "fixed", "a", "b", 2) + "</robot>"), 'is also the child of "j"'),
+    "two parents": (
+        SINGLE.replace("</robot>", joint("k", "fixed", "a", "b", 2) + "</robot>"),
+        'is also the child of "j"',
+    ),
     "two roots": (SINGLE.replace("</robot>", link("c", 3) + "</robot>"), "2 links are no joint's child"),
     "unknown link": (SINGLE.replace('child link="b"', 'child link="x"'), 'its child is "x"'),
     "no mass": (re.sub(r"<mass[^>]*/>", "", SINGLE), "mass value is missing"),
@@ -138,7 +150,7 @@ BAD = {
     "no xml": ("robot", "not XML"),
     "empty": ("<robot name='r'/>", "0 links"),
     "same name": (SINGLE.replace('name="b"', 'name="a"'), "one that is taken"),
-}  # fmt: skip
+}
 
 
 @pytest.mark.parametrize("fault", BAD)
