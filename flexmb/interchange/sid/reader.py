@@ -20,7 +20,7 @@ ZEROS, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)  # "structure"
 STATEMENT = re.compile(r"([A-Za-z_]\w*)\s*(?:\(([^)]*)\))?\s*(?:=\s*(.*))?$")
 
 
-class Line(NamedTuple):
+class SidLine(NamedTuple):
     """A statement: `key`, in small letters, as written in `word`; indices in brackets; what is right of "="."""
 
     number: int
@@ -48,7 +48,7 @@ class _Reader:
     def __init__(self, file: str, text: str) -> None:
         self.file = file
         self.lines = self._statements(text)
-        self.line = Line(0, "", (), "")
+        self.line = SidLine(0, "", (), "")
         self.modes = 0
 
     def body(self) -> Sid:
@@ -175,7 +175,7 @@ class _Reader:
 
     # Statements and numbers
 
-    def _statements(self, text: str) -> Iterator[Line]:
+    def _statements(self, text: str) -> Iterator[SidLine]:
         """All statements; whatever stands before "part" is a title."""
         started = False
         for number, raw in enumerate(text.split("\n"), 1):
@@ -187,18 +187,18 @@ class _Reader:
                 continue
             first = stripped.split(maxsplit=1)
             if first[0].lower() == "new" and "=" in stripped:
-                yield Line(number, "new", (), stripped.partition("=")[2])
+                yield SidLine(number, "new", (), stripped.partition("=")[2])
             elif first[0].lower() in ("end", "new"):
-                yield Line(number, first[0], (), first[1] if len(first) > 1 else "")
+                yield SidLine(number, first[0], (), first[1] if len(first) > 1 else "")
             elif (found := STATEMENT.match(stripped)) is not None:
                 word, indices, value = found.groups()
-                self.line = Line(number, word, (), value or "")
+                self.line = SidLine(number, word, (), value or "")
                 yield self.line._replace(indices=tuple(self._whole(i) for i in indices.split(",")) if indices else ())
             else:
-                self.line = Line(number, stripped, (), "")
+                self.line = SidLine(number, stripped, (), "")
                 self._fail(f'"{stripped[:60]}" is no statement', "write KEY = VALUE, or the name of a block")
 
-    def _next(self, until: str) -> Line:
+    def _next(self, until: str) -> SidLine:
         line = next(self.lines, None)
         if line is None:
             self._fail(f"the file ends before {until}", "the file is cut off, or an end is missing: write it anew")

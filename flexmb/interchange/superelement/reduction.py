@@ -32,7 +32,8 @@ class ReducedBody:
     """`body` in axes of the structure, its origin at `origin` (3,) m of them; frequencies (m,) Hz of its modes.
 
     mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin, both in the body frame, by the rigid-body
-    motions of M. `notes`: what was changed, in words.
+    motions of M. shapes (n,6,m): displacements and rotations of all nodes of the structure for unit modes, to recover
+    its motion from modal coordinates. `notes`: what was changed, in words.
     """
 
     body: ModalBody
@@ -41,6 +42,7 @@ class ReducedBody:
     mass: float
     centre: Real
     inertia: Real
+    shapes: Real
     notes: tuple[str, ...]
 
 
@@ -52,11 +54,15 @@ def reduced(
 
     `modes`: how many modes of the structure held at all interface nodes join the 6 static modes of each of these, but
     for the six rigid-body motions. `damping_ratio` of every mode. Raises SuperElementError for interface nodes without
-    rotations, more modes than there are, mechanisms, and mass that no points can have.
+    rotations, no or more modes than there are, mechanisms, and mass that no points can have.
     """
+    if not 0.0 <= damping_ratio < 1.0:
+        raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
     inertia = nodal_inertia(element)
     nodes = [element.node(number) for number in dict.fromkeys(interface)]
     held = _interface_rows(element, nodes)
+    if len(held) + modes <= 6:
+        raise SuperElementError("one interface node without modes is a rigid body: ask for modes, or for more nodes")
     T = _shapes(element.K, inertia.M, held, modes)
     clamped = boundary == "clamped-free"
     R = element.rigid(np.zeros(3))
@@ -65,7 +71,8 @@ def reduced(
     centre = np.array([rigid_mass[5, 1], rigid_mass[3, 2], rigid_mass[4, 0]]) / mass
     origin = element.position[nodes[0]] if clamped else centre
     frequencies, V = _modes(element.K, inertia.M, T[:, 6:] if clamped else T, None if clamped else R)
-    translation, rotation = _at_nodes(element, V)
+    shapes = _at_nodes(element, V)
+    translation, rotation = shapes[:, :3], shapes[:, 3:]
     omega = 2.0 * np.pi * frequencies
     try:
         points = equivalent_masses(inertia.gram(element.position - origin, translation, rotation))
@@ -91,7 +98,7 @@ def reduced(
     about = element.rigid(origin)
     J = (about.T @ inertia.M @ about)[3:, 3:]
     notes = _notes(element, inertia)
-    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, centre - origin, J, notes)
+    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, centre - origin, J, shapes, notes)
 
 
 def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64]:
@@ -151,6 +158,7 @@ def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
     _refuse_loose(k, "K lets the structure move without force beyond its six rigid-body motions")
     compliance, columns = eigh(0.5 * (elastic + elastic.T), 0.5 * (k + k.T))
     kept = np.flatnonzero(compliance > MASSLESS * compliance[-1])[::-1]
+    kept = kept if rigid is None else kept[: len(compliance) - 6]
     V = T @ (columns[:, kept] / np.sqrt(np.einsum("im,ij,jm->m", columns[:, kept], m, columns[:, kept], optimize=True)))
     if rigid is not None:  # their share in the columns is rounding
         V = V - R @ (R.T @ (M @ V))
@@ -165,11 +173,10 @@ def _refuse_loose(K: Real, what: str) -> None:
         raise SuperElementError(f"{what}: join the part, or remove displacements without stiffness from K and M")
 
 
-def _at_nodes(element: SuperElement, V: Real) -> tuple[Real, Real]:
-    """Translations and rotations (n,3,m) of the nodes, zero where a node has none."""
+def _at_nodes(element: SuperElement, V: Real) -> Real:
+    """Translations and rotations (n,6,m) of the nodes, zero where a node has none."""
     padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # row -1
-    shapes = padded[element.place]
-    return shapes[:, :3], shapes[:, 3:]
+    return padded[element.place]
 
 
 def _notes(element: SuperElement, inertia: NodalInertia) -> tuple[str, ...]:
