@@ -20,7 +20,7 @@ from flexmb.scene.reading import MIB, Unreadable, read_text, regular_size
 from flexmb.typing import Real
 
 LIMIT = 512 * MIB
-LARGEST = 20_000  # rows: a dense matrix of 3 GiB
+LARGEST = 8_000  # rows: a dense matrix of half a GiB, minutes
 OP4, DMIG = (".op4",), (".pch", ".bdf", ".dat")
 MATRIX_MARKET, HARWELL_BOEING = (".mtx", ".mm"), (".hb", ".rb", ".rua", ".rsa")
 

@@ -14,7 +14,7 @@ import numpy as np
 from flexmb.interchange.superelement.element import SuperElementError
 from flexmb.typing import Real
 
-LARGEST = 20_000  # rows
+LARGEST = 8_000  # rows
 REAL_TYPES = (1, 2)  # single and double precision
 INTEGER = 8  # characters of a whole number in OP4
 STRING = 65536  # of a short string header: (words + 1) * STRING + first row

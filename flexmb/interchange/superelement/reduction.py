@@ -24,6 +24,8 @@ from flexmb.typing import Real
 
 LOOSE = 1e-12
 """Share of its own stiffness below which a motion needs no force: a mechanism, or a part that is joined to nothing."""
+DENSE = 1000
+"""Rows of matrices that are solved whole."""
 MASSLESS = 1e-13  # share of the largest 1/omega^2 below which a mode moves no mass
 
 
@@ -116,7 +118,7 @@ def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64
 
 def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
     """Static modes of the interface and the lowest modes of the structure held there: columns (N, held + modes)."""
-    from scipy.linalg import cho_factor, cho_solve, eigh
+    from scipy.linalg import cho_solve
 
     inside = np.setdiff1d(np.arange(len(K)), held)
     if not 0 <= modes <= len(inside):
@@ -128,11 +130,10 @@ def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
     if len(inside) == 0:
         return T
     K_ii, M_ii = K[np.ix_(inside, inside)], M[np.ix_(inside, inside)]
-    _refuse_loose(K_ii, "K lets a part move without force while the interface is held")
-    T[np.ix_(inside, np.arange(len(held)))] = -cho_solve(cho_factor(K_ii), K[np.ix_(inside, held)])
+    L = _factor(K_ii, "K lets a part move without force while the interface is held")
+    T[np.ix_(inside, np.arange(len(held)))] = -cho_solve((L, True), K[np.ix_(inside, held)])
     if modes:
-        n = len(inside)
-        compliance, columns = eigh(M_ii, K_ii, subset_by_index=[n - modes, n - 1])
+        compliance, columns = _highest(M_ii, L, modes)
         if compliance[0] <= MASSLESS * compliance[-1]:
             there = int(np.count_nonzero(compliance > MASSLESS * compliance[-1]))
             raise SuperElementError(f"{modes} modes are asked for, and M gives mass to {there} of them: ask for fewer")
@@ -155,7 +156,7 @@ def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
         held = T.T @ (M @ R)
         k = k + np.trace(k) / np.trace(held @ held.T) * held @ held.T
         elastic = m - held @ held.T
-    _refuse_loose(k, "K lets the structure move without force beyond its six rigid-body motions")
+    _factor(k, "K lets the structure move without force beyond its six rigid-body motions")
     compliance, columns = eigh(0.5 * (elastic + elastic.T), 0.5 * (k + k.T))
     kept = np.flatnonzero(compliance > MASSLESS * compliance[-1])[::-1]
     kept = kept if rigid is None else kept[: len(compliance) - 6]
@@ -166,11 +167,37 @@ def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
     return 1.0 / (2.0 * np.pi * np.sqrt(compliance[kept])), V * np.sign(largest)
 
 
-def _refuse_loose(K: Real, what: str) -> None:
-    """SuperElementError where K, scaled to unit diagonal, is singular."""
+def _factor(K: Real, what: str) -> Real:
+    """Cholesky's lower factor; SuperElementError where a pivot of K, scaled to unit diagonal, is rounding."""
     size = np.sqrt(np.maximum(np.diag(K), np.finfo(float).tiny))
-    if float(np.linalg.eigvalsh(K / np.outer(size, size))[0]) < LOOSE:
+    try:
+        L = np.linalg.cholesky(K / np.outer(size, size))
+    except np.linalg.LinAlgError:
+        L = np.zeros((1, 1))
+    if np.min(np.diag(L)) ** 2 < LOOSE:
         raise SuperElementError(f"{what}: join the part, or remove displacements without stiffness from K and M")
+    return size[:, None] * L
+
+
+def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
+    """The `count` largest values, ascending, and columns of M x = value L L' x: by Lanczos' method where few of many."""
+    from scipy.linalg import eigh, solve_triangular
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n = len(M)
+    if n <= DENSE or 4 * count > n:
+        reduced_mass = solve_triangular(L, solve_triangular(L, M, lower=True).T, lower=True)
+        values, columns = eigh(0.5 * (reduced_mass + reduced_mass.T), subset_by_index=[n - count, n - 1])
+    else:
+
+        def product(x: Real) -> Real:
+            return solve_triangular(L, M @ solve_triangular(L, x, lower=True, trans=1), lower=True)
+
+        start = np.random.default_rng(0).normal(size=n)  # the same run after run
+        values, columns = eigsh(LinearOperator((n, n), product), k=count, which="LA", v0=start, tol=1e-13)
+        order = np.argsort(values)
+        values, columns = values[order], columns[:, order]
+    return values, solve_triangular(L, columns, lower=True, trans=1)
 
 
 def _at_nodes(element: SuperElement, V: Real) -> Real:

@@ -8,7 +8,7 @@ from scipy.linalg import eigh
 
 import flexmb as fm
 from flexmb.interchange.sid import imported_sid, sid_of
-from flexmb.interchange.superelement import SuperElementError, reduced, super_element
+from flexmb.interchange.superelement import SuperElementError, reduced, reduction, super_element
 from flexmb.interchange.superelement.inertia import nodal_inertia
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.integrals import modal_integrals
@@ -48,6 +48,15 @@ def test_few_modes_give_the_low_frequencies_of_the_whole_and_never_lower_ones():
     assert np.all(few >= whole[: len(few)] * (1.0 - 1e-9))  # Rayleigh and Ritz
     assert np.all(few[:4] <= fewer[:4])
     assert relative(few[:4], whole[:4]) < 1e-3
+
+
+def test_a_large_structure_has_the_modes_that_all_of_it_has(monkeypatch):
+    """Lanczos' method for few modes of many, against the whole eigenproblem."""
+    position, members = frames.panel(7, 8)
+    element = super_element(frames.frame(position, members), frames.lumped(position, members), position)
+    whole = reduced(element, [1, 56], 6)
+    monkeypatch.setattr(reduction, "DENSE", 10)
+    assert relative(reduced(element, [1, 56], 6).frequencies, whole.frequencies) < 1e-9
 
 
 def test_frequencies_are_those_of_the_closed_form_and_of_flexmbs_beam():
