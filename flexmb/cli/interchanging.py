@@ -25,6 +25,10 @@ def import_(
     model: Annotated[Path, typer.Argument(help="URDF, MJCF (.xml) or SID file.", metavar="MODEL", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Scene file to write.")] = Path("scene.toml"),
     free_base: Annotated[bool, typer.Option("--free-base", help="Of a URDF: the root link floats.")] = False,
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Of a URDF: change tensors that no mass has as little as makes them possible."),
+    ] = False,
 ) -> None:
     """
     Make a scene of a robot (URDF, MJCF) or of a flexible body (SID).
@@ -42,7 +46,7 @@ def import_(
     """
     with no_traceback():
         check_folder(out.parent)
-        scene, notes = _imported(model, free_base)
+        scene, notes = _imported(model, free_base, repair)
         _write(scene, out, notes)
 
 
@@ -130,15 +134,15 @@ def reduce(
     console.print("wrote", str(out), soft_wrap=True)
 
 
-def _imported(model: Path, free_base: bool) -> tuple[Scene, tuple[str, ...]]:
+def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[str, ...]]:
     ending = model.suffix.lower()
     if ending == ".urdf":
         from flexmb.interchange.urdf import read_urdf
 
-        found = read_urdf(model, free_base=free_base)
+        found = read_urdf(model, free_base=free_base, repair=repair)
         return found.scene, found.notes
-    if free_base:
-        raise ValueError("--free-base is for URDF: an MJCF has a freejoint")
+    if free_base or repair:
+        raise ValueError("--free-base and --repair are for URDF: an MJCF has a freejoint, and MuJoCo's own checks")
     if ending in (".xml", ".mjcf"):
         from flexmb.interchange.mjcf import read_mjcf
 

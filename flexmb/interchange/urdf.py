@@ -31,15 +31,18 @@ Z = np.array([0.0, 0.0, 1.0])
 
 
 def read_urdf(
-    path: str | os.PathLike[str], *, gravity: ArrayLike = (0.0, 0.0, -9.81), free_base: bool = False
-) -> ImportedScene:
+    path: str | os.PathLike[str], *, gravity: ArrayLike = (0.0, 0.0, -9.81), free_base: bool = False,
+    repair: bool = False,
+) -> ImportedScene:  # fmt: skip
     """The rigid tree of a URDF file, at its zero position and at rest, under `gravity` (m/s², World axes).
 
-    The root link is welded to the ground, or free with `free_base`; its frame starts at the World's. Limits, damping,
+    The root link is welded to the ground, or free with `free_base`; its frame starts at the World's. Many published
+    robots have tensors that no mass has: `repair` changes them as little as makes them possible, and a note lists them;
+    otherwise they are SceneErrors. Limits, damping,
     friction, shapes and transmissions are left out, as the notes say. Raises ModelError for what is no URDF, has no one
     root, or has mimic joints; SceneError for inertia that no body has; OSError for a file that cannot be read.
     """
-    return _Robot(str(path), _parsed(Path(path))).scene(gravity, free_base)
+    return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
 
 
 def _parsed(path: Path) -> ElementTree.Element:
@@ -52,7 +55,7 @@ def _parsed(path: Path) -> ElementTree.Element:
         raise ModelError(f"{path}: {error}") from None
     except ElementTree.ParseError as error:
         raise ModelError(f"{path}: not XML ({error}): correct it there") from None
-    if "xacro" in text and any(each.tag.startswith("{") for each in root.iter()):
+    if any(each.tag.startswith("{") and "xacro" in each.tag for each in root.iter()):
         raise ModelError(f"{path}: it has xacro macros: expand them first, by the command xacro")
     if root.tag != "robot":
         raise ModelError(f'{path}: the outermost element is "{root.tag}", not "robot": is it a URDF file?')
@@ -62,11 +65,12 @@ def _parsed(path: Path) -> ElementTree.Element:
 class _Robot:
     """One robot; `place` in errors are the names of link and joint."""
 
-    def __init__(self, file: str, robot: ElementTree.Element) -> None:
-        self.file, self.robot = file, robot
+    def __init__(self, file: str, robot: ElementTree.Element, repair: bool) -> None:
+        self.file, self.robot, self.repair = file, robot, repair
         self.links = self._named("link")
         self.joints = self._named("joint")
         self.ignored: dict[str, list[str]] = {}
+        self.repaired: list[str] = []
 
     def scene(self, gravity: ArrayLike, free_base: bool) -> ImportedScene:
         root = self._root()
@@ -77,7 +81,7 @@ class _Robot:
         base = next(
             name for name in ("base", "base_joint", f"{root}_to_ground", *map(str, range(9))) if name not in taken
         )
-        (builder.free if free_base else builder.weld)(base, GROUND, root)
+        (builder.free if free_base else builder.weld)(base, GROUND, self._body_of(root))
         for name, joint in self.joints.items():
             self._hinge(builder, name, joint)
         return ImportedScene(builder.scene(), tuple(self._notes()))
@@ -86,8 +90,8 @@ class _Robot:
         found: dict[str, ElementTree.Element] = {}
         for element in self.robot.findall(tag):
             name = element.get("name")
-            if not name or name in found or name == GROUND:
-                self._fail(f'{tag} "{name}"', 'it has no name, one that is taken, or "ground"', "rename it")
+            if not name or name in found:
+                self._fail(f'{tag} "{name}"', "it has no name, or one that is taken", "rename it")
             found[name] = element
         return found
 
@@ -113,10 +117,16 @@ class _Robot:
             self._fail(f'joint "{name}"', f'its {end} is "{link}", which is no link', "name one that is there")
         return link
 
+    def _body_of(self, link: str) -> str:
+        """The name of a link's body: "ground" is taken by the inertial frame."""
+        return (
+            link if link != GROUND else next(name for name in ("ground link", "link ground") if name not in self.links)
+        )
+
     def _body(self, builder: SceneBuilder, name: str, link: ElementTree.Element) -> None:
         place, inertial = f'link "{name}"', link.find("inertial")
         if inertial is None:
-            builder.rigid_body(name, mass=0.0, inertia=np.zeros((3, 3)))
+            builder.rigid_body(self._body_of(name), mass=0.0, inertia=np.zeros((3, 3)))
             return
         R, com = self._origin(place, inertial)
         mass = self._number(place, inertial, "mass", "value")
@@ -124,12 +134,15 @@ class _Robot:
             self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
         )
         tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if self.repair and not np.array_equal(possible := _possible(mass, tensor), tensor):
+            self.repaired.append(name)
+            tensor = possible
         turned = R @ tensor @ R.T
-        builder.rigid_body(name, mass=mass, com=com, inertia=0.5 * (turned + turned.T))
+        builder.rigid_body(self._body_of(name), mass=mass, com=com, inertia=0.5 * (turned + turned.T))
 
     def _hinge(self, builder: SceneBuilder, name: str, joint: ElementTree.Element) -> None:
         place, kind = f'joint "{name}"', joint.get("type", "")
-        parent, child = self._link_of(name, joint, "parent"), self._link_of(name, joint, "child")
+        parent, child = (self._body_of(self._link_of(name, joint, end)) for end in ("parent", "child"))
         if joint.find("mimic") is not None:
             what = "it mimics another joint, and no hinge of a scene follows another"
             self._fail(place, what, "prescribe both coordinates, or close the mechanism by a closure")
@@ -195,11 +208,24 @@ class _Robot:
         others = sorted({each.tag for each in self.robot} - {"link", "joint", *NO_MECHANICS})
         if others:
             yield f"elements that URDF does not define are left out: {listed(others)}"
+        if self.repaired:
+            yield f"tensors that no mass has were changed as little as makes them possible: {listed(self.repaired)}"
         if empty := [name for name, link in self.links.items() if link.find("inertial") is None]:
             yield f"links without inertia are bodies without mass: {listed(empty)}"
 
     def _fail(self, place: str, what: str, remedy: str) -> NoReturn:
         raise ModelError(f"{self.file}: {place}: {what}: {remedy}")
+
+
+def _possible(mass: float, tensor: Real) -> Real:
+    """The tensor itself if masses can have it, else the one whose second moments sum m x x' lose what is negative."""
+    if mass == 0.0:
+        return np.zeros((3, 3))
+    second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    if second[0] >= 0.0:
+        return tensor
+    second = np.maximum(second, 0.0)
+    return np.sum(second) * np.eye(3) - (axes * second) @ axes.T
 
 
 def _upright(axis: Real) -> Real:

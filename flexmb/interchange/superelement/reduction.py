@@ -180,7 +180,7 @@ def _factor(K: Real, what: str) -> Real:
 
 
 def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
-    """The `count` largest values, ascending, and columns of M x = value L L' x: by Lanczos' method where few of many."""
+    """The `count` largest values, ascending, and columns of M x = value L L' x; by Lanczos where few of many."""
     from scipy.linalg import eigh, solve_triangular
     from scipy.sparse.linalg import LinearOperator, eigsh
 

@@ -161,6 +161,20 @@ def test_what_is_no_tree_of_rigid_bodies_is_refused_with_place_and_remedy(fault,
     assert "robot.urdf" in str(error.value)
 
 
-def test_inertia_that_no_body_has_is_refused(tmp_path):
+def test_inertia_that_no_body_has_is_refused_or_repaired(tmp_path):
+    text = re.sub(r'izz="[^"]*"', 'izz="9"', SINGLE)
     with pytest.raises(fm.SceneError, match="triangle|positive"):
-        read(re.sub(r'izz="[^"]*"', 'izz="9"', SINGLE), tmp_path)
+        read(text, tmp_path)
+    repaired = read(text, tmp_path, repair=True)
+    assert "changed as little as makes them possible: a, b" in repaired.notes[-1]
+    moments = np.linalg.eigvalsh(repaired.scene.bodies[0].inertia_kg_m2)
+    assert moments[0] + moments[1] >= moments[2] * (1.0 - 1e-12)
+    assert read(SINGLE, tmp_path, repair=True) == read(SINGLE, tmp_path)  # what is possible stays as it is
+
+
+def test_a_link_may_be_called_ground_and_namespaces_of_macros_may_be_left_over(tmp_path):
+    text = SINGLE.replace('"a"', '"ground"').replace(
+        "<robot", '<robot xmlns:xacro="http://ros.org/wiki/xacro" xmlns:g="g"'
+    )
+    scene = read(text.replace("</robot>", "<g:body/></robot>"), tmp_path).scene
+    assert [body.name for body in scene.bodies] == ["ground link", "b"]
