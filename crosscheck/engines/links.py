@@ -129,7 +129,7 @@ def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
             return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'
     for body in scene.bodies:
         if isinstance(body, SidBody):
-            return f'body "{body.name}": SID files are not supported yet'
+            return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
         if not isinstance(body, RigidBody) and body.level != "rigid":
             return f'{engine} has no flexible bodies ("{body.name}"): use the finite-segment surrogate'
     return ""

@@ -8,6 +8,7 @@ import typer
 
 from flexmb.cli.advising import advise
 from flexmb.cli.appendages import equivalence
+from flexmb.cli.interchanging import export, import_, reduce
 from flexmb.cli.linearising import campbell, linearize
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
@@ -44,8 +45,9 @@ def everything(
     """Has no words of its own: the application's help stands above."""
 
 
-for command in (simulate, check, equivalence, advise, linearize, campbell, schema):
+for command in (simulate, check, equivalence, advise, linearize, campbell, export, reduce, schema):
     app.command()(command)
+app.command("import")(import_)  # as a function it cannot have this name
 
 
 def main() -> None:

@@ -15,6 +15,9 @@ from flexmb.scene.files import load_scene
 
 METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
 
+FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
+"""Endings, and the methods of a trajectory that write them."""
+
 
 def simulate(
     scene: SceneFile,
@@ -43,6 +46,10 @@ def simulate(
             "`frisch_as_printed`."
         ),
     ] = "articulated",
+    also: Annotated[
+        list[str] | None,
+        typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
+    ] = None,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
 ) -> None:
     """
@@ -55,6 +62,7 @@ def simulate(
         flexmb simulate boom.toml --t-end 60 --method rk4 --step 1e-3 --no-plots
         flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
+        flexmb simulate boom.toml --t-end 60 --also parquet --also rrd
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
@@ -69,6 +77,9 @@ def simulate(
         from flexmb.run.summary import summary
 
         check_folder(out)
+        strange = [word for word in also or () if word not in FORMATS]
+        if strange:
+            raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             try:
                 trajectory = run(
@@ -83,7 +94,10 @@ def simulate(
         with writing(out / "trajectory.csv"):
             trajectory.to_csv(out / "trajectory.csv")
         with writing(out):
-            written = [out / "trajectory.csv", *(trajectory.plot(out) if plots else ())]
+            others = [out / f"trajectory.{word}" for word in dict.fromkeys(also or ())]
+            for path in others:
+                getattr(trajectory, FORMATS[path.suffix[1:]])(path)
+            written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)

@@ -7,14 +7,19 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from flexmb.run import exports
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.tables.status import Status
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
 
 
 @dataclass(frozen=True)
@@ -134,6 +139,32 @@ class Trajectory:
             writer.writerow([f"{name} [{unit}]" for name, unit, _ in columns])
             for row in zip(*(values.tolist() for _, _, values in columns), strict=True):
                 writer.writerow([f"{value:.17g}" for value in row])
+
+    def to_npz(self, path: str | os.PathLike[str]) -> None:
+        """Write all channels for NumPy: `names` (n,), `units` (n,), `values` (T,n), and `scene`."""
+        exports.write_npz(self, Path(path))
+
+    def to_pandas(self) -> pandas.DataFrame:
+        """All channels as columns, time (s) as the index; `attrs["units"]` by name. ImportError without pandas."""
+        return exports.data_frame(self)
+
+    def to_parquet(self, path: str | os.PathLike[str]) -> None:
+        """Write all channels as columns, their units in the metadata of the fields. ImportError without pyarrow."""
+        exports.write_parquet(self, Path(path))
+
+    def to_xarray(self) -> xarray.Dataset:
+        """Channels by name with dimensions t, axis (x, y, z), component (w, x, y, z of quaternions), units in `attrs`.
+
+        Names are those of crosscheck: "marker:end.position", "load:pivot.torque". ImportError without xarray.
+        """
+        return exports.dataset(self)
+
+    def to_rerun(self, path: str | os.PathLike[str]) -> None:
+        """Write a recording (`.rrd`) for the viewer rerun: markers move in space, loads and energies are curves.
+
+        ImportError without rerun-sdk.
+        """
+        exports.write_recording(self, Path(path))
 
     def plot(self, folder: str | os.PathLike[str]) -> list[Path]:
         """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""

@@ -183,7 +183,11 @@ class ModalBody(SceneStruct, frozen=True, kw_only=True, tag="modal", tag_field="
 
 
 class SidBody(SceneStruct, frozen=True, kw_only=True, tag="sid", tag_field="kind"):
-    """A body from a Standard Input Data file (Wallrapp 1994): a scene can contain it, `compile` refuses it so far."""
+    """A body from a Standard Input Data file (Wallrapp 1994), whose nodes are those of the file.
+
+    `compile` reads it as a raw modal body with the same sums. The adapters of other codes refuse it: for them, convert
+    the file by `flexmb import`.
+    """
 
     name: str
     file: str

@@ -75,7 +75,7 @@ def rest_frames(body: Body) -> dict[str, NodeFrame]:
         case ModalBody():
             listed = {node.name: NodeFrame(node.position_m, node.quaternion) for node in body.nodes}
             return (origin if body.boundary == "clamped-free" else {}) | listed
-    raise ValueError(f'the nodes of body "{body.name}" are in the SID file "{body.file}", which is not supported yet')
+    raise ValueError(f'the nodes of body "{body.name}" are in the SID file "{body.file}": convert it by flexmb import')
 
 
 def node_frame(body: Body, node: str) -> NodeFrame:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import get_args
 
 from flexmb.jain.elimination import Elimination
+from flexmb.scene.bodies import SidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.schema import Scene
@@ -20,8 +21,9 @@ def compile(scene: Scene, elimination: Elimination = "fastest") -> System:  # no
     All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen. Scenes
     with closures factorise D_f whatever is asked for.
 
-    Raises SceneError for a scene that is wrong, ValueError for an elimination that does not exist, NotImplementedError
-    for a scene that is right but needs what is not supported yet (SID files).
+    SID bodies are read from their files here. Raises SceneError for a scene that is wrong, SidError or OSError for a
+    SID file that cannot be used, ValueError for an elimination that does not exist, NotImplementedError for a scene
+    that is right but needs what is not supported yet.
     """
     check_scene(scene)
     return assembled(scene, elimination)
@@ -30,6 +32,7 @@ def compile(scene: Scene, elimination: Elimination = "fastest") -> System:  # no
 def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
     """The system of a scene that was checked before."""
     arguments.one_of("elimination", elimination, get_args(Elimination))
+    scene = _read(scene)
     if scene.closures:
         from flexmb.system.closed import ClosedSystem  # a tree needs none of it
 
@@ -37,3 +40,14 @@ def assembled(scene: Scene, elimination: Elimination = "fastest") -> System:
             return ClosedSystem(scene)
     with collector_paused():
         return System(scene, elimination)
+
+
+def _read(scene: Scene) -> Scene:
+    """The scene with its SID bodies read, and checked again: only now their nodes and modes are known."""
+    if not any(isinstance(body, SidBody) for body in scene.bodies):
+        return scene
+    from flexmb.interchange.sid import with_sid_bodies  # few scenes need it
+
+    scene = with_sid_bodies(scene)
+    check_scene(scene)
+    return scene

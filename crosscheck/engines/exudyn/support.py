@@ -43,7 +43,7 @@ def _refusals(scene: Scene) -> Iterator[str]:
 def _body_refusals(body: Body) -> Iterator[str]:
     match body:
         case SidBody():
-            yield f'body "{body.name}": SID files are not supported yet'
+            yield f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
         case BeamBody() if body.level != "rigid":
             yield f'body "{body.name}": expand the beam to raw points and modes first'
         case ModalBody() if body.level not in ("rigid", "full"):

@@ -6,7 +6,8 @@ import sys
 LATER = (
     "scipy.linalg", "scipy.spatial", "scipy.interpolate", "scipy.sparse", "scipy.optimize", "matplotlib",
     "rich", "typer", "jinja2", "psutil", "filelock", "flexmb.dense.dense_system", "flexmb.jain.operators",
-    "flexmb.frisch.evaluation", "flexmb.closure.closures", "flexmb.advisor", "flexmb.linear",
+    "flexmb.frisch.evaluation", "flexmb.closure.closures", "flexmb.advisor", "flexmb.linear", "flexmb.interchange",
+    "pandas", "pyarrow", "xarray", "rerun", "mujoco",
 )  # fmt: skip
 FLEXIBLE = """
 import sys

@@ -1,0 +1,176 @@
+"""`flexmb import`, `flexmb export` and `flexmb reduce`: models of other programs, and bodies for them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.text import Text
+
+from flexmb.cli.terminal import SceneFile, console, errors, no_traceback
+from flexmb.output.printable import printable
+from flexmb.output.writing import check_folder, folder, writing
+from flexmb.scene.bodies import BeamBody, ModalBody, SidBody
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.files import load_scene, save_scene
+from flexmb.scene.schema import Scene
+
+SID = (".sid", ".sid_fem")
+Out = Annotated[Path, typer.Option("--out", "-o", help="File to write.", show_default=False)]
+
+
+def import_(
+    model: Annotated[Path, typer.Argument(help="URDF, MJCF (.xml) or SID file.", metavar="MODEL", show_default=False)],
+    out: Annotated[Path, typer.Option("--out", "-o", help="Scene file to write.")] = Path("scene.toml"),
+    free_base: Annotated[bool, typer.Option("--free-base", help="Of a URDF: the root link floats.")] = False,
+    repair: Annotated[
+        bool,
+        typer.Option("--repair", help="Of a URDF: change tensors that no mass has as little as makes them possible."),
+    ] = False,
+) -> None:
+    """
+    Make a scene of a robot (URDF, MJCF) or of a flexible body (SID).
+
+    What of the model the scene leaves out is printed. A SID body is held at its first node, ready to be copied.
+
+    **Examples**
+
+        flexmb import robot.urdf --out robot.toml
+        flexmb import quadruped.urdf --free-base
+        flexmb import humanoid.xml
+        flexmb import panel.sid --out panel.toml
+
+    **Exit code**: 0 written, 2 the model cannot be a scene: the message names the place and the remedy.
+    """
+    with no_traceback():
+        check_folder(out.parent)
+        scene, notes = _imported(model, free_base, repair)
+        _write(scene, out, notes)
+
+
+def export(
+    scene: SceneFile,
+    body: Annotated[str, typer.Argument(help="Name of a flexible body.", metavar="BODY", show_default=False)],
+    out: Out,
+) -> None:
+    """
+    Write a flexible body of a scene (beam, modal or SID) as a SID file, all blocks to first order.
+
+        flexmb export boom.toml strip --out strip.sid
+
+    **Exit code**: 0 written, 2 the scene or the body is wrong.
+    """
+    with no_traceback():
+        from flexmb.interchange.sid import sid_of, with_sid_bodies, write_sid
+        from flexmb.scene.check import check_scene
+
+        loaded = load_scene(scene)
+        check_scene(loaded)
+        check_folder(out.parent)
+        flexible = {
+            each.name: each for each in with_sid_bodies(loaded).bodies if isinstance(each, BeamBody | ModalBody)
+        }
+        if body not in flexible:
+            raise ValueError(f'"{body}" is no flexible body of the scene; these are: {", ".join(flexible) or "none"}')
+        folder(out.parent)
+        with writing(out):
+            write_sid(sid_of(flexible[body]), out)
+    console.print("wrote", str(out), soft_wrap=True)
+
+
+def reduce(
+    stiffness: Annotated[
+        Path, typer.Argument(help="K: .mtx, .hb, .rb, .op4 or .pch.", metavar="K", show_default=False)
+    ],
+    mass: Annotated[Path, typer.Argument(help="M, or the file of K once more.", metavar="M", show_default=False)],
+    nodes: Annotated[Path, typer.Argument(help="CSV: id,x,y,z[,dofs].", metavar="NODES", show_default=False)],
+    interface: Annotated[
+        str, typer.Option(help="Numbers of the nodes for hinges, loads and markers: `1,12`.", show_default=False)
+    ],
+    out: Out,
+    modes: Annotated[int, typer.Option(help="Modes of the structure held at these nodes.")] = 8,
+    free: Annotated[bool, typer.Option("--free", help="Free-free modes about the mass centre.")] = False,
+    damping: Annotated[float, typer.Option(help="Damping ratio of every mode.")] = 0.0,
+) -> None:
+    """
+    Reduce finite-element matrices to a flexible body (Craig and Bampton): a SID file, or a scene with the body.
+
+    Without `--free` the first interface node is the body's frame, and the modes are clamped there.
+
+    **Examples**
+
+        flexmb reduce K.mtx M.mtx nodes.csv --interface 1,12 --modes 8 --out panel.sid
+        flexmb reduce panel.pch panel.pch nodes.csv --interface 101 --free --damping 0.005 --out panel.toml
+
+    **Exit code**: 0 written, 2 the matrices are not those of a free structure, or do not fit the nodes.
+    """
+    with no_traceback():
+        from flexmb.interchange.sid import sid_of, write_sid
+        from flexmb.interchange.superelement import read_super_element, reduced
+
+        check_folder(out.parent)
+        if out.suffix.lower() not in (*SID, ".toml"):
+            raise ValueError(f'--out: "{out.suffix}" is neither a SID file (.sid) nor a scene (.toml)')
+        try:
+            chosen = [int(word) for word in interface.split(",")]
+        except ValueError:
+            raise ValueError(f"--interface is numbers of nodes such as 1,12; got {interface!r}") from None
+        made = reduced(
+            read_super_element(stiffness, mass, nodes), chosen, modes, name=out.stem,
+            boundary="free-free" if free else "clamped-free", damping_ratio=damping,
+        )  # fmt: skip
+        centre, moments = (" ".join(f"{each:.6g}" for each in row) for row in (made.centre, np.diag(made.inertia)))
+        console.print(f"mass {made.mass:.6g} kg, centre {centre} m, moments of inertia {moments} kg m²")
+        console.print("frequencies", " ".join(f"{each:.6g}" for each in made.frequencies), "Hz", soft_wrap=True)
+        if out.suffix.lower() == ".toml":
+            _write(_held(made.body), out, made.notes)
+            return
+        _tell(made.notes)
+        folder(out.parent)
+        with writing(out):
+            write_sid(sid_of(made.body), out)
+    console.print("wrote", str(out), soft_wrap=True)
+
+
+def _imported(model: Path, free_base: bool, repair: bool) -> tuple[Scene, tuple[str, ...]]:
+    ending = model.suffix.lower()
+    if ending == ".urdf":
+        from flexmb.interchange.urdf import read_urdf
+
+        found = read_urdf(model, free_base=free_base, repair=repair)
+        return found.scene, found.notes
+    if free_base or repair:
+        raise ValueError("--free-base and --repair are for URDF: an MJCF has a freejoint, and MuJoCo's own checks")
+    if ending in (".xml", ".mjcf"):
+        from flexmb.interchange.mjcf import read_mjcf
+
+        found = read_mjcf(model)
+        return found.scene, found.notes
+    if ending in SID:
+        from flexmb.interchange.sid import imported_sid, read_sid
+
+        imported = imported_sid(read_sid(model), model.stem)
+        return _held(imported.body), imported.notes
+    raise ValueError(f'{model}: "{model.suffix}" is no known model: give .urdf, .xml (MJCF) or .sid')
+
+
+def _held(body: ModalBody | SidBody) -> Scene:
+    """The body welded to the ground at its first node."""
+    assert isinstance(body, ModalBody)
+    node = body.nodes[0].name if body.nodes else "origin"
+    return SceneBuilder(body.name).add(body).weld("base", "ground", body.name, child_node=node).scene()
+
+
+def _write(scene: Scene, out: Path, notes: tuple[str, ...]) -> None:
+    _tell(notes)
+    folder(out.parent)
+    with writing(out):
+        save_scene(scene, out)
+    console.print("wrote", str(out), soft_wrap=True)
+
+
+def _tell(notes: tuple[str, ...]) -> None:
+    for note in notes:
+        errors.print(Text("note: ", style="bold yellow") + Text(printable(note)), soft_wrap=True)

@@ -1,0 +1,62 @@
+"""A few equal masses that have given sums of products of their fields: 1, coordinates of r, and of mode shapes.
+
+All that the kinetic energy of masses needs are sums m a b of two of these 4 + 3 m fields: their Gram matrix. The rows
+of any factor X of it, X'X, are the fields at points times the root of the point's mass. A reflection turns the column
+of the field 1 into equal numbers, so that all points have the same mass.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.typing import Real
+
+NEGATIVE = 1e-6
+"""Share of the largest eigenvalue by which a Gram matrix that was printed in single precision may be negative."""
+ROUNDING = 1e-15  # share of it below which a direction is rounding
+
+
+class EquivalentMasses(NamedTuple):
+    """mass (n,) kg, position (n,3) m, translation_modes (n,3,m)."""
+
+    mass: Real
+    position: Real
+    translation_modes: Real
+
+
+class NoMasses(ValueError):
+    """No masses have these sums; `field` is the one that shows it most: 0 is 1, 1 to 3 are r, then phi by modes."""
+
+    def __init__(self, field: int) -> None:
+        self.field = field
+        super().__init__(f"no distribution of mass has these sums, least of all those of field {field}")
+
+
+def equivalent_masses(gram: Real) -> EquivalentMasses:
+    """Points whose fields have the Gram matrix `gram` (4+3m, 4+3m), of which the upper triangle is read.
+
+    Raises NoMasses where it is not positive semidefinite.
+    """
+    gram = np.triu(gram) + np.triu(gram, 1).T
+    size = _sizes(np.diag(gram))
+    values, vectors = np.linalg.eigh(gram / np.outer(size, size))
+    if values[0] < -NEGATIVE * values[-1]:
+        raise NoMasses(int(np.argmax(np.abs(vectors[:, 0]))))
+    kept = values > ROUNDING * values[-1]
+    X = np.sqrt(values[kept])[:, None] * vectors[:, kept].T * size
+    n, mass = len(X), gram[0, 0]
+    normal = X[:, 0] - np.sqrt(mass / n)
+    if np.any(normal):
+        X = X - 2.0 * np.outer(normal, normal @ X) / (normal @ normal)
+    fields = X / np.sqrt(mass / n)
+    modes = fields[:, 4:].reshape(n, -1, 3).transpose(0, 2, 1)
+    return EquivalentMasses(np.full(n, mass / n), fields[:, 1:4], modes)
+
+
+def _sizes(squares: Real) -> Real:
+    """One size for the three coordinates of a vector: of one that is rounding, the others say so."""
+    vectors = np.repeat(np.sqrt(np.abs(squares[1:].reshape(-1, 3).sum(axis=1))), 3)
+    size = np.concatenate([np.sqrt(np.abs(squares[:1])), vectors])
+    return np.where(size == 0.0, 1.0, size)

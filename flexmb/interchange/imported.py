@@ -1,0 +1,24 @@
+"""What reading somebody else's model gives: a scene, and what of the model is not in it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flexmb.scene.schema import Scene
+
+
+class ModelError(ValueError):
+    """A model that no scene can represent, or no model at all: the file, the place, the reason and the remedy."""
+
+
+@dataclass(frozen=True)
+class ImportedScene:
+    """The scene, checked, and what of the model it leaves out, in words: one line for each kind of thing."""
+
+    scene: Scene
+    notes: tuple[str, ...]
+
+
+def listed(names: list[str]) -> str:
+    """Names for a note: the first five, and how many there are."""
+    return ", ".join(names[:5]) + (f" and {len(names) - 5} more" if len(names) > 5 else "")

@@ -1,0 +1,151 @@
+"""MJCF: what MuJoCo's own compiler makes of a model, as a scene.
+
+Defaults, inertia of shapes, frames of all notations and included files are resolved by MuJoCo itself. A joint becomes a
+hinge of its name; bodies with several joints get bodies without mass in between. Coordinates count from the model's
+pose at its reference, `qpos0`.
+"""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any, NoReturn
+
+import numpy as np
+
+from flexmb.interchange.imported import ImportedScene, ModelError, listed
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.reading import regular_size
+from flexmb.scene.tree import GROUND
+
+FREE, BALL, SLIDE, HINGE = range(4)  # mjtJoint
+
+
+def read_mjcf(path: str | os.PathLike[str]) -> ImportedScene:
+    """The rigid tree of an MJCF file (or of a URDF file, as MuJoCo reads it), at its reference pose and at rest.
+
+    Springs and dampers of joints come along. Contacts, limits, dry friction, actuators and sensors are left out, as the
+    notes say. Raises ImportError without MuJoCo, ModelError for a file that MuJoCo refuses, and for what changes the
+    motion and has no counterpart: equality constraints, tendons, rotor inertia, fluids, flexible parts.
+    """
+    try:
+        import mujoco
+    except ImportError:
+        raise ImportError("MJCF is read by MuJoCo's own compiler: pip install 'flexmb[peers]'") from None
+    regular_size(path)
+    try:
+        model = mujoco.MjModel.from_xml_path(str(path))
+    except ValueError as error:
+        raise ModelError(f"{path}: MuJoCo refuses the model: {error}") from None
+    return _Model(str(path), model).scene()
+
+
+class _Model:
+    """A compiled model; `m` has MuJoCo's names."""
+
+    def __init__(self, file: str, m: Any) -> None:
+        self.file, self.m = file, m
+        self._refuse()
+
+    def scene(self) -> ImportedScene:
+        m = self.m
+        builder = SceneBuilder(Path(self.file).stem, gravity=m.opt.gravity)
+        for k in range(1, m.nbody):
+            self._body(builder, k)
+        return ImportedScene(builder.scene(), tuple(self._notes()))
+
+    def _body(self, builder: SceneBuilder, k: int) -> None:
+        """Body k and its joints: massless bodies carry all but the last of these."""
+        m, name = self.m, self._body_name(k)
+        R = rotation_matrix(m.body_iquat[k])
+        inertia = R @ np.diag(m.body_inertia[k]) @ R.T
+        builder.rigid_body(name, mass=float(m.body_mass[k]), com=m.body_ipos[k], inertia=0.5 * (inertia + inertia.T))
+        parent = self._body_name(int(m.body_parentid[k]))
+        at = {"parent_position": m.body_pos[k], "parent_quaternion": m.body_quat[k]}
+        joints = range(m.body_jntadr[k], m.body_jntadr[k] + m.body_jntnum[k])
+        if len(joints) == 0:
+            builder.weld(f"{name}.weld", parent, name, **at)
+        for j in joints:
+            last = j == joints[-1]
+            child = name if last else f"{name}.{self._joint_name(j)}"
+            if not last:
+                builder.rigid_body(child, mass=0.0, inertia=np.zeros((3, 3)))
+            self._hinge(builder, j, parent, child, at)
+            parent, at = child, {"parent_position": np.zeros(3), "parent_quaternion": np.array([1.0, 0.0, 0.0, 0.0])}
+
+    def _hinge(self, builder: SceneBuilder, j: int, parent: str, child: str, at: dict[str, Any]) -> None:
+        m, name, dof = self.m, self._joint_name(j), int(self.m.jnt_dofadr[j])
+        kind, anchor = int(m.jnt_type[j]), m.jnt_pos[j]
+        if kind == FREE:
+            builder.free(name, parent, child, **at)
+            return
+        frames = at | {
+            "parent_position": at["parent_position"] + rotation_matrix(at["parent_quaternion"]) @ anchor,
+            "child_position": anchor,
+        }
+        damping, stiffness = float(m.dof_damping[dof]), float(m.jnt_stiffness[j])
+        if kind == BALL:
+            builder.spherical(name, parent, child, stiffness=stiffness, damping=damping, **frames)
+            return
+        place = int(m.jnt_qposadr[j])
+        rest = float(m.qpos_spring[place] - m.qpos0[place])
+        make = builder.prismatic if kind == SLIDE else builder.revolute
+        make(name, parent, child, axis=m.jnt_axis[j], stiffness=stiffness, rest=rest, damping=damping, **frames)
+
+    def _body_name(self, k: int) -> str:
+        if k == 0:
+            return GROUND
+        name = str(self.m.body(k).name) or f"body {k}"
+        return name if name != GROUND else f"{name} {k}"
+
+    def _joint_name(self, j: int) -> str:
+        return str(self.m.joint(j).name) or f"{self._body_name(int(self.m.jnt_bodyid[j]))}.joint {j}"
+
+    def _refuse(self) -> None:
+        """ModelError for what changes the motion and has no counterpart in a scene."""
+        m = self.m
+        for count, what, remedy in (
+            (m.neq, "equality constraints", "remove them, and add closures to the scene"),
+            (m.ntendon, "tendons", "remove them, or give the joints springs"),
+            (getattr(m, "nflex", 0), "flexible parts", "remove them, and add flexible bodies to the scene"),
+            (m.npluginstate, "plugins", "remove them"),
+        ):
+            if count:
+                self._fail(f"it has {count} {what}, which no scene has", remedy)
+        for dof in np.flatnonzero(m.dof_armature):
+            joint = self._joint_name(int(m.dof_jntid[dof]))
+            self._fail(
+                f'joint "{joint}" has the rotor inertia {m.dof_armature[dof]:g} (armature)',
+                "add a wheel to the scene, and set it to zero",
+            )
+        if m.opt.density or m.opt.viscosity or np.any(m.opt.wind):
+            self._fail("option has density, viscosity or wind, and scenes have no fluid", "set them to zero")
+        for k in np.flatnonzero(m.body_gravcomp):
+            self._fail(f'body "{self._body_name(int(k))}" has gravity compensation', "remove gravcomp, or add a force")
+        for j in range(m.njnt):
+            first, place = int(m.jnt_dofadr[j]), int(m.jnt_qposadr[j])
+            if m.jnt_type[j] == FREE and (m.jnt_stiffness[j] or np.any(m.dof_damping[first : first + 6])):
+                self._fail(f'free joint "{self._joint_name(j)}" has a spring or damper', "remove it")
+            turned = not np.array_equal(m.qpos_spring[place : place + 4], m.qpos0[place : place + 4])
+            if m.jnt_type[j] == BALL and m.jnt_stiffness[j] and turned:
+                self._fail(f'the spring of ball joint "{self._joint_name(j)}" is at rest elsewhere', "turn its body")
+
+    def _notes(self) -> list[str]:
+        m = self.m
+        joints = [self._joint_name(j) for j in range(m.njnt)]
+        found = []
+        if any(m.geom_contype) or any(m.geom_conaffinity):
+            found.append("contacts are left out: bodies pass through each other")
+        if limited := [name for name, limit in zip(joints, m.jnt_limited, strict=True) if limit]:
+            found.append(f"limits of joints are left out: {listed(limited)}")
+        if rough := [joints[j] for j in sorted({int(m.dof_jntid[i]) for i in np.flatnonzero(m.dof_frictionloss)})]:
+            found.append(f"dry friction is left out: {listed(rough)}")
+        if m.nu:
+            found.append(f"{m.nu} actuators are left out, with the forces of servos at zero control")
+        if moved := [joints[j] for j in range(m.njnt) if m.jnt_type[j] > BALL and m.qpos0[m.jnt_qposadr[j]] != 0.0]:
+            found.append(f"coordinates count from the reference position, not from zero: {listed(moved)}")
+        return found
+
+    def _fail(self, what: str, remedy: str) -> NoReturn:
+        raise ModelError(f"{self.file}: {what}: {remedy}")

@@ -1,0 +1,237 @@
+"""Reading SID files of any writer: Fortran's exponents, any letter case, comments, blank lines, blocks in any order."""
+
+from __future__ import annotations
+
+import math
+import os
+import re
+from collections.abc import Iterator
+from typing import NamedTuple, NoReturn
+
+import numpy as np
+
+from flexmb.interchange.sid.blocks import Sid, SidError, SidNode, Taylor, node_shapes, shapes
+from flexmb.scene.reading import MIB, Unreadable, read_text
+
+LIMIT = 256 * MIB
+LARGEST = 2**26  # numbers in one block
+OPTIONAL = ("ksigma", "De", "sigma", "psi", "AP")  # zero, for AP the unit matrix, where a file leaves them out
+ZEROS, DIAGONAL, SYMMETRIC, GENERAL, UNIT = range(5)  # "structure"
+STATEMENT = re.compile(r"([A-Za-z_]\w*)\s*(?:\(([^)]*)\))?\s*(?:=\s*(.*))?$")
+
+
+class SidLine(NamedTuple):
+    """A statement: `key`, in small letters, as written in `word`; indices in brackets; what is right of "="."""
+
+    number: int
+    word: str
+    indices: tuple[int, ...]
+    value: str
+
+    @property
+    def key(self) -> str:
+        return self.word.lower()
+
+
+def read_sid(path: str | os.PathLike[str]) -> Sid:
+    """Read a SID file. SidError names file, line and remedy, OSError the file that cannot be read."""
+    try:
+        text = read_text(path, LIMIT)
+    except Unreadable as error:
+        raise SidError(f"{path}: {error}") from None
+    return _Reader(str(path), text).body()
+
+
+class _Reader:
+    """Statements of one file, taken one after the other."""
+
+    def __init__(self, file: str, text: str) -> None:
+        self.file = file
+        self.lines = self._statements(text)
+        self.line = SidLine(0, "", (), "")
+        self.modes = 0
+
+    def body(self) -> Sid:
+        """The first modal body of the file."""
+        self._find("refmod", "it has no block refmod: is it a SID file of a modal body?")
+        mass, names = self._refmod()
+        self.modes = len(names)
+        nodes: list[SidNode] = []
+        blocks: dict[str, Taylor] = {}
+        known = {name.lower(): name for name in shapes(self.modes)}
+        while (line := self._next("end modal or end part")).key != "end":
+            if line.key == "frame":
+                nodes = self._frame()
+            elif line.key in known:
+                blocks[self._new(known[line.key], blocks)] = self._taylor(known[line.key], shapes(self.modes))
+            else:
+                self._fail(
+                    f'"{line.word}" is no block of a modal body', f"blocks are frame, {', '.join(known.values())}"
+                )
+        return Sid(mass=mass, modes=names, nodes=tuple(nodes), **self._complete(blocks, shapes(self.modes), "the body"))
+
+    def _refmod(self) -> tuple[float, tuple[str, ...]]:
+        mass, count, names = math.nan, -1, {}
+        while (line := self._next("end refmod")).key != "end":
+            match line.key:
+                case "mass":
+                    mass = self._real(line.value)
+                case "nelastq":
+                    count = self._whole(line.value)
+                case "ielastq" if len(line.indices) == 1:
+                    names[line.indices[0]] = line.value.strip().strip("'\"")
+                case _:
+                    self._fail(f'"{line.word}" does not belong into refmod', "it holds mass, nelastq and ielastq(k)")
+        if not mass > 0.0:
+            self._fail("refmod gives no mass above zero", "add mass = ... in kg")
+        if not 0 <= count <= LARGEST:
+            self._fail("refmod does not give the number of modes", "add nelastq = ...")
+        if count > len(names) and math.prod((count, count)) > LARGEST:
+            self._fail(f"nelastq = {count} modes would not fit into memory", "correct nelastq")
+        return mass, tuple(names.get(k, f"mode {k}") for k in range(1, count + 1))
+
+    def _frame(self) -> list[SidNode]:
+        nodes: list[SidNode] = []
+        while (line := self._next("end frame")).key != "end":
+            if line.key != "new":
+                self._fail(f'"{line.word}" stands where a node begins', "write new node = NAME")
+            name = line.value.strip().strip("'\"")
+            if not name or name in [node.name for node in nodes]:
+                self._fail(f'the node name "{name}" is empty or there twice', "give every node a name of its own")
+            nodes.append(self._node(name))
+        return nodes
+
+    def _node(self, name: str) -> SidNode:
+        blocks: dict[str, Taylor] = {}
+        known = {key.lower(): key for key in node_shapes(self.modes)}
+        while (line := self._next("end node")).key != "end":
+            if line.key == "rframe":
+                continue
+            if line.key not in known:
+                self._fail(f'"{line.word}" is no block of a node', f"blocks are {', '.join(known.values())}")
+            blocks[self._new(known[line.key], blocks)] = self._taylor(known[line.key], node_shapes(self.modes))
+        return SidNode(name, **self._complete(blocks, node_shapes(self.modes), f"node {name}"))
+
+    def _taylor(self, name: str, expected: dict[str, tuple[int, int]]) -> Taylor:
+        """A block, with what its structure leaves out."""
+        start, head, elements = self.line.number, {}, []
+        while (line := self._next(f"end {name}")).key != "end":
+            if line.key in ("m0", "m1"):
+                elements.append((line, self._real(line.value)))
+            elif line.key in ("order", "nrow", "ncol", "nq", "nqn", "structure"):
+                head[line.key] = self._whole(line.value)
+            else:
+                self._fail(
+                    f'"{line.word}" does not belong into {name}', "it holds order, nrow, ..., m0(i,j), m1(i,k,j)"
+                )
+        rows, columns = expected[name]
+        structure, order = head.get("structure", GENERAL), head.get("order", 0)
+        if name == "ksigma" and head.get("ncol") == self.modes and head.get("nrow") == 1:
+            rows, columns = columns, rows
+        given = (head.get("nrow", rows), head.get("ncol", columns))
+        if structure != ZEROS and given != (rows, columns) or structure not in range(5) or order not in (0, 1):
+            self.line = self.line._replace(number=start)
+            what = f"{name} is {given[0]} x {given[1]} of structure {structure}, order {order}"
+            self._fail(what, f"it has to be {rows} x {columns}, of structure 0 to 4, order 0 or 1")
+        zero = np.eye(rows, columns) if structure == UNIT else np.zeros((rows, columns))
+        has_first = order == 1 or any(line.key == "m1" for line, _ in elements)
+        if has_first and rows * columns * self.modes > LARGEST:
+            self._fail(f"{name} would not fit into memory", "correct nelastq")
+        first = np.zeros((rows, self.modes, columns)) if has_first else None
+        for line, value in elements:
+            target = zero if line.key == "m0" else first
+            assert target is not None
+            if len(line.indices) != target.ndim or not all(
+                1 <= i <= n for i, n in zip(line.indices, target.shape, strict=True)
+            ):
+                self.line = line
+                size = " x ".join(map(str, target.shape))
+                self._fail(f"{line.key}{line.indices} is no element of {name} ({size})", "correct its indices")
+            place = tuple(i - 1 for i in line.indices)
+            target[place] = value
+        if structure == SYMMETRIC:
+            zero = _mirrored(zero)
+            first = (
+                None
+                if first is None
+                else np.moveaxis(np.array([_mirrored(each) for each in np.moveaxis(first, 1, 0)]), 0, 1)
+            )
+        return Taylor(
+            zero.reshape(expected[name]), first if first is None else first.reshape(expected[name][0], self.modes, -1)
+        )
+
+    def _complete(self, found: dict[str, Taylor], expected: dict[str, tuple[int, int]], of: str) -> dict[str, Taylor]:
+        for name, shape in expected.items():
+            if name not in found and name in OPTIONAL:
+                found[name] = Taylor(np.eye(3) if name == "AP" else np.zeros(shape))
+            elif name not in found:
+                self._fail(f"{of} has no block {name}", "add it, with structure = 0 if it is zero")
+        return found
+
+    def _new(self, name: str, found: dict[str, Taylor]) -> str:
+        if name in found:
+            self._fail(f"{name} is there twice", "keep one of them")
+        return name
+
+    # Statements and numbers
+
+    def _statements(self, text: str) -> Iterator[SidLine]:
+        """All statements; whatever stands before "part" is a title."""
+        started = False
+        for number, raw in enumerate(text.split("\n"), 1):
+            stripped = raw.strip()
+            started = started or stripped.lower().split(maxsplit=1)[:1] in (["part"], ["new"], ["refmod"])
+            text_value = stripped.lower().startswith("ielastq")
+            stripped = stripped if text_value else re.split(r"[%!#]", stripped, maxsplit=1)[0].strip()
+            if not started or not stripped:
+                continue
+            first = stripped.split(maxsplit=1)
+            if first[0].lower() == "new" and "=" in stripped:
+                yield SidLine(number, "new", (), stripped.partition("=")[2])
+            elif first[0].lower() in ("end", "new"):
+                yield SidLine(number, first[0], (), first[1] if len(first) > 1 else "")
+            elif (found := STATEMENT.match(stripped)) is not None:
+                word, indices, value = found.groups()
+                self.line = SidLine(number, word, (), value or "")
+                yield self.line._replace(indices=tuple(self._whole(i) for i in indices.split(",")) if indices else ())
+            else:
+                self.line = SidLine(number, stripped, (), "")
+                self._fail(f'"{stripped[:60]}" is no statement', "write KEY = VALUE, or the name of a block")
+
+    def _next(self, until: str) -> SidLine:
+        line = next(self.lines, None)
+        if line is None:
+            self._fail(f"the file ends before {until}", "the file is cut off, or an end is missing: write it anew")
+        self.line = line
+        return line
+
+    def _find(self, key: str, otherwise: str) -> None:
+        for line in self.lines:
+            self.line = line
+            if line.key == key:
+                return
+        self._fail(otherwise, "give a file that begins with part, new modal, refmod")
+
+    def _real(self, text: str) -> float:
+        try:
+            value = float(text.strip().lower().replace("d", "e"))
+        except ValueError:
+            value = math.nan
+        if not math.isfinite(value):
+            self._fail(f'"{text.strip()[:40]}" is no finite number', "write it as 1.5, 1.5E-3 or 1.5D-3")
+        return value
+
+    def _whole(self, text: str) -> int:
+        try:
+            value = int(text)
+        except ValueError:
+            self._fail(f'"{text.strip()[:40]}" is no whole number', "correct it")
+        return value
+
+    def _fail(self, what: str, remedy: str) -> NoReturn:
+        raise SidError(f"{self.file}, line {self.line.number}: {what}: {remedy}")
+
+
+def _mirrored(a: np.ndarray) -> np.ndarray:
+    """The symmetric matrix of which one half may be missing."""
+    return np.where(a == 0.0, a.T, a)

@@ -1,0 +1,214 @@
+"""Craig and Bampton's reduction: static modes of the interface and modes of the structure held at its interface.
+
+Either all interface nodes but the first move, the first being the body frame (boundary "clamped-free"), or all do and
+the six rigid-body motions are taken out ("free-free", the body frame at the mass centre). Both describe the same
+motions of the structure. The modes are made orthonormal by the eigenproblem of the reduced matrices.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.interchange.gram import NoMasses, equivalent_masses
+from flexmb.interchange.superelement.element import MOTIONS, SuperElement, SuperElementError
+from flexmb.interchange.superelement.inertia import NodalInertia, nodal_inertia
+from flexmb.scene.bodies import Level, ModalBody
+from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.modal_data import inertia_points
+from flexmb.typing import Real
+
+LOOSE = 1e-12
+"""Share of its own stiffness below which a motion needs no force: a mechanism, or a part that is joined to nothing."""
+DENSE = 1000
+"""Rows of matrices that are solved whole."""
+MASSLESS = 1e-13  # share of the largest 1/omega^2 below which a mode moves no mass
+
+
+@dataclass(frozen=True)
+class ReducedBody:
+    """`body` in axes of the structure, its origin at `origin` (3,) m of them; frequencies (m,) Hz of its modes.
+
+    mass kg, mass centre (3,) m and inertia (3,3) kg m² about the origin, both in the body frame, by the rigid-body
+    motions of M. shapes (n,6,m): displacements and rotations of all nodes of the structure for unit modes, to recover
+    its motion from modal coordinates. `notes`: what was changed, in words.
+    """
+
+    body: ModalBody
+    origin: Real
+    frequencies: Real
+    mass: float
+    centre: Real
+    inertia: Real
+    shapes: Real
+    notes: tuple[str, ...]
+
+
+def reduced(
+    element: SuperElement, interface: Sequence[int], modes: int, *, name: str = "body",
+    boundary: Literal["clamped-free", "free-free"] = "clamped-free", damping_ratio: float = 0.0, level: Level = "full",
+) -> ReducedBody:  # fmt: skip
+    """A flexible body whose nodes are the `interface` nodes, named by their numbers.
+
+    `modes`: how many modes of the structure held at all interface nodes join the 6 static modes of each of these, but
+    for the six rigid-body motions. `damping_ratio` of every mode. Raises SuperElementError for interface nodes without
+    rotations, no or more modes than there are, mechanisms, and mass that no points can have.
+    """
+    if not 0.0 <= damping_ratio < 1.0:
+        raise SuperElementError(f"the damping ratio is {damping_ratio:g}: give a number from 0 to 1, such as 0.005")
+    inertia = nodal_inertia(element)
+    nodes = [element.node(number) for number in dict.fromkeys(interface)]
+    held = _interface_rows(element, nodes)
+    if len(held) + modes <= 6:
+        raise SuperElementError("one interface node without modes is a rigid body: ask for modes, or for more nodes")
+    T = _shapes(element.K, inertia.M, held, modes)
+    clamped = boundary == "clamped-free"
+    R = element.rigid(np.zeros(3))
+    rigid_mass = R.T @ inertia.M @ R
+    mass = float(np.trace(rigid_mass[:3, :3])) / 3.0
+    centre = np.array([rigid_mass[5, 1], rigid_mass[3, 2], rigid_mass[4, 0]]) / mass
+    origin = element.position[nodes[0]] if clamped else centre
+    frequencies, V = _modes(element.K, inertia.M, T[:, 6:] if clamped else T, None if clamped else R)
+    shapes = _at_nodes(element, V)
+    translation, rotation = shapes[:, :3], shapes[:, 3:]
+    omega = 2.0 * np.pi * frequencies
+    try:
+        points = equivalent_masses(inertia.gram(element.position - origin, translation, rotation))
+    except NoMasses as error:
+        raise SuperElementError(f"M is no mass matrix ({error}): its eigenvalues have to be zero or more") from None
+    body = {
+        "name": name,
+        "points": inertia_points(*points),
+        "stiffness": np.diag(omega**2),
+        "damping": np.diag(2.0 * damping_ratio * omega) if damping_ratio else (),
+        "boundary": boundary,
+        "level": level,
+        "nodes": [
+            {
+                "name": str(element.ids[i]),
+                "position_m": element.position[i] - origin,
+                "translation_modes": translation[i].T,
+                "rotation_modes": rotation[i].T,
+            }
+            for i in nodes
+        ],
+    }
+    about = element.rigid(origin)
+    J = (about.T @ inertia.M @ about)[3:, 3:]
+    notes = _notes(element, inertia)
+    return ReducedBody(to_struct(plain(body), ModalBody), origin, frequencies, mass, centre - origin, J, shapes, notes)
+
+
+def _interface_rows(element: SuperElement, nodes: list[int]) -> NDArray[np.int64]:
+    if not nodes:
+        raise SuperElementError("there is no interface node: name those that hinges, loads or markers use")
+    for i in nodes:
+        missing = [motion for motion, row in zip(MOTIONS, element.place[i], strict=True) if row < 0]
+        if missing:
+            raise SuperElementError(
+                f"interface node {element.ids[i]} has no {missing[0]}: an interface needs all six motions; tie its "
+                "surface to a node that has them, by rigid or distributing elements"
+            )
+    return element.place[nodes].ravel()
+
+
+def _shapes(K: Real, M: Real, held: NDArray[np.int64], modes: int) -> Real:
+    """Static modes of the interface and the lowest modes of the structure held there: columns (N, held + modes)."""
+    from scipy.linalg import cho_solve
+
+    inside = np.setdiff1d(np.arange(len(K)), held)
+    if not 0 <= modes <= len(inside):
+        raise SuperElementError(
+            f"{modes} modes are asked for, and the structure held at its interface has {len(inside)}"
+        )
+    T = np.zeros((len(K), len(held) + modes))
+    T[held, np.arange(len(held))] = 1.0
+    if len(inside) == 0:
+        return T
+    K_ii, M_ii = K[np.ix_(inside, inside)], M[np.ix_(inside, inside)]
+    L = _factor(K_ii, "K lets a part move without force while the interface is held")
+    T[np.ix_(inside, np.arange(len(held)))] = -cho_solve((L, True), K[np.ix_(inside, held)])
+    if modes:
+        compliance, columns = _highest(M_ii, L, modes)
+        if compliance[0] <= MASSLESS * compliance[-1]:
+            there = int(np.count_nonzero(compliance > MASSLESS * compliance[-1]))
+            raise SuperElementError(f"{modes} modes are asked for, and M gives mass to {there} of them: ask for fewer")
+        T[np.ix_(inside, len(held) + np.arange(modes))] = columns[:, ::-1]
+    return T
+
+
+def _modes(K: Real, M: Real, T: Real, rigid: Real | None) -> tuple[Real, Real]:
+    """Frequencies (m,) Hz, ascending, and orthonormal modes (N,m) of the motions T without those of `rigid` (N,6).
+
+    With M-orthonormal R, K + s M R R' M holds the rigid-body motions and M - M R R' M takes their inertia away.
+    """
+    from scipy.linalg import eigh, solve_triangular
+
+    T = T / np.sqrt(np.einsum("im,ij,jm->m", T, K, T, optimize=True))
+    k, m = T.T @ K @ T, T.T @ M @ T
+    elastic = m
+    if rigid is not None:
+        R = solve_triangular(np.linalg.cholesky(rigid.T @ M @ rigid), rigid.T, lower=True).T
+        held = T.T @ (M @ R)
+        k = k + np.trace(k) / np.trace(held @ held.T) * held @ held.T
+        elastic = m - held @ held.T
+    _factor(k, "K lets the structure move without force beyond its six rigid-body motions")
+    compliance, columns = eigh(0.5 * (elastic + elastic.T), 0.5 * (k + k.T))
+    kept = np.flatnonzero(compliance > MASSLESS * compliance[-1])[::-1]
+    kept = kept if rigid is None else kept[: len(compliance) - 6]
+    V = T @ (columns[:, kept] / np.sqrt(np.einsum("im,ij,jm->m", columns[:, kept], m, columns[:, kept], optimize=True)))
+    if rigid is not None:  # their share in the columns is rounding
+        V = V - R @ (R.T @ (M @ V))
+    largest = V[np.argmax(np.abs(V), axis=0), np.arange(V.shape[1])]
+    return 1.0 / (2.0 * np.pi * np.sqrt(compliance[kept])), V * np.sign(largest)
+
+
+def _factor(K: Real, what: str) -> Real:
+    """Cholesky's lower factor; SuperElementError where a pivot of K, scaled to unit diagonal, is rounding."""
+    size = np.sqrt(np.maximum(np.diag(K), np.finfo(float).tiny))
+    try:
+        L = np.linalg.cholesky(K / np.outer(size, size))
+    except np.linalg.LinAlgError:
+        L = np.zeros((1, 1))
+    if np.min(np.diag(L)) ** 2 < LOOSE:
+        raise SuperElementError(f"{what}: join the part, or remove displacements without stiffness from K and M")
+    return size[:, None] * L
+
+
+def _highest(M: Real, L: Real, count: int) -> tuple[Real, Real]:
+    """The `count` largest values, ascending, and columns of M x = value L L' x; by Lanczos where few of many."""
+    from scipy.linalg import eigh, solve_triangular
+    from scipy.sparse.linalg import LinearOperator, eigsh
+
+    n = len(M)
+    if n <= DENSE or 4 * count > n:
+        reduced_mass = solve_triangular(L, solve_triangular(L, M, lower=True).T, lower=True)
+        values, columns = eigh(0.5 * (reduced_mass + reduced_mass.T), subset_by_index=[n - count, n - 1])
+    else:
+
+        def product(x: Real) -> Real:
+            return solve_triangular(L, M @ solve_triangular(L, x, lower=True, trans=1), lower=True)
+
+        start = np.random.default_rng(0).normal(size=n)  # the same run after run
+        values, columns = eigsh(LinearOperator((n, n), product), k=count, which="LA", v0=start, tol=1e-13)
+        order = np.argsort(values)
+        values, columns = values[order], columns[:, order]
+    return values, solve_triangular(L, columns, lower=True, trans=1)
+
+
+def _at_nodes(element: SuperElement, V: Real) -> Real:
+    """Translations and rotations (n,6,m) of the nodes, zero where a node has none."""
+    padded = np.concatenate([V, np.zeros((1, V.shape[1]))])  # row -1
+    return padded[element.place]
+
+
+def _notes(element: SuperElement, inertia: NodalInertia) -> tuple[str, ...]:
+    if not inertia.note:
+        return ()
+    R = element.rigid(element.position.mean(axis=0))
+    before, after = (np.trace((R.T @ M @ R)[3:, 3:]) for M in (element.M, inertia.M))
+    return (f"{inertia.note}; the moments of inertia changed by {abs(after / before - 1.0):.2g} of their sum",)

@@ -1,0 +1,243 @@
+"""URDF: links become bodies, joints hinges of the same names, and inertia tensors turn with their frames.
+
+Read by Python's own XML parser, with every element that carries mechanics checked: the usual parsers fill in what is
+wrong, and the best kept of them brings twenty packages for meshes that no scene needs.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Iterable
+from pathlib import Path
+from typing import NoReturn
+from xml.etree import ElementTree
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from flexmb.interchange.imported import ImportedScene, ModelError, listed
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.options import Placement
+from flexmb.scene.quaternions import about, quaternion_of
+from flexmb.scene.reading import Unreadable, read_text
+from flexmb.scene.tree import GROUND
+from flexmb.typing import Real
+
+MOVING = ("revolute", "continuous", "prismatic", "floating", "planar")
+IGNORED = {"limit": "limits", "dynamics": "damping and friction", "safety_controller": "safety limits"}
+NO_MECHANICS = ("material", "transmission", "gazebo", "sensor", "ros2_control")
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def read_urdf(
+    path: str | os.PathLike[str], *, gravity: ArrayLike = (0.0, 0.0, -9.81), free_base: bool = False,
+    repair: bool = False,
+) -> ImportedScene:  # fmt: skip
+    """The rigid tree of a URDF file, at its zero position and at rest, under `gravity` (m/s², World axes).
+
+    The root link is welded to the ground, or free with `free_base`; its frame starts at the World's. Many published
+    robots have tensors that no mass has: `repair` changes them as little as makes them possible, and a note lists them;
+    otherwise they are SceneErrors. Limits, damping,
+    friction, shapes and transmissions are left out, as the notes say. Raises ModelError for what is no URDF, has no one
+    root, or has mimic joints; SceneError for inertia that no body has; OSError for a file that cannot be read.
+    """
+    return _Robot(str(path), _parsed(Path(path)), repair).scene(gravity, free_base)
+
+
+def _parsed(path: Path) -> ElementTree.Element:
+    try:
+        text = read_text(path)
+        if "<!ENTITY" in text:
+            raise ModelError(f"{path}: it declares entities, which no URDF needs: remove them")
+        root = ElementTree.fromstring(text)
+    except Unreadable as error:
+        raise ModelError(f"{path}: {error}") from None
+    except ElementTree.ParseError as error:
+        raise ModelError(f"{path}: not XML ({error}): correct it there") from None
+    if any(each.tag.startswith("{") and "xacro" in each.tag for each in root.iter()):
+        raise ModelError(f"{path}: it has xacro macros: expand them first, by the command xacro")
+    if root.tag != "robot":
+        raise ModelError(f'{path}: the outermost element is "{root.tag}", not "robot": is it a URDF file?')
+    return root
+
+
+class _Robot:
+    """One robot; `place` in errors are the names of link and joint."""
+
+    def __init__(self, file: str, robot: ElementTree.Element, repair: bool) -> None:
+        self.file, self.robot, self.repair = file, robot, repair
+        self.links = self._named("link")
+        self.joints = self._named("joint")
+        self.ignored: dict[str, list[str]] = {}
+        self.repaired: list[str] = []
+
+    def scene(self, gravity: ArrayLike, free_base: bool) -> ImportedScene:
+        root = self._root()
+        builder = SceneBuilder(self.robot.get("name") or Path(self.file).stem, gravity=gravity)
+        for name, link in self.links.items():
+            self._body(builder, name, link)
+        taken = set(self.joints)
+        base = next(
+            name for name in ("base", "base_joint", f"{root}_to_ground", *map(str, range(9))) if name not in taken
+        )
+        (builder.free if free_base else builder.weld)(base, GROUND, self._body_of(root))
+        for name, joint in self.joints.items():
+            self._hinge(builder, name, joint)
+        return ImportedScene(builder.scene(), tuple(self._notes()))
+
+    def _named(self, tag: str) -> dict[str, ElementTree.Element]:
+        found: dict[str, ElementTree.Element] = {}
+        for element in self.robot.findall(tag):
+            name = element.get("name")
+            if not name or name in found:
+                self._fail(f'{tag} "{name}"', "it has no name, or one that is taken", "rename it")
+            found[name] = element
+        return found
+
+    def _root(self) -> str:
+        """The one link that is no child. ModelError where the joints make no tree."""
+        children: dict[str, str] = {}
+        for name, joint in self.joints.items():
+            parent, child = self._link_of(name, joint, "parent"), self._link_of(name, joint, "child")
+            if child in children or parent == child:
+                other = children.get(child, name)
+                self._fail(f'joint "{name}"', f'link "{child}" is also the child of "{other}"', "a URDF is a tree")
+            children[child] = name
+        roots = [name for name in self.links if name not in children]
+        if len(roots) != 1:
+            what = f"{len(roots)} links are no joint's child ({listed(roots) or 'none'})"
+            self._fail("robot", what, "join all links to one tree")
+        return roots[0]
+
+    def _link_of(self, name: str, joint: ElementTree.Element, end: str) -> str:
+        element = joint.find(end)
+        link = "" if element is None else element.get("link", "")
+        if link not in self.links:
+            self._fail(f'joint "{name}"', f'its {end} is "{link}", which is no link', "name one that is there")
+        return link
+
+    def _body_of(self, link: str) -> str:
+        """The name of a link's body: "ground" is taken by the inertial frame."""
+        return (
+            link if link != GROUND else next(name for name in ("ground link", "link ground") if name not in self.links)
+        )
+
+    def _body(self, builder: SceneBuilder, name: str, link: ElementTree.Element) -> None:
+        place, inertial = f'link "{name}"', link.find("inertial")
+        if inertial is None:
+            builder.rigid_body(self._body_of(name), mass=0.0, inertia=np.zeros((3, 3)))
+            return
+        R, com = self._origin(place, inertial)
+        mass = self._number(place, inertial, "mass", "value")
+        xx, yy, zz, xy, xz, yz = (
+            self._number(place, inertial, "inertia", f"i{k}") for k in ("xx", "yy", "zz", "xy", "xz", "yz")
+        )
+        tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+        if self.repair and not np.array_equal(possible := _possible(mass, tensor), tensor):
+            self.repaired.append(name)
+            tensor = possible
+        turned = R @ tensor @ R.T
+        builder.rigid_body(self._body_of(name), mass=mass, com=com, inertia=0.5 * (turned + turned.T))
+
+    def _hinge(self, builder: SceneBuilder, name: str, joint: ElementTree.Element) -> None:
+        place, kind = f'joint "{name}"', joint.get("type", "")
+        parent, child = (self._body_of(self._link_of(name, joint, end)) for end in ("parent", "child"))
+        if joint.find("mimic") is not None:
+            what = "it mimics another joint, and no hinge of a scene follows another"
+            self._fail(place, what, "prescribe both coordinates, or close the mechanism by a closure")
+        R, p = self._origin(place, joint)
+        at: Placement = {"parent_position": p, "parent_quaternion": quaternion_of(R)}
+        axis = self._axis(place, joint) if kind in ("revolute", "continuous", "prismatic", "planar") else Z
+        match kind:
+            case "fixed":
+                builder.weld(name, parent, child, **at)
+            case "revolute" | "continuous":
+                builder.revolute(name, parent, child, axis=axis, **at)
+            case "prismatic":
+                builder.prismatic(name, parent, child, axis=axis, **at)
+            case "floating":
+                builder.free(name, parent, child, **at)
+            case "planar":  # in the plane across the axis: z of turned frames on both sides
+                across = _upright(axis)
+                inner, outer = quaternion_of(R @ across), quaternion_of(across)
+                builder.planar(name, parent, child, parent_position=p, parent_quaternion=inner, child_quaternion=outer)
+            case _:
+                self._fail(place, f'its type is "{kind}"', f"types are fixed, {', '.join(MOVING)}")
+        for tag in IGNORED:
+            if joint.find(tag) is not None and kind != "fixed":
+                self.ignored.setdefault(tag, []).append(name)
+
+    def _origin(self, place: str, element: ElementTree.Element) -> tuple[Real, Real]:
+        """Rotation (3,3) and position (3,) m of a frame: turns about the fixed axes x, then y, then z."""
+        origin = element.find("origin")
+        if origin is None:
+            return np.eye(3), np.zeros(3)
+        roll, pitch, yaw = self._vector(place, origin, "rpy")
+        return about("z", yaw) @ about("y", pitch) @ about("x", roll), self._vector(place, origin, "xyz")
+
+    def _axis(self, place: str, joint: ElementTree.Element) -> Real:
+        element = joint.find("axis")
+        axis = np.array([1.0, 0.0, 0.0]) if element is None else self._vector(place, element, "xyz")
+        length = float(np.linalg.norm(axis))
+        if length == 0.0:
+            self._fail(place, "its axis has no length", "give a unit vector")
+        return axis / length
+
+    def _vector(self, place: str, element: ElementTree.Element, key: str) -> Real:
+        words = element.get(key, "0 0 0").split()
+        numbers = [_real(word) for word in words]
+        if len(numbers) != 3 or not all(map(math.isfinite, numbers)):
+            self._fail(place, f'{key} is "{element.get(key)}"', "give three numbers")
+        return np.array(numbers)
+
+    def _number(self, place: str, inertial: ElementTree.Element, tag: str, key: str) -> float:
+        element = inertial.find(tag)
+        text = None if element is None else element.get(key)
+        value = math.nan if text is None else _real(text)
+        if not math.isfinite(value):
+            self._fail(
+                place, f"{tag} {key} is {'missing' if text is None else repr(text)}", "give a number in SI units"
+            )
+        return value
+
+    def _notes(self) -> Iterable[str]:
+        for tag, words in IGNORED.items():
+            if names := self.ignored.get(tag):
+                yield f"{words} of joints are left out: {listed(names)}"
+        others = sorted({each.tag for each in self.robot} - {"link", "joint", *NO_MECHANICS})
+        if others:
+            yield f"elements that URDF does not define are left out: {listed(others)}"
+        if self.repaired:
+            yield f"tensors that no mass has were changed as little as makes them possible: {listed(self.repaired)}"
+        if empty := [name for name, link in self.links.items() if link.find("inertial") is None]:
+            yield f"links without inertia are bodies without mass: {listed(empty)}"
+
+    def _fail(self, place: str, what: str, remedy: str) -> NoReturn:
+        raise ModelError(f"{self.file}: {place}: {what}: {remedy}")
+
+
+def _possible(mass: float, tensor: Real) -> Real:
+    """The tensor itself if masses can have it, else the one whose second moments sum m x x' lose what is negative."""
+    if mass == 0.0:
+        return np.zeros((3, 3))
+    second, axes = np.linalg.eigh(0.5 * np.trace(tensor) * np.eye(3) - tensor)
+    if second[0] >= 0.0:
+        return tensor
+    second = np.maximum(second, 0.0)
+    return np.sum(second) * np.eye(3) - (axes * second) @ axes.T
+
+
+def _upright(axis: Real) -> Real:
+    """A rotation whose z is the unit vector `axis`; its x is as near to x as can be."""
+    along = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.9 else np.array([0.0, 1.0, 0.0])
+    y = np.cross(axis, along)
+    y /= np.linalg.norm(y)
+    return np.column_stack([np.cross(y, axis), y, axis])
+
+
+def _real(word: str) -> float:
+    try:
+        return float(word)
+    except ValueError:
+        return math.nan

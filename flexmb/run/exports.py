@@ -1,0 +1,139 @@
+"""Trajectories for other programs: tables of pandas, Parquet and NumPy, datasets of xarray, recordings of rerun.
+
+Each is imported where it is used: none belongs to what flexmb needs. Names and units go along everywhere.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import numpy as np
+
+from flexmb.run.channels import channels_of, unit
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    import pandas
+    import xarray
+
+    from flexmb.run.trajectory import Trajectory
+
+AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
+"""Dimension and its labels of the last axis of vectors and quaternions."""
+
+
+def write_npz(trajectory: Trajectory, path: Path) -> None:
+    """`names` (n,), `units` (n,), `values` (T,n), `scene`: text and numbers only, nothing that has to be unpickled."""
+    names, units, values = zip(*trajectory.columns(), strict=True)
+    np.savez(path, names=np.array(names), units=np.array(units), values=np.column_stack(values), scene=trajectory.scene)
+
+
+def data_frame(trajectory: Trajectory) -> pandas.DataFrame:
+    """One column a channel, time as the index; `attrs` has the units by name, and the scene."""
+    try:
+        import pandas
+    except ImportError:
+        _missing("pandas", "dataframe")
+    columns = list(trajectory.columns())
+    frame = pandas.DataFrame(
+        {name: values for name, _, values in columns[1:]}, index=pandas.Index(trajectory.t, name="t")
+    )
+    frame.attrs = {"units": {name: unit for name, unit, _ in columns}, "scene": trajectory.scene}
+    return frame
+
+
+def write_parquet(trajectory: Trajectory, path: Path) -> None:
+    """One column a channel, its unit in the metadata of its field; the scene in those of the file."""
+    try:
+        import pyarrow
+        from pyarrow import parquet
+    except ImportError:
+        _missing("pyarrow", "dataframe")
+    columns = list(trajectory.columns())
+    fields = [pyarrow.field(name, pyarrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
+    about = {"scene": trajectory.scene, "status": json.dumps(trajectory.message)}
+    table = pyarrow.table([values for _, _, values in columns], schema=pyarrow.schema(fields, metadata=about))
+    parquet.write_table(table, path)
+
+
+def dataset(trajectory: Trajectory) -> xarray.Dataset:
+    """A variable a channel, (t), (t, axis) or, of quaternions, (t, component); units in `attrs`, as usual there."""
+    try:
+        import xarray
+    except ImportError:
+        _missing("xarray", "dataframe")
+    found: dict[str, Any] = {}
+    for name, units, values in _channels(trajectory):
+        if name.startswith("drive:"):
+            dimension, labels = f"{name}.coordinate", None
+        else:
+            dimension, labels = AXES.get(values.shape[1], ("", None))
+        scalar = labels is None and values.shape[1] == 1
+        dims = ("t",) if scalar else ("t", dimension)
+        found[name] = (dims, values[:, 0] if scalar else values, {"units": units})
+    coordinates = {name: list(labels) for name, labels in AXES.values()}
+    time = ("t", trajectory.t, {"units": "s"})
+    return xarray.Dataset(found, coords={"t": time, **coordinates}, attrs={"scene": trajectory.scene})
+
+
+def write_recording(trajectory: Trajectory, path: Path) -> None:
+    """A recording for the viewer rerun: markers as moving frames with their paths, all other channels as curves."""
+    try:
+        import rerun
+    except ImportError:
+        _missing("rerun-sdk", "viewer")
+    recording = rerun.RecordingStream("flexmb", recording_id=None)
+    recording.save(str(path), default_blueprint=_blueprint(rerun.blueprint))
+    time = [rerun.TimeColumn("t", duration=trajectory.t)]
+    recording.log("markers", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    for name, marker in trajectory.markers.items():
+        entity = f"markers/{rerun.escape_entity_path_part(name)}"
+        turned = np.roll(marker.quaternion, -1, axis=1)  # the scalar last
+        recording.send_columns(
+            entity, indexes=time, columns=rerun.Transform3D.columns(translation=marker.position, quaternion=turned)
+        )
+        size = 0.05 * max(float(np.max(np.ptp(marker.position, axis=0), initial=0.0)), 1e-3)
+        recording.log(entity, rerun.TransformAxes3D(size), static=True)
+        path_of = f"paths/{rerun.escape_entity_path_part(name)}"
+        recording.log(path_of, rerun.LineStrips3D([marker.position]), static=True)
+    for name, units, values in _channels(trajectory):
+        if not name.startswith("marker:"):
+            kind, _, rest = name.partition(":")
+            parts = [rerun.escape_entity_path_part(part) for part in (kind, rest) if part]
+            entity = "/".join(["curves", *parts])
+            labels = AXES[3][1] if values.shape[1] == 3 else range(values.shape[1])
+            recording.log(
+                entity, rerun.SeriesLines(names=[f"{name} {label} [{units}]" for label in labels]), static=True
+            )
+            columns = rerun.Scalars.columns(scalars=values)
+            recording.send_columns(entity, indexes=time, columns=columns)
+    recording.flush()
+    recording.disconnect()
+
+
+def _blueprint(blueprint: Any) -> Any:
+    """Markers and their paths in space, loads and energies beneath each other."""
+    curves = blueprint.Vertical(
+        *(
+            blueprint.TimeSeriesView(origin=f"curves/{kind}", name=name)
+            for kind, name in (("load", "loads"), ("energy", "energy"))
+        ),
+        blueprint.TimeSeriesView(origin="curves", name="all curves"),
+    )
+    return blueprint.Blueprint(blueprint.Horizontal(blueprint.Spatial3DView(origin="/", name="markers"), curves))
+
+
+def _channels(trajectory: Trajectory) -> Iterator[tuple[str, str, Real]]:
+    """(name, unit, values (T,k)) of channels, with coordinates and speeds."""
+    for names, values in ((trajectory.q_names, trajectory.q), (trajectory.u_names, trajectory.u)):
+        for i, (name, units) in enumerate(names):
+            yield name, units, values[:, i : i + 1]
+    for name, values in channels_of(trajectory).items():
+        yield name, "1" if name.endswith(".orientation") else unit(name), values
+
+
+def _missing(package: str, extra: str) -> NoReturn:
+    raise ImportError(f"{package} is not installed: pip install 'flexmb[{extra}]'") from None

@@ -1,0 +1,241 @@
+"""Super-elements against the full finite-element model, closed forms, and flexmb's own beam."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scipy.linalg import eigh
+
+import flexmb as fm
+from flexmb.interchange.sid import imported_sid, sid_of
+from flexmb.interchange.superelement import SuperElementError, reduced, reduction, super_element
+from flexmb.interchange.superelement.inertia import nodal_inertia
+from flexmb.modal.flexible import flexible_model
+from flexmb.modal.integrals import modal_integrals
+from tests.bounds import relative
+from tests.flexmb.interchange import frames
+
+LENGTH, TIP = 1.0, 21
+POSITION, MEMBERS = frames.straight(20, LENGTH)
+STIFFNESS = frames.frame(POSITION, MEMBERS)
+BEAM = super_element(STIFFNESS, frames.lumped(POSITION, MEMBERS, rotary=1e-7), POSITION)
+GRID, BARS = frames.panel()
+PANEL_STIFFNESS = frames.frame(GRID, BARS)
+MASSES = {
+    "lumped": frames.lumped(GRID, BARS),
+    "tensors": frames.lumped(GRID, BARS, rotary=1e-5),
+    "one kernel": frames.linear(GRID, BARS),
+    "coupled": frames.consistent(GRID, BARS),
+}
+
+
+def clamped(element, first: int = 0) -> np.ndarray:
+    """Frequencies (Hz) of the full model, clamped at one node."""
+    free = np.setdiff1d(np.arange(len(element.K)), element.place[first])
+    inverse = eigh(element.M[np.ix_(free, free)], element.K[np.ix_(free, free)], eigvals_only=True)[::-1]
+    return 1.0 / (2.0 * np.pi * np.sqrt(inverse[inverse > 1e-12 * inverse[0]]))
+
+
+def test_with_all_modes_nothing_is_lost():
+    every = reduced(BEAM, [1, TIP], len(BEAM.K) - 12)
+    assert relative(every.frequencies, clamped(BEAM)[: len(every.frequencies)]) < 1e-8
+
+
+def test_few_modes_give_the_low_frequencies_of_the_whole_and_never_lower_ones():
+    fewer, few = (reduced(BEAM, [1, TIP], count).frequencies for count in (4, 8))
+    whole = clamped(BEAM)
+    assert len(few) == 6 + 8
+    assert np.all(few >= whole[: len(few)] * (1.0 - 1e-9))  # Rayleigh and Ritz
+    assert np.all(few[:4] <= fewer[:4])
+    assert relative(few[:4], whole[:4]) < 1e-3
+
+
+def test_a_large_structure_has_the_modes_that_all_of_it_has(monkeypatch):
+    """Lanczos' method for few modes of many, against the whole eigenproblem."""
+    position, members = frames.panel(7, 8)
+    element = super_element(frames.frame(position, members), frames.lumped(position, members), position)
+    whole = reduced(element, [1, 56], 6)
+    monkeypatch.setattr(reduction, "DENSE", 10)
+    assert relative(reduced(element, [1, 56], 6).frequencies, whole.frequencies) < 1e-9
+
+
+def test_frequencies_are_those_of_the_closed_form_and_of_flexmbs_beam():
+    """Cantilever: (beta L)² = 3.516, 22.03; half an element is lumped at the tip, an error ~ 1/(2 n²)."""
+    found = reduced(BEAM, [1, TIP], 8).frequencies
+    line = frames.RHO * frames.A
+    exact = sorted(
+        beta**2 * np.sqrt(frames.E * I / line) / (2.0 * np.pi)
+        for beta in (1.8751041, 4.6940911)
+        for I in (frames.IY, frames.IZ)
+    )
+    assert relative(found[:2], exact[:2]) < 1.0 / 20**2
+    assert relative(found[2:4], exact[2:4]) < 22.0 / 3.5 / 20**2
+    section = fm.BeamStation(
+        x_m=0.0,
+        EA_N=frames.E * frames.A,
+        EIy_Nm2=frames.E * frames.IY,
+        EIz_Nm2=frames.E * frames.IZ,
+        GJ_Nm2=frames.G * frames.J,
+        mass_per_length_kg_m=line,
+    )
+    modes = fm.Modes(count=4, families=("bending_y", "bending_z"))
+    builder = fm.SceneBuilder("own").beam(
+        "rod", length=LENGTH, elements=20, section=section, modes=modes, mass="lumped", points="line"
+    )
+    (own,) = builder.weld("root", "ground", "rod").scene().bodies
+    frequencies = np.sqrt(np.diag(flexible_model(own).stiffness)) / (2.0 * np.pi)
+    assert relative(found[:4], frequencies) < 1e-3
+
+
+@pytest.mark.parametrize("mass", MASSES)
+def test_kinetic_energy_at_rest_shape_is_that_of_the_mass_matrix(mass):
+    element = super_element(PANEL_STIFFNESS, MASSES[mass], GRID)
+    for boundary in ("clamped-free", "free-free"):
+        made = reduced(element, [1, 12], 4, boundary=boundary)
+        model = flexible_model(made.body)
+        spatial = modal_integrals(model).spatial_mass
+        m = model.mode_count
+        inertia = nodal_inertia(element)
+        R = element.rigid(made.origin)[:, [3, 4, 5, 0, 1, 2]]
+        assert relative(spatial[m:, m:], R.T @ inertia.M @ R) < 1e-12
+        assert relative(spatial[:m, :m], np.eye(m)) < 1e-9
+        assert relative(made.mass, float(np.sum(model.mass))) < 1e-13
+        assert relative(made.inertia, spatial[m : m + 3, m : m + 3]) < 1e-12
+        if boundary == "free-free":
+            assert np.max(np.abs(spatial[:m, m:])) < 1e-9 * np.max(np.abs(spatial[m:, m:]))
+            assert np.max(np.abs(made.centre)) < 1e-12
+        if mass != "coupled":
+            assert made.notes == ()
+            R = element.rigid(made.origin)
+            assert relative((R.T @ element.M @ R)[3:, 3:], made.inertia) < 1e-12
+
+
+def test_mass_that_couples_rotations_is_lumped_and_the_change_is_said():
+    element = super_element(PANEL_STIFFNESS, MASSES["coupled"], GRID)
+    made = reduced(element, [1, 12], 4)
+    assert "lumped at the nodes; the moments of inertia changed by" in made.notes[0]
+    total = frames.RHO * frames.A * sum(np.linalg.norm(GRID[j] - GRID[i]) for i, j in BARS)
+    assert relative(made.mass, total) < 1e-13
+    assert relative(made.frequencies[:2], clamped(element)[:2]) < 0.05
+
+
+def test_gyroscopic_sums_are_those_of_the_moving_nodes():
+    """Exact with one kernel: 1/2 v' M v of v_i = v + w x (r_i + phi_i q) + phi_i q', at any q."""
+    element = super_element(PANEL_STIFFNESS, MASSES["one kernel"], GRID)
+    made = reduced(element, [1, 12], 5)
+    model = flexible_model(made.body)
+    rng = np.random.default_rng(7)
+    q, qd = rng.normal(size=(2, model.mode_count)) * 1e-2
+    w, v = rng.normal(size=(2, 3))
+
+    def energy(position, shapes, kernel):
+        u = v + np.cross(w, position + shapes @ q) + shapes @ qd
+        return 0.5 * np.einsum("ia,ij,ja->", u, kernel, u)
+
+    whole = energy(GRID - made.origin, made.shapes[:, :3], nodal_inertia(element).kernel)
+    few = energy(model.position, model.translation, np.diag(model.mass))
+    assert relative(few, whole) < 1e-12
+
+
+def assembled(made, base: str) -> fm.Scene:
+    """The structure on a hinge, a rigid body at its far node."""
+    return (
+        fm.SceneBuilder("arm")
+        .add(made.body)
+        .rigid_body("load", mass=0.2, com=(0.03, 0.0, 0.0), inertia=(1e-3, 2e-3, 2e-3))
+        .revolute("pivot", "ground", "body", child_node=base, axis=(0, 1, 0), stiffness=50.0)
+        .revolute("wrist", "body", "load", parent_node="21", axis=(0, 0, 1), stiffness=1.0)
+        .marker("end", "body", node="21")
+        .scene()
+    )
+
+
+def test_free_and_clamped_modes_give_the_same_assembled_system():
+    """Both span the same motions: frequencies about the undeformed shape agree to rounding."""
+    found = []
+    for boundary, base in (("clamped-free", "1"), ("free-free", "1")):
+        scene = assembled(reduced(BEAM, [1, TIP], 6, boundary=boundary), base)
+        A = fm.linearize(fm.compile(scene)).A
+        found.append(np.sort(np.abs(np.linalg.eigvals(A)))[::2])
+    low = slice(0, 8)
+    assert relative(found[0][low] / found[1][low], np.ones(8)) < 1e-8
+    assert np.min(found[0]) > 1.0
+
+
+def test_a_tip_load_bends_it_by_the_closed_form_and_comes_back_at_the_root():
+    """F L³ / (3 EI): static modes of the interface are exact. Axial and bending loads at the root balance F."""
+    made = reduced(BEAM, [1, TIP], 2)
+    force = 1e-3
+    scene = (
+        fm.SceneBuilder("loaded")
+        .add(made.body)
+        .weld("root", "ground", "body", child_node="1")
+        .force("pull", "body", node="21", direction=(0, 1, 0), function=fm.Constant(value=force))
+        .marker("end", "body", node="21")
+        .scene()
+    )
+    system = fm.compile(scene)
+    rest = fm.equilibrium(system)
+    deflection = system.evaluate(rest.t, rest.q, rest.u).markers["end"].position[1]
+    assert relative(deflection, force * LENGTH**3 / (3.0 * frames.E * frames.IZ)) < 1e-6
+    load = system.hinge_loads(rest)["root"]
+    assert np.allclose(load, [0.0, 0.0, -force * LENGTH, 0.0, -force, 0.0], rtol=0.0, atol=1e-3 * force)
+
+
+def test_a_reduced_body_goes_through_sid():
+    made = reduced(BEAM, [1, TIP], 4)
+    back = imported_sid(sid_of(made.body), "body").body
+    assert back.boundary == "clamped-free"
+    before, after = (modal_integrals(flexible_model(each)) for each in (made.body, back))
+    for name in ("mass", "s0", "s1", "J0", "J1", "J2", "C0", "C1", "M_ff"):
+        assert relative(getattr(after, name), getattr(before, name)) < 1e-9, name
+
+
+def spring_to_ground(K):
+    K = K.copy()
+    K[0, 0] += 1e3
+    return K
+
+
+def cut(K):
+    """The last member is gone: node 21 hangs on nothing."""
+    return frames.frame(POSITION, MEMBERS[:-1])
+
+
+BAD = {
+    "held": (
+        lambda: super_element(spring_to_ground(STIFFNESS), BEAM.M, POSITION),
+        "resists the rigid-body translation x",
+    ),
+    "moved node": (lambda: super_element(STIFFNESS, BEAM.M, POSITION[:, [1, 0, 2]]), "resists the rigid-body rotation"),
+    "not symmetric": (lambda: super_element(np.triu(STIFFNESS), BEAM.M, POSITION), "K is not symmetric"),
+    "mass in x only": (
+        lambda: super_element(STIFFNESS, BEAM.M * np.tile([1, 0, 0, 1, 1, 1], 21), POSITION),
+        "M is not symmetric|mass of M",
+    ),
+    "sizes": (lambda: super_element(STIFFNESS[6:, 6:], BEAM.M, POSITION), "K has 120 rows, M 126"),
+    "no such node": (lambda: reduced(BEAM, [1, 22], 2), "there is no node 22: the nodes are 1, 2"),
+    "too many modes": (lambda: reduced(BEAM, [1, TIP], 115), "115 modes are asked for, and .* has 114"),
+    "loose part": (lambda: reduced(super_element(cut(STIFFNESS), BEAM.M, POSITION), [1], 2), "move without force"),
+    "rigid": (lambda: reduced(BEAM, [1], 0), "is a rigid body: ask for modes"),
+    "damping": (lambda: reduced(BEAM, [1], 2, damping_ratio=-0.1), "the damping ratio is -0.1"),
+    "no interface": (lambda: reduced(BEAM, [], 2), "no interface node"),
+    "nan": (lambda: super_element(STIFFNESS * np.nan, BEAM.M, POSITION), "finite numbers"),
+}
+
+
+@pytest.mark.parametrize("fault", BAD)
+def test_what_is_no_free_structure_is_refused(fault):
+    make, words = BAD[fault]
+    with pytest.raises(SuperElementError, match=words):
+        make()
+
+
+def test_an_interface_node_of_a_solid_has_no_rotations():
+    rows = np.flatnonzero(np.arange(len(STIFFNESS)) % 6 < 3)
+    ends = np.concatenate([rows, [3, 4, 5]])
+    ends.sort()
+    with pytest.raises(SuperElementError, match="interface node 21 has no rotation x"):
+        K = np.zeros((len(ends), len(ends)))
+        M = BEAM.M[np.ix_(ends, ends)]
+        reduced(super_element(K, M, POSITION, dofs=["123456", *["123"] * 20]), [1, TIP], 1)
