@@ -1,4 +1,4 @@
-"""Lagrange's heavy top, released with its spin alone: its height by Jacobi's elliptic functions, the rest by quadrature.
+"""Lagrange's heavy top, released with its spin alone: height by Jacobi's elliptic functions, the rest by quadrature.
 
 With u the cosine of the lean, u'^2 = beta (u0 - u) (u - u1) (u3 - u).
 """
@@ -62,7 +62,7 @@ def primitive(rate, times):
     """The integral of `rate` from 0 to each of `times`, by Gauss-Legendre between them."""
     nodes, weights = np.polynomial.legendre.leggauss(12)
     pieces = 24
-    edges = np.concatenate([np.linspace(a, b, pieces, endpoint=False) for a, b in zip(times, times[1:])] + [times[-1:]])
+    edges = np.append(np.linspace(times[:-1], times[1:], pieces, endpoint=False).T, times[-1])
     half, middle = 0.5 * np.diff(edges), 0.5 * (edges[1:] + edges[:-1])
     parts = half * (rate(middle[:, None] + half[:, None] * nodes) @ weights)
     return np.concatenate([[0.0], np.cumsum(parts.reshape(-1, pieces).sum(axis=1))])
