@@ -35,7 +35,7 @@ def _roots():
 
 
 def _mode(beta, x):
-    """phi_n at x/L = `x`, with int_0^1 phi^2 = 1; what cosh and sinh leave of e^(beta x) is put so that none cancels."""
+    """phi_n at x/L = `x`, with int_0^1 phi^2 = 1; nothing in it cancels where beta is large."""
     sigma = _sigma(beta)
     rising = 0.5 * np.exp(beta * x) * (np.exp(-beta) + np.cos(beta) + np.sin(beta)) / (np.cosh(beta) + np.cos(beta))
     return rising + 0.5 * (1.0 + sigma) * np.exp(-beta * x) - np.cos(beta * x) + sigma * np.sin(beta * x)

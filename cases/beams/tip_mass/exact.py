@@ -40,8 +40,8 @@ def _roots():
     def equation(b):
         return 1.0 / np.cosh(b) + np.cos(b) + RATIO * b * (np.cos(b) * np.tanh(b) - np.sin(b))
 
-    ends = np.arange(MODES + 1) * np.pi
-    return np.array([brentq(equation, low + 1e-6, high, xtol=1e-15) for low, high in zip(ends[:-1], ends[1:], strict=True)])
+    starts = np.arange(MODES) * np.pi
+    return np.array([brentq(equation, start + 1e-6, start + np.pi, xtol=1e-15) for start in starts])
 
 
 def _mode(beta, x):

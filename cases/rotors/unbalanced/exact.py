@@ -1,7 +1,7 @@
 """Closed form: a disc whose mass centre is off an isotropic elastic shaft, which starts to whirl from rest.
 
-With z = x + i y of the shaft's centre: z'' + 2 d z' + w^2 z = e W^2 exp(i W t). The whirl is the particular solution and
-the two decaying ones that start it at z = z' = 0.
+With z = x + i y of the shaft's centre: z'' + 2 d z' + w^2 z = e W^2 exp(i W t). The whirl is the particular solution
+and the two decaying ones that start it at z = z' = 0.
 """
 
 import numpy as np
