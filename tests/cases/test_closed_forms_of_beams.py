@@ -1,4 +1,4 @@
-"""The closed forms of beams, rotors and booms against routes that share nothing with them: beam elements, SciPy's ODEs."""
+"""The closed forms of beams, rotors and booms against routes that share nothing with them: elements, ODE solvers."""
 
 from __future__ import annotations
 
