@@ -1,6 +1,6 @@
 """The command `crosscheck`, one file a command: it reads the command line and shows what the other rooms do."""
 
-from crosscheck.cli import run, listing, verify, stability  # noqa: F401, I001 - each adds its commands, in this order
+from crosscheck.cli import run, listing, verify, regenerate, stability  # noqa: F401, I001 - each adds its commands, in this order
 from crosscheck.cli.common import app
 
 

@@ -11,7 +11,7 @@ from typing import TypeVar
 from crosscheck.library.accepted import FILE as ACCEPTED
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile, Variant
-from crosscheck.library.check import check_accepted, check_run_file
+from crosscheck.library.check import check_accepted, check_provenance, check_run_file
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError, closest
@@ -103,11 +103,18 @@ def load_case(folder: Path) -> Case:
         except CaseError as error:
             raise CaseError(f"{folder / ACCEPTED}: {error}") from None
     provenance_file, readme = folder / "provenance.toml", folder / "README.md"
+    provenance: Provenance | None = None
+    if _present(provenance_file):
+        provenance = _read(provenance_file, Provenance)
+        try:
+            check_provenance(provenance)
+        except CaseError as error:
+            raise CaseError(f"{provenance_file}: {error}") from None
     return Case(
         name=f"{folder.parent.name}/{folder.name}",
         folder=folder,
         run=run,
-        provenance=_read(provenance_file, Provenance) if _present(provenance_file) else None,
+        provenance=provenance,
         readme=_text(readme) if _present(readme) else "",
         accepted=accepted,
     )

@@ -7,6 +7,8 @@ For example::
     samples = 101                     # [the variant's]
     horizon_s = 8.0                   # [the whole run] how long the motion is known: a chaotic one only so far
     channels = ["marker", "load"]     # [all that two routes offer]
+    engines = ["native", "mujoco"]    # [those that a comparison expects to agree on the variant] held against it
+    goals = { marker = 1e-7 }         # [those of that comparison]
 
     [[reference.route]]               # the first route that offers a channel gives its values
     exact = "exact.py"                # a closed form, in the case's folder
@@ -19,7 +21,9 @@ For example::
     [[reference.route]]
     engine = "native-frisch"
 
-Every channel comes by two routes at least, which must agree within their uncertainties.
+Every channel comes by two routes at least, which must agree within their uncertainties and be independent: a closed
+form and any other, two codes, or two of this library's engines with two integrators. The samples are some of the
+variant's: with 251 of these, 126 or 51 can be kept. `docs/references.md` has all rules.
 """
 
 from __future__ import annotations
@@ -54,10 +58,12 @@ class ReferenceRoute(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw
 
 
 class ReferenceRecipe(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """What `reference.csv` holds and by which routes it is made."""
+    """What `reference.csv` holds, by which routes it is made, and who is held against it in which channels."""
 
     variant: str
     samples: int | None = None
     horizon_s: float | None = None
     channels: tuple[str, ...] = ()
+    engines: tuple[str, ...] = ()
+    goals: dict[str, float] = {}
     routes: tuple[ReferenceRoute, ...] = msgspec.field(name="route", default=())

@@ -13,13 +13,15 @@ from __future__ import annotations
 import csv
 import hashlib
 import io
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
-from crosscheck.library.case import CaseError
+from crosscheck.library.case import CaseError, Variant
+from crosscheck.library.find import Case
 from flexmb.run.channels import unit
 from flexmb.scene.convert import to_struct
 from flexmb.scene.problems import SceneError
@@ -28,6 +30,8 @@ from flexmb.typing import Real
 
 VALUES, KNOWLEDGE = "reference.csv", "reference.toml"
 LIMIT = 64 * MIB
+AGAIN = "run `crosscheck regenerate`"
+ANEW = f"put back what it was, or delete both files and {AGAIN}"
 TIME = "t [s]"
 
 
@@ -41,8 +45,8 @@ class Known(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=Tru
 
 
 class Knowledge(msgspec.Struct, frozen=True, forbid_unknown_fields=True, kw_only=True):
-    """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of the
-    variant's scene with the sample times; `routes` say in words how the numbers were made, `made_with` by what."""
+    """reference.toml. `values`, `provenance` and `scene` are digests of reference.csv, of provenance.toml and of what
+    the variant is (see `scene_digest`); `routes` say in words how the numbers were made, `made_with` by what."""
 
     variant: str
     horizon_s: float
@@ -67,10 +71,10 @@ def load_reference(folder: Path) -> StoredReference:
     """The reference of the case in `folder`; CaseError where there is none, or where its files belie each other."""
     values, knowledge = _text(folder / VALUES), _knowledge(folder / KNOWLEDGE)
     if digest(values) != knowledge.values:
-        raise CaseError(f"{folder / VALUES} was changed after {KNOWLEDGE} was written: run `crosscheck regenerate`")
+        raise CaseError(f"{folder / VALUES} was changed after {KNOWLEDGE} was written: {ANEW}")
     times, channels = parse_values(values, str(folder / VALUES))
     if set(channels) != set(knowledge.channels):
-        raise CaseError(f"{folder / KNOWLEDGE} names other channels than {VALUES}: run `crosscheck regenerate`")
+        raise CaseError(f"{folder / KNOWLEDGE} names other channels than {VALUES}: {ANEW}")
     return StoredReference(times, channels, knowledge)
 
 
@@ -82,6 +86,43 @@ def has_reference(folder: Path) -> bool:
 def digest(text: str) -> str:
     """What a text is recognised by."""
     return hashlib.sha256(text.encode()).hexdigest()
+
+
+def scene_digest(case: Case, variant: Variant) -> str:
+    """What a variant is recognised by: its scene file without comments, the files it names, and its transformation.
+
+    It is the scene before the transformation, whose numbers depend in their last digits on the machine.
+    """
+    try:
+        scene = json.dumps(parse_toml(_text(case.folder / variant.scene)), sort_keys=True, default=str)
+        model = msgspec.structs.replace(
+            variant, engines=(), also=(), efforts=(), refined=None, duration_s=None, samples=None, note=""
+        )
+        found = hashlib.sha256(scene.encode() + msgspec.json.encode(model))
+        for body in case.scene(variant).bodies:
+            file = getattr(body, "file", None)
+            if file is not None:
+                found.update(Path(file).read_bytes())
+    except (Unreadable, OSError, SceneError) as error:
+        raise CaseError(f"{case.folder / variant.scene}: {error}") from None
+    return found.hexdigest()
+
+
+def current_reference(case: Case) -> StoredReference:
+    """The stored reference of a case, if it is one of the case as it is now.
+
+    CaseError where there is none, where its files belie each other, where it is of another variant than the run file
+    asks for, or where the scene was changed after it was made.
+    """
+    found = load_reference(case.folder)
+    place = f"{case.folder / KNOWLEDGE}:"
+    of, recipe = found.knowledge.variant, case.run.reference
+    if recipe is not None and recipe.variant != of:
+        raise CaseError(f'{place} it is of variant "{of}", [reference] asks for "{recipe.variant}": {AGAIN}')
+    variant = case.run.variant(of)
+    if scene_digest(case, variant) != found.knowledge.scene:
+        raise CaseError(f"{place} {variant.scene} or its variant was changed after the reference was made: {AGAIN}")
+    return found
 
 
 def column_names(channel: str, width: int) -> list[str]:

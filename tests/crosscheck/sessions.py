@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import shutil
+from collections.abc import Iterable
 from pathlib import Path
 
 from crosscheck.judging.outcome import SessionOutcome, conclude
 from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
-from crosscheck.library.find import load_case
-from crosscheck.records.archive import read
+from crosscheck.library.find import Case, load_case
+from crosscheck.records.archive import Archive, read
+from crosscheck.records.kinds import RunRecord
+from crosscheck.records.machine import environment
 from crosscheck.records.session import last_session
+from crosscheck.running.execute import execute
+from crosscheck.running.plan import plan
 from crosscheck.running.pool import Limits
 from crosscheck.running.sweep import sweep
 
@@ -60,3 +65,17 @@ def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
     """The one verdict on a pair of engines."""
     (found,) = [verdict for verdict in verdicts if (verdict.engine_a, verdict.engine_b) == (a, b)]
     return found
+
+
+def sweep_here(
+    cases: Iterable[Case], asked: tuple[str, ...], records: Path, *, provider: str = PROVIDER, **_: object
+) -> None:
+    """What `sweep` records, without its worker processes, which take a second each to start."""
+    archive = Archive(records)
+    for case in cases:
+        record, jobs = plan(case, asked, provider)
+        archive.write(environment((case.name,), asked, confirms=True))
+        archive.write(record)
+        for job in jobs:
+            execute(job, lambda content: archive.write(content) if isinstance(content, RunRecord) else None)
+    archive.close()

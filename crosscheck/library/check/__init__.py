@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from crosscheck.library.accepted import Accepted
-from crosscheck.library.case import CaseError, RunFile
+from crosscheck.library.case import CaseError, Provenance, RunFile
 from crosscheck.library.check.figures import check_figures
 from crosscheck.library.check.judged import check_chart, check_comparison, check_conservation, check_control
 from crosscheck.library.check.ranges import (
@@ -20,6 +20,7 @@ from crosscheck.library.check.ranges import (
     item_place,
     problem,
 )
+from crosscheck.library.check.references import check_anchors, check_reference
 from crosscheck.library.check.runs import check_sides_run
 from crosscheck.library.check.variants import check_variant
 from flexmb.scene.problems import Defect
@@ -35,6 +36,11 @@ def check_run_file(run: RunFile) -> None:
 def check_accepted(accepted: Accepted, run: RunFile) -> None:
     """Refuse accepted figures that are none, or that belong to no comparison of the run file."""
     _refuse(check_figures(accepted, run))
+
+
+def check_provenance(provenance: Provenance) -> None:
+    """Refuse published numbers that nothing can be held against."""
+    _refuse(check_anchors(provenance))
 
 
 def check_recorded(run: RunFile) -> None:
@@ -75,6 +81,8 @@ def _run(run: RunFile) -> Iterator[Defect]:
         yield from check_conservation(run, conservation, ROOT.key("conservation", i), seen)
     for i, chart in enumerate(run.charts):
         yield from check_chart(run, chart, ROOT.key("chart", i))
+    if run.reference is not None:
+        yield from check_reference(run, run.reference, ROOT.key("reference"))
 
 
 def _recorded(run: RunFile) -> Iterator[Defect]:

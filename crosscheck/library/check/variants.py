@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from itertools import pairwise
 
-from crosscheck.library.case import EffortLadder, Refined, RunFile, Variant
+from crosscheck.library.case import Refined, RunFile, Variant
 from crosscheck.library.check.ranges import (
     MOST_PIECES,
     check_count,
@@ -15,6 +15,7 @@ from crosscheck.library.check.ranges import (
     problem,
 )
 from crosscheck.library.check.runs import check_engines_once, check_engines_run
+from crosscheck.library.recipe import EffortLadder
 from flexmb.scene.problems import Defect, Place
 
 MOST_STEPS = 1e8  # of one run with fixed steps: hours
@@ -52,7 +53,25 @@ def check_variant(run: RunFile, variant: Variant, place: Place) -> Iterator[Defe
         yield from _refined(variant, variant.refined, place.key("refined"))
     duration = variant.duration_s if variant.duration_s is not None else run.duration_s
     for i, ladder in enumerate(variant.efforts):
-        yield from _ladder(variant, ladder, duration, place.key("efforts", i))
+        where = place.key("efforts", i)
+        yield from check_engines_run(variant, (ladder.engine,), where.key("engine"))
+        yield from check_ladder(ladder, duration, where)
+
+
+def check_ladder(ladder: EffortLadder, duration: float, place: Place) -> Iterator[Defect]:
+    """The problems of a ladder of efforts for a run of `duration` (s)."""
+    where = place.key("values")
+    if not 2 <= len(ladder.values) <= MOST_EFFORTS:
+        text = f"an uncertainty needs at least two efforts, and {MOST_EFFORTS} are enough"
+        yield problem(where, text, "list them from coarse to fine")
+    if not all(coarse > fine for coarse, fine in pairwise(ladder.values)):
+        yield problem(where, "they do not fall", "list them from coarse to fine (falling)")
+    for i, value in enumerate(ladder.values):
+        if ladder.kind == "tolerance":
+            yield from check_within(value, TOLERANCES, where.key(i))
+        elif not 0.0 < value <= duration <= MOST_STEPS * value:
+            text = f"a step of {value:g} s makes no run of {duration:g} s"
+            yield problem(where.key(i), text, f"give a step for at most {MOST_STEPS:g} of them")
 
 
 def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Defect]:
@@ -68,19 +87,3 @@ def _refined(variant: Variant, refined: Refined, place: Place) -> Iterator[Defec
     if counts["elements"] is not None:
         yield from check_count(counts["elements"], place.key("elements"), 1)
     yield from check_within(refined.order, ORDERS, place.key("order"))
-
-
-def _ladder(variant: Variant, ladder: EffortLadder, duration: float, place: Place) -> Iterator[Defect]:
-    yield from check_engines_run(variant, (ladder.engine,), place.key("engine"))
-    where = place.key("values")
-    if not 2 <= len(ladder.values) <= MOST_EFFORTS:
-        text = f"an uncertainty needs at least two efforts, and {MOST_EFFORTS} are enough"
-        yield problem(where, text, "list them from coarse to fine")
-    if not all(coarse > fine for coarse, fine in pairwise(ladder.values)):
-        yield problem(where, "they do not fall", "list them from coarse to fine (falling)")
-    for i, value in enumerate(ladder.values):
-        if ladder.kind == "tolerance":
-            yield from check_within(value, TOLERANCES, where.key(i))
-        elif not 0.0 < value <= duration <= MOST_STEPS * value:
-            text = f"a step of {value:g} s makes no run of {duration:g} s"
-            yield problem(where.key(i), text, f"give a step for at most {MOST_STEPS:g} of them")

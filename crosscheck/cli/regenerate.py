@@ -1,0 +1,61 @@
+"""`crosscheck regenerate`: stored references are made again by their routes."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.common import Jobs, TimeLimit, app, check_limit, console, found, in_one_line
+from crosscheck.library.case import CaseError
+from crosscheck.running.pool import Limits
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.text import marked, words
+
+
+@app.command()
+def regenerate(
+    cases: Annotated[list[str], typer.Argument(help="Case names, a tag, `all`, or folders that hold a run.toml.")],
+    check: Annotated[bool, typer.Option("--check", help="Compare with what is stored, write nothing.")] = False,
+    jobs: Jobs = None,
+    time_limit: TimeLimit = None,
+) -> None:
+    """
+    Make the stored reference of cases again, by the routes of their table `[reference]`.
+
+    **Writes** `reference.csv` and `reference.toml` into each case's folder: times and channels with 17 digits, and of
+    each channel the uncertainty, with the routes that say so. Nothing is written where the stored files are reproduced
+    within what they state.
+
+    It is **refused** where a channel does not come by two independent routes that agree within their uncertainties,
+    where a published number of `provenance.toml` is not met, and where the numbers change by more than was stated
+    while `provenance.toml` is as it was: a reference is not moved to make a run green. `docs/references.md` has the
+    rules.
+
+    **Exit code**: 0 every reference is confirmed or written; 1 one was refused, or with `--check` would be written;
+    2 the request makes no sense.
+
+    **Examples**: `crosscheck regenerate wheel_gyrostat/torque_free` · `crosscheck regenerate all --check` ·
+    `crosscheck regenerate ./my_case`
+    """
+    from crosscheck.references.regenerate import regenerate as make_again  # it loads SciPy
+
+    check_limit(time_limit)
+    good = True
+    with in_one_line():
+        for case in found(tuple(cases)):
+            try:
+                with LiveProgress(console) as live:
+                    limits = Limits(jobs, time_limit)
+                    done = make_again(case, check=check, limits=limits, listener=live.hear)
+            except CaseError as error:
+                console.print(marked("✕", "red", str(error)), soft_wrap=True)
+                good = False
+                continue
+            kept = done.done != "would be written"
+            good = good and kept
+            what = f"{done.case}: {done.done}, {done.channels} channels to {done.horizon_s:g} s"
+            remark = f"; {done.remark}" if done.remark else ""
+            console.print(marked("✓" if kept else "!", "green" if kept else "yellow", what + remark), soft_wrap=True)
+    console.print(words("Every reference holds" if good else "Not every reference holds", "green" if good else "red"))
+    raise typer.Exit(int(not good))

@@ -1,0 +1,167 @@
+"""From routes to a reference: every channel by two independent routes that agree, its uncertainty, and the horizon.
+
+With E = max |a - b| of the route a that gives the values and another route b, and their numerical U,
+
+    E <= U_a + U_b   is required of all routes,      uncertainty = max(U_a, every E).
+
+E is no less than what the two routes together have got wrong unless they err alike, and U_a is what the first one knows
+of itself. The 17 digits of the file and the rounding of one operation, eps times the size of the channel's family, are
+the least that is stated.
+
+**Horizon.** In chaotic motion U grows until nothing is known. The reference ends at the last sample before the U of a
+position or an orientation exceeds `KNOWN` of the range that the channel's family has up to there: beyond, the routes
+still agree within their uncertainties, but say nothing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import chain
+
+import numpy as np
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.reference import Known
+from crosscheck.references.routes import RouteSignals
+from flexmb.run.channels import distance, family, magnitude, matches, signal_range, unit
+from flexmb.typing import Real
+
+EPS = float(np.finfo(np.float64).eps)
+KNOWN = 1e-3
+MOTION = (".position", ".orientation")
+ADVICE = "ask for finer efforts, or put right what is wrong with one of the two"
+
+
+@dataclass(frozen=True)
+class Agreed:
+    """What the routes agree on: channels (T, k) at `times` (T,) in SI and World axes, and what is known of each."""
+
+    times: Real
+    channels: dict[str, Real]
+    known: dict[str, Known]
+
+
+def agree(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> Agreed:
+    """The reference that the routes make of the channels that `patterns` name, all that two routes offer if none.
+
+    CaseError names each channel for which there are no two independent routes, or where two do not agree.
+    """
+    wanted = _wanted(routes, patterns)
+    until = _horizon(routes, wanted)
+    problems: list[str] = []
+    channels, known = {}, {}
+    for channel in wanted:
+        offering = [route for route in routes if channel in route.channels]
+        first = offering[0]
+        others = [other for other in offering[1:] if other.channels[channel].shape == first.channels[channel].shape]
+        if not any(first.independent_of(other) for other in others):
+            problems.append(_alone(channel, first, offering[1:]))
+            continue
+        apart = [_distance(channel, first, other, until) for other in others]
+        for other, (error, when) in zip(others, apart, strict=True):
+            doubt = _doubt(first, channel, until) + _doubt(other, channel, until)
+            if not error <= doubt:
+                problems.append(_disagreement(channel, first, other, error, doubt, when))
+        channels[channel] = first.channels[channel][:until]
+        largest = max(error for error, _ in apart)
+        floor = _floor(channel, first.channels, until)
+        known[channel] = Known(
+            uncertainty=_rounded_up(max(_doubt(first, channel, until), largest, floor)),
+            scale=float(f"{signal_range(channel, channels[channel]):.3g}"),
+            how=_in_words(channel, first, others, apart, until),
+        )
+    if problems:
+        raise CaseError("\n".join(problems))
+    return Agreed(routes[0].times[:until], channels, known)
+
+
+def _wanted(routes: Sequence[RouteSignals], patterns: Sequence[str]) -> list[str]:
+    """The channels of the reference, in the order of the routes; those that only one route offers if asked for."""
+    offered = list(dict.fromkeys(chain.from_iterable(route.channels for route in routes)))
+    if not patterns:
+        twice = [name for name in offered if sum(name in route.channels for route in routes) > 1]
+        if not twice:
+            raise CaseError("[reference] no channel is offered by two of its routes: add a route that offers the same")
+        return twice
+    for pattern in patterns:
+        if not any(matches(pattern, name) for name in offered):
+            raise CaseError(f'[reference] channels: no route offers "{pattern}"; they offer {", ".join(offered)}')
+    return [name for name in offered if any(matches(pattern, name) for pattern in patterns)]
+
+
+def _horizon(routes: Sequence[RouteSignals], wanted: Iterable[str]) -> int:
+    """The number of samples up to which the motion is known; CaseError where that is none of it."""
+    until = len(routes[0].times)
+    for channel in wanted:
+        if channel.endswith(MOTION):
+            first = next(route for route in routes if channel in route.channels)
+            reach = np.maximum.accumulate(_family_reach(channel, first.channels))
+            unsure = first.uncertainties[channel].envelope > KNOWN * np.maximum(reach, KNOWN * reach[-1])
+            until = min(until, int(np.argmax(unsure)) if np.any(unsure) else until)
+    if until < 2:
+        raise CaseError(
+            "[reference] the motion is unknown from the start: a position or an orientation has an uncertainty of "
+            f"more than {KNOWN:g} of its range: ask for finer efforts"
+        )
+    return until
+
+
+def _family_reach(channel: str, channels: Mapping[str, Real]) -> Real:
+    """How far the channels of the family have got from where they began, (T,)."""
+    kin = [name for name in channels if family(name) == family(channel)]
+    starts = {name: np.broadcast_to(channels[name][:1], channels[name].shape) for name in kin}
+    return np.max([distance(name, channels[name], starts[name]) for name in kin], axis=0)
+
+
+def _doubt(route: RouteSignals, channel: str, until: int) -> float:
+    return float(route.uncertainties[channel].envelope[until - 1])
+
+
+def _distance(channel: str, one: RouteSignals, other: RouteSignals, until: int) -> tuple[float, float]:
+    """The largest distance up to the horizon, and its time (s)."""
+    apart = distance(channel, one.channels[channel][:until], other.channels[channel][:until])
+    worst = int(np.argmax(apart))
+    return float(apart[worst]), float(one.times[worst])
+
+
+def _floor(channel: str, channels: Mapping[str, Real], until: int) -> float:
+    """What 17 digits and the rounding of one operation leave open; of a signal that is nothing, eps of its unit."""
+    sizes = [magnitude(name, rows[:until]) for name, rows in channels.items() if family(name) == family(channel)]
+    return EPS * (max(sizes) or 1.0)
+
+
+def _rounded_up(number: float) -> float:
+    """Two digits, not below the number."""
+    rounded = float(f"{number:.1e}")
+    return rounded if rounded >= number else float(f"{number * 1.05:.1e}")
+
+
+def _in_words(
+    channel: str,
+    first: RouteSignals,
+    others: Sequence[RouteSignals],
+    apart: Sequence[tuple[float, float]],
+    until: int,
+) -> str:
+    own = f"U {_doubt(first, channel, until):.1e} of {first.name}: {first.uncertainties[channel].how}"
+    against = (f"E {error:.1e} to {other.name}" for other, (error, _) in zip(others, apart, strict=True))
+    return "; ".join([own, *against])
+
+
+def _alone(channel: str, first: RouteSignals, others: Sequence[RouteSignals]) -> str:
+    if not others:
+        return f"[reference] {channel} is offered by {first.title} alone: add a route that offers it, or leave it out"
+    shared = ", ".join(other.title for other in others)
+    remedy = "take another code, or another engine of ours with another integrator"
+    return f"[reference] {channel}: no route is independent of {first.title} ({shared}): {remedy}"
+
+
+def _disagreement(
+    channel: str, first: RouteSignals, other: RouteSignals, error: float, doubt: float, when: float
+) -> str:
+    symbol = unit(channel)
+    return (
+        f"[reference] {channel}: {first.title} and {other.title} are {error:.3g} {symbol} apart at t = {when:.6g} s, "
+        f"and their uncertainties are {doubt:.3g} {symbol} together: {ADVICE}"
+    )

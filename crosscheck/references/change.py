@@ -1,0 +1,66 @@
+"""What may change in a stored reference: nothing by more than was stated, unless its provenance changes with it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from crosscheck.library.reference import KNOWLEDGE, StoredReference
+from crosscheck.references.agreement import Agreed
+from flexmb.run.channels import distance, unit
+
+CLOCK = 1e-9  # relative difference of times that are the same
+GROWTH = 10.0  # of a stated uncertainty: estimates are no better than a factor of a few
+
+
+def beyond_uncertainty(before: StoredReference, now: Agreed) -> list[str]:
+    """How the reference `now` takes back what `before` had stated; none where it confirms it.
+
+    A channel that is gone, an earlier horizon, values farther apart than was stated and an uncertainty that has grown
+    by more than `GROWTH` all take something back. More channels, samples and digits do not.
+    """
+    return list(_changes(before, now))
+
+
+def largest_share(before: StoredReference, now: Agreed) -> float:
+    """The largest change of a channel that both have, relative to the uncertainty that was stated."""
+    ours, theirs = _shared(before, now)
+    shares = (
+        float(np.max(distance(channel, now.channels[channel][ours], before.channels[channel][theirs]), initial=0.0))
+        / before.knowledge.channels[channel].uncertainty
+        for channel in now.channels
+        if channel in before.channels
+    )
+    return max(shares, default=0.0)
+
+
+def _changes(before: StoredReference, now: Agreed) -> Iterator[str]:
+    if now.times[-1] < before.times[-1] * (1.0 - CLOCK):
+        yield f"the horizon is {now.times[-1]:g} s, it was {before.times[-1]:g} s"
+    ours, theirs = _shared(before, now)
+    if not len(ours):
+        yield "none of its times is one of before"
+        return
+    for channel, rows in before.channels.items():
+        stated, symbol = before.knowledge.channels[channel].uncertainty, unit(channel)
+        if channel not in now.channels or now.channels[channel].shape[1] != rows.shape[1]:
+            yield f"{channel} is not there any more"
+            continue
+        apart = distance(channel, now.channels[channel][ours], rows[theirs])
+        worst = int(np.argmax(apart))
+        if not apart[worst] <= stated:
+            when = before.times[theirs][worst]
+            yield f"{channel} differs by {apart[worst]:.3g} {symbol} at t = {when:.6g} s, stated was {stated:.2g}"
+        grown = now.known[channel].uncertainty
+        if not grown <= GROWTH * stated:
+            yield f"{channel} is known to {grown:.2g} {symbol}, stated in {KNOWLEDGE} was {stated:.2g}"
+
+
+def _shared(before: StoredReference, now: Agreed) -> tuple[np.ndarray, np.ndarray]:
+    """The places of the times that both have, in the one and in the other."""
+    places = np.clip(np.searchsorted(before.times, now.times), 1, len(before.times) - 1)
+    left = np.abs(now.times - before.times[places - 1]) < np.abs(before.times[places] - now.times)
+    nearest = places - left
+    same = np.abs(before.times[nearest] - now.times) <= CLOCK * before.times[-1]
+    return np.flatnonzero(same), nearest[same]

@@ -1,0 +1,134 @@
+"""`crosscheck regenerate`: the reference of a case, made again by its routes, and written if it may be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import Case
+from crosscheck.library.recipe import ReferenceRecipe
+from crosscheck.library.reference import (
+    VALUES,
+    Knowledge,
+    StoredReference,
+    digest,
+    has_reference,
+    load_reference,
+    scene_digest,
+    values_text,
+)
+from crosscheck.references.agreement import Agreed, agree
+from crosscheck.references.anchors import meet
+from crosscheck.references.change import beyond_uncertainty, largest_share
+from crosscheck.references.files import knowledge_text, write_both
+from crosscheck.references.routes import RouteSignals, run_routes
+from crosscheck.running.plan import sample_times
+from crosscheck.running.pool import BY_DEFAULT, Limits
+from crosscheck.running.sweep import PROVIDER, Listener
+from flexmb.scene.reading import read_text
+from flexmb.typing import Real
+
+Done = Literal["confirmed", "written", "would be written"]
+
+
+@dataclass(frozen=True)
+class Regenerated:
+    """What became of a case's reference, in how many channels, until when it holds (s), and what there is to say.
+
+    "confirmed": the stored files say the same within what they state, and are left as they are.
+    """
+
+    case: str
+    done: Done
+    channels: int
+    horizon_s: float
+    remark: str = ""
+
+
+def regenerate(
+    case: Case,
+    *,
+    check: bool = False,
+    provider: str = PROVIDER,
+    limits: Limits = BY_DEFAULT,
+    listener: Listener = lambda jobs, event: None,
+) -> Regenerated:
+    """Make the reference of a case by its recipe, and write it; with `check` nothing is written.
+
+    CaseError says why there is none: no recipe, a route without result, channels by fewer than two independent routes
+    or by routes that do not agree, a published number that is not met, or a change beyond the stated uncertainty while
+    provenance.toml is as it was.
+    """
+    recipe = case.run.reference
+    if recipe is None:
+        raise CaseError(f"{case.folder / 'run.toml'}: it has no table [reference]: add one with two routes at least")
+    try:
+        before = load_reference(case.folder) if has_reference(case.folder) else None
+        routes = run_routes(case, recipe, _times(case, recipe), provider, limits, listener)
+        agreed = agree(routes, recipe.channels)
+        meet(agreed, case.provenance.anchors if case.provenance is not None else ())
+    except CaseError as error:
+        raise CaseError(f"{case.name}: {error}") from None
+    values = values_text(agreed.times, agreed.channels)
+    knowledge = _knowledge(case, recipe, routes, agreed, values)
+    remark = "" if before is None else _permitted(case, before, agreed, knowledge)
+    if before is not None and not remark and _describes_the_same(before, agreed, knowledge):
+        share = f"reproduced, farthest off by {largest_share(before, agreed):.2g} of the stated uncertainty"
+        return Regenerated(case.name, "confirmed", len(agreed.channels), knowledge.horizon_s, share)
+    if not check:
+        write_both(case.folder, values, knowledge_text(knowledge))
+    done: Done = "would be written" if check else "written"
+    return Regenerated(case.name, done, len(agreed.channels), knowledge.horizon_s, remark)
+
+
+def _times(case: Case, recipe: ReferenceRecipe) -> Real:
+    """The times (s) of the reference: every so many of the variant's, up to the horizon."""
+    times = sample_times(case.run, case.run.variant(recipe.variant))
+    kept = times[:: (len(times) - 1) // ((recipe.samples or len(times)) - 1)]
+    return kept if recipe.horizon_s is None else kept[kept <= recipe.horizon_s * (1.0 + 1e-9)]
+
+
+def _knowledge(
+    case: Case, recipe: ReferenceRecipe, routes: list[RouteSignals], agreed: Agreed, values: str
+) -> Knowledge:
+    return Knowledge(
+        variant=recipe.variant,
+        horizon_s=float(agreed.times[-1]),
+        values=digest(values),
+        provenance=_provenance(case),
+        scene=scene_digest(case, case.run.variant(recipe.variant)),
+        routes=tuple(route.title for route in routes),
+        made_with=tuple(dict.fromkeys(route.made_with for route in routes if route.made_with)),
+        channels=agreed.known,
+    )
+
+
+def _provenance(case: Case) -> str:
+    file = case.folder / "provenance.toml"
+    return digest(read_text(file) if file.exists() else "")
+
+
+def _permitted(case: Case, before: StoredReference, agreed: Agreed, knowledge: Knowledge) -> str:
+    """What changes beyond the stated uncertainty, as the provenance changes with it; CaseError where it does not."""
+    changes = beyond_uncertainty(before, agreed)
+    if changes and before.knowledge.provenance == knowledge.provenance:
+        listed = "\n".join(f"  {change}" for change in changes)
+        raise CaseError(
+            f"{case.name}: {VALUES} is not replaced, as more would change than was stated:\n{listed}\n"
+            "  A reference is not moved to make a run green. If the case is meant to be another, say so in "
+            f"{case.folder / 'provenance.toml'}: with that changed too, the reference is replaced."
+        )
+    return f"{len(changes)} changes beyond what was stated, with provenance.toml: {changes[0]}" if changes else ""
+
+
+def _describes_the_same(before: StoredReference, agreed: Agreed, knowledge: Knowledge) -> bool:
+    """Whether variant, scene, routes, times and channels are what they were; digits may have moved within U."""
+    return (
+        all(getattr(before.knowledge, key) == getattr(knowledge, key) for key in ("variant", "scene", "routes"))
+        and before.times.shape == agreed.times.shape
+        and bool(np.allclose(before.times, agreed.times, rtol=1e-9))
+        and list(before.channels) == list(agreed.channels)
+    )

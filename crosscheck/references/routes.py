@@ -1,0 +1,187 @@
+"""The routes to a reference: engines that run the variant at their efforts, and closed forms of the case's folder.
+
+Engines go the usual way, through `sweep` and its workers. A closed form is Python of the case's folder: it is loaded
+here and nowhere else.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import msgspec
+import numpy as np
+
+from crosscheck.judging.results import Result, collect
+from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
+from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.find import Case
+from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
+from crosscheck.records.archive import read
+from crosscheck.records.kinds import RunRecord
+from crosscheck.running.plan import MAIN
+from crosscheck.running.pool import Limits
+from crosscheck.running.sweep import Listener, sweep
+from flexmb.run.channels import family, magnitude
+from flexmb.typing import Real
+
+
+@dataclass(frozen=True)
+class RouteSignals:
+    """What one route gave at the reference's times: channels (T, k) with their U, in SI and World axes.
+
+    `name` is short, `title` says in words what the route is. `engine` is "" for a closed form, `method` its integrator.
+    `made_with` is the engine's version.
+    """
+
+    name: str
+    title: str
+    engine: str
+    method: str
+    made_with: str
+    times: Real
+    channels: Mapping[str, Real]
+    uncertainties: Mapping[str, Uncertainty]
+
+    def independent_of(self, other: RouteSignals) -> bool:
+        """Whether the two are of different codes, or of one code by two engines with two integrators.
+
+        Engines of one code have names that begin alike, such as `native` and `native-frisch`.
+        """
+        if self.engine.partition("-")[0] == other.engine.partition("-")[0]:
+            return self.engine != other.engine and self.method != other.method
+        return True
+
+
+def run_routes(
+    case: Case, recipe: ReferenceRecipe, times: Real, provider: str, limits: Limits, listener: Listener
+) -> list[RouteSignals]:
+    """The signals of every route of the recipe at `times` (T,); CaseError where a route gives none.
+
+    Closed forms come first: they take no time, and a fault in them needs no engine to be seen.
+    """
+    found = {
+        place: _closed_form(case.folder / route.exact, route, times)
+        for place, route in enumerate(recipe.routes)
+        if route.exact
+    }
+    results = _engine_results(case, recipe, times, provider, limits, listener)
+    for place, route in enumerate(recipe.routes):
+        if route.engine:
+            found[place] = _of_engine(case, results[_name(place)])
+    return [found[place] for place in sorted(found)]
+
+
+def _name(place: int) -> str:
+    """What the variant of a route is called where it is run."""
+    return f"route {place + 1}"
+
+
+def _engine_results(
+    case: Case, recipe: ReferenceRecipe, times: Real, provider: str, limits: Limits, listener: Listener
+) -> dict[str, Result]:
+    """The results of all routes that are engines, by name, each run as a variant of its own."""
+    variants = tuple(
+        _as_variant(case.run.variant(route.variant or recipe.variant), _name(place), route, times)
+        for place, route in enumerate(recipe.routes)
+        if route.engine
+    )
+    if not variants:
+        return {}
+    run = RunFile(
+        title=case.run.title,
+        duration_s=case.run.duration_s,
+        samples=case.run.samples,
+        time_limit_s=case.run.time_limit_s,
+        variants=variants,
+    )
+    with TemporaryDirectory() as folder:
+        records = Path(folder) / "records.jsonl"
+        sweep((replace(case, run=run),), (), records, provider=provider, limits=limits, listener=listener)
+        (results,) = collect(read(records)).cases
+    return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}
+
+
+def _as_variant(variant: Variant, name: str, route: ReferenceRoute, times: Real) -> Variant:
+    efforts = tuple(each for each in route.efforts or variant.efforts if each.engine == route.engine)
+    return msgspec.structs.replace(
+        variant,
+        name=name,
+        engines=(route.engine,),
+        also=(),
+        efforts=efforts,
+        refined=None,
+        duration_s=float(times[-1]),
+        samples=len(times),
+    )
+
+
+def _of_engine(case: Case, result: Result) -> RouteSignals:
+    if result.status != "finished":
+        what = f"{result.variant}, {result.engine}, {result.status}: {result.message}"
+        raise CaseError(f"{case.folder / 'run.toml'}: [reference] {what}: correct the route, or take another")
+    efforts = [run.effort for run in result.runs if run.effort_method == result.finest.effort_method]
+    return RouteSignals(
+        name=result.engine,
+        title=f"{result.engine}, {', '.join(efforts)}",
+        engine=result.engine,
+        method=result.finest.effort_method,
+        made_with=_version(result.finest),
+        times=result.times,
+        channels={name: result.values(name) for name in result.channels},
+        uncertainties={name: result.uncertainty(name) for name in result.channels},
+    )
+
+
+def _version(run: RunRecord) -> str:
+    return f"{run.engine} {run.version}".strip()
+
+
+def _closed_form(file: Path, route: ReferenceRoute, times: Real) -> RouteSignals:
+    """Channels of a closed form, with U relative to the largest size in each channel's family."""
+    exact = _function(file)
+    try:
+        given = exact(times.copy())
+        channels = {name: np.array(values, float).reshape(len(times), -1) for name, values in given.items()}
+    except Exception as error:  # the file is anybody's
+        raise CaseError(f"{file}: exact(times) failed: {type(error).__name__}: {error}") from None
+    for name, values in channels.items():
+        if not np.all(np.isfinite(values)):
+            raise CaseError(f"{file}: exact(times) gives {name} values that are not finite")
+    sizes: dict[str, float] = {}
+    for name, values in channels.items():
+        sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
+    how = f"closed form, evaluated to {route.relative_uncertainty:g} of its size"
+    doubts = {name: route.relative_uncertainty * sizes[family(name)] for name in channels}
+    floors = {name: roundoff_floor(sizes[family(name)], 1) for name in channels}
+    return RouteSignals(
+        name=file.name,
+        title=f"{file.name}, a closed form",
+        engine="",
+        method="",
+        made_with="",
+        times=times,
+        channels=channels,
+        uncertainties={
+            name: Uncertainty(np.full(len(times), doubts[name] + floors[name]), doubts[name] + floors[name], how)
+            for name in channels
+        },
+    )
+
+
+def _function(file: Path) -> Callable[[Real], Mapping[str, Real]]:
+    spec = spec_from_file_location(f"closed form of {file.parent.name}", file)
+    if spec is None or spec.loader is None or not file.is_file():
+        raise CaseError(f"{file}: there is no such Python file, and a route of [reference] names it")
+    module = module_from_spec(spec)
+    try:
+        spec.loader.exec_module(module)
+    except Exception as error:  # the file is anybody's
+        raise CaseError(f"{file}: it cannot be loaded: {type(error).__name__}: {error}") from None
+    found: Callable[[Real], Mapping[str, Real]] | None = getattr(module, "exact", None)
+    if found is None:
+        raise CaseError(f"{file}: it has no function exact(times): add one that returns channels by name")
+    return found
