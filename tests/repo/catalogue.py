@@ -1,5 +1,4 @@
-"""docs/cases.md: every shipped case with what it shows, who runs it, what anchors it and how well its numbers are known.
-Write it with
+"""docs/cases.md: every shipped case, who runs it, what anchors it, and how well its numbers are known. Write it with
 
     python -m tests.repo.catalogue
 """

@@ -29,6 +29,10 @@ def snippets(page: Path) -> list[Snippet]:
     """All blocks of a page, in their order."""
     text = page.read_text(encoding="utf-8")
     return [
-        Snippet(page, text.count("\n", 0, found.start("code")) + 1, *found.group("language", "code"), found["why"] or "")
+        Snippet(page, _line(text, found.start("code")), found["language"], found["code"], found["why"] or "")
         for found in BLOCK.finditer(text)
     ]
+
+
+def _line(text: str, place: int) -> int:
+    return text.count("\n", 0, place) + 1
