@@ -57,7 +57,7 @@ def simulate(
 ) -> Trajectory:
     """Simulate a scene from its initial state at t = 0 to `t_end` (s).
 
-    method: "dop853" adapts its step so that the error of each step stays below rtol |y_i| + atol (1e-10 and 1e-12 if
+    method: "dop853" adapts its step so that the error of each step stays below `rtol |y_i| + atol` (1e-10 and 1e-12 if
     left out), in the root mean square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not
     longer than `step` (s). Three methods are for scenes with modes or springs that are much faster than the motion of
     interest. "radau5" lets them die out where the step is longer than their period; "exponential" follows them exactly

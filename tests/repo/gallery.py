@@ -31,6 +31,7 @@ failed or did not finish have colours of their own. The black line is a boundary
 every cell is of the class that the line predicts, there or within one of the finest cells. This draws all maps and
 writes their verdicts:
 
+<!-- not run: it takes half an hour -->
 ```sh
 crosscheck stability all --pictures docs/pictures
 ```

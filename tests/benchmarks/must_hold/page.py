@@ -16,6 +16,7 @@ INTRODUCTION = """# Performance
 
 What must hold, and what was measured. This page is generated from `tests/benchmarks/must_hold/results.json`:
 
+<!-- not run: it measures, for half an hour -->
 ```sh
 python -m tests.benchmarks                 # measure every row and print the table; it takes half an hour
 python -m tests.benchmarks -k kernel       # only rows with this word in their names

@@ -1,0 +1,83 @@
+"""docs/cases.md: every shipped case, who runs it, what anchors it, and how well its numbers are known. Write it with
+
+    python -m tests.repo.catalogue
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from crosscheck.library.find import Case, shipped_cases
+from crosscheck.library.reference import has_reference, load_reference
+from tests.repo.project import ROOT
+
+PAGE = ROOT / "docs" / "cases.md"
+FAMILIES = {
+    "closed_form": "Closed form: a formula gives the motion or a part of it.",
+    "published": "Published: numbers of a paper or a benchmark.",
+    "converged": "Converged: two algorithms and two integrators of this library agree at high accuracy.",
+    "agreed": "Agreed: independent codes agree.",
+}
+INTRODUCTION = """# Cases
+
+Every case with what anchors it. This page is generated from the folders in `cases`: `python -m tests.repo.catalogue`.
+`crosscheck run NAME` runs a case, `crosscheck verify NAME my.csv` holds your own code's results against it.
+
+The last column of the tables is the least and the largest uncertainty of the stored numbers, relative to each channel's
+range.
+"""
+
+
+def page() -> str:
+    """The text of docs/cases.md."""
+    cases = shipped_cases()
+    parts = [INTRODUCTION]
+    for family, meaning in FAMILIES.items():
+        members = [case for case in cases if case.provenance is not None and case.provenance.family == family]
+        rows = [_row(case) for case in members]
+        head = ["| case | what | engines | known to |", "|---|---|---|---|"]
+        name, _, text = meaning.partition(": ")
+        parts += [f"## {name}\n\n{text[0].upper()}{text[1:]}\n", "\n".join([*head, *rows]) + "\n"]
+    parts += ["## What each case shows\n", *(section for case in cases for section in _section(case))]
+    return "\n".join(parts)
+
+
+def _row(case: Case) -> str:
+    engines = dict.fromkeys(engine for variant in case.run.variants for engine in variant.engines)
+    return f"| [{case.name}](#{_anchor(case.name)}) | {case.run.title} | {', '.join(engines)} | {_known(case)} |"
+
+
+def _known(case: Case) -> str:
+    """Least and largest relative uncertainty of the stored channels."""
+    if not has_reference(case.folder):
+        return "–"
+    channels = load_reference(case.folder).knowledge.channels.values()
+    known = [each.uncertainty / each.scale for each in channels if each.scale > 0.0]
+    return f"{min(known):.0e} to {max(known):.0e}" if known else "–"
+
+
+def _anchor(name: str) -> str:
+    """The anchor of a heading as pages make it."""
+    return re.sub(r"[^\w-]", "", name.lower().replace(" ", "-"))
+
+
+def _section(case: Case) -> Iterator[str]:
+    """The case's own page, its headings two levels down, its picture from the case's folder."""
+    assert case.provenance is not None
+    text = re.sub(r"\A# .*\n", "", case.readme)
+    text = re.sub(r"^(#+) ", r"##\1 ", text, flags=re.M)
+    text = re.sub(r"\]\((?!https?:|#)([^)]+)\)", rf"](../cases/{case.name}/\1)", text)
+    yield f"### {case.name}\n"
+    yield f"**{case.run.title}.** Tags: {', '.join(case.run.tags) or 'none'}. Known: {case.provenance.uncertainty}.\n"
+    yield f"{text.strip()}\n"
+    yield f"Sources: {'; '.join(case.provenance.sources)}\n"
+
+
+def main() -> None:
+    """Write the page."""
+    PAGE.write_text(page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
