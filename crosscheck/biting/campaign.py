@@ -16,7 +16,7 @@ import numpy as np
 from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
 from crosscheck.biting.mutants import Litter, PassedOver, litter
 from crosscheck.biting.score import CaseBite, Mutant, ShownIn, bite, outcome
-from crosscheck.biting.subject import Subject, subject
+from crosscheck.biting.subject import JudgedVariant, subject
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import roundoff_floor
@@ -84,7 +84,7 @@ def _plan(case: Case, provider: str, limits: Limits) -> tuple[CaseRecord, list[J
     ]
 
 
-def scored(what: Subject, mutants: Litter, results: CaseResults) -> CaseBite:
+def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBite:
     """The scores of one case from the results of its mutants."""
     verdicts: dict[str, list[Verdict]] = {name: [] for name in mutants.mutants}
     for verdict in judge(results):
@@ -119,7 +119,7 @@ def _mutant(mutation: str, target: str, verdicts: Sequence[Verdict], patient: bo
     )
 
 
-def _answers(what: Subject, true: Result) -> tuple[list[Mutant], list[PassedOver]]:
+def _answers(what: JudgedVariant, true: Result) -> tuple[list[Mutant], list[PassedOver]]:
     """Faults planted in the true run; passed over are those that change nothing, or nothing that the case judges."""
     found: list[Mutant] = []
     passed: list[PassedOver] = []
@@ -157,7 +157,7 @@ def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int)
     return bool(np.max(distance(name, values, right[name])) > floor)
 
 
-def _falsified(what: Subject, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
+def _falsified(what: JudgedVariant, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
     """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))

@@ -14,7 +14,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.biting.invariances import INVARIANCES, Counterpart, NotApplicable
-from crosscheck.biting.subject import Subject, reduced, subject
+from crosscheck.biting.subject import JudgedVariant, reduced, subject
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
@@ -72,7 +72,7 @@ class InvarianceFile(msgspec.Struct, frozen=True, kw_only=True):
 class _Set:
     """The counterparts of a subject by the name of the invariance, and why there is none of the others."""
 
-    what: Subject
+    what: JudgedVariant
     counterparts: dict[str, Counterpart]
     without: dict[str, str]
     record: CaseRecord
@@ -103,7 +103,7 @@ def run_invariances(
     return verdicts
 
 
-def _planned(what: Subject, provider: str, limits: Limits) -> _Set:
+def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
     record, (true,) = plan(reduced(what), (), provider, limits.time_s)
     counterparts: dict[str, Counterpart] = {}
     without: dict[str, str] = {}
@@ -175,7 +175,7 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
     return found
 
 
-def _findings(what: Subject, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
+def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Counterpart) -> dict[str, Finding]:
     """A finding for every channel of the true run that the counterpart has, told back; the case need not judge it."""
     told = _told(other, counterpart)
     found: dict[str, Finding] = {}

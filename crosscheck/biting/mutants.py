@@ -8,7 +8,7 @@ from typing import Any
 
 import msgspec
 
-from crosscheck.biting.subject import Subject, reduced
+from crosscheck.biting.subject import JudgedVariant, reduced
 from crosscheck.library.case import ComparisonSide, Control, MutationKind
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
@@ -36,7 +36,7 @@ class Litter:
     passed_over: tuple[PassedOver, ...]
 
 
-def litter(what: Subject, all_targets: bool = False) -> Litter:
+def litter(what: JudgedVariant, all_targets: bool = False) -> Litter:
     """Every applicable mutation at one target of each kind, or at all targets.
 
     Passed over is what physics says changes nothing, what the variant's transformation does not model, and what makes
@@ -63,7 +63,7 @@ def litter(what: Subject, all_targets: bool = False) -> Litter:
     return Litter(replace(small, run=run), mutants, tuple(passed))
 
 
-def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what: Subject) -> str:
+def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what: JudgedVariant) -> str:
     """Why the mutated scene is none that could be run and told from the true one; "" if it is."""
     variant = msgspec.structs.replace(what.variant, level=None)
     try:
@@ -98,7 +98,7 @@ def _near(one: Any, other: Any, size: float) -> bool:
     return bool(one == other)
 
 
-def _control(what: Subject, kind: MutationKind, target: str) -> Control:
+def _control(what: JudgedVariant, kind: MutationKind, target: str) -> Control:
     side = ComparisonSide(variant=what.variant.name, engine=what.engine)
     name = f"{kind} of {target}" if target else kind
     return Control(name=name, mutation=kind, target=target, a=side, b=side, goals=what.goals, scales=what.scales)

@@ -11,7 +11,7 @@ from crosscheck.library.find import Case
 
 
 @dataclass(frozen=True)
-class Subject:
+class JudgedVariant:
     """A case reduced to one variant and one engine.
 
     `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others, where it has
@@ -25,7 +25,7 @@ class Subject:
     scales: dict[str, float]
 
 
-def subject(case: Case, engine: str) -> Subject:
+def subject(case: Case, engine: str) -> JudgedVariant:
     """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
@@ -41,11 +41,11 @@ def subject(case: Case, engine: str) -> Subject:
         if goals and (engine not in named or engine in (*variant.engines, *variant.also)):
             alone = msgspec.structs.replace(variant, engines=(engine,), also=(), refined=None)
             efforts = tuple(ladder for ladder in variant.efforts if ladder.engine == engine)
-            return Subject(case, msgspec.structs.replace(alone, efforts=efforts), engine, goals, scales)
+            return JudgedVariant(case, msgspec.structs.replace(alone, efforts=efforts), engine, goals, scales)
     raise CaseError(f"{case.name}: no comparison judges a variant that engine {engine} runs: it cannot notice anything")
 
 
-def reduced(what: Subject) -> Case:
+def reduced(what: JudgedVariant) -> Case:
     """The case with nothing but the subject's run: no comparison, no control, no chart."""
     run = msgspec.structs.replace(
         what.case.run,

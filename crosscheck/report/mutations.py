@@ -9,7 +9,7 @@ import msgspec
 FILE = "mutation.json"
 
 
-class Mutation(msgspec.Struct, frozen=True, kw_only=True):
+class ScoredMutation(msgspec.Struct, frozen=True, kw_only=True):
     """A physical fault that was planted in a case: whether it was noticed, and by which channels."""
 
     mutation: str
@@ -28,7 +28,7 @@ class CaseScore(msgspec.Struct, frozen=True, kw_only=True):
     """The part of the applicable mutations that a case noticed (None where none applies), and each of them."""
 
     score: float | None
-    mutations: tuple[Mutation, ...] = ()
+    mutations: tuple[ScoredMutation, ...] = ()
 
 
 class Scores(msgspec.Struct, frozen=True, kw_only=True):

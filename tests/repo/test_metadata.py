@@ -39,6 +39,8 @@ SIGNS = {
     "pin": "import pinocchio", "dask": "distributed import", "pytest-benchmark": "benchmark(", "pytest-xdist": "--dist",
     "import-linter": "importlinter.cli import", "ruff": '"ruff", "check"', "mypy": '"-m", "mypy"',
     "hatchling": '"hatchling", "build"', "pyyaml": "import yaml", "mutmut": "mutmut run",
+    "rerun-sdk": "import rerun", "selenium": "importorskip(\"selenium", "sphinx": "\"-m\", \"sphinx\"",
+    "furo": "html_theme = \"furo\"", "myst-parser": "\"myst_parser\"",
 }  # fmt: skip
 EXTRAS = PYPROJECT["project"]["optional-dependencies"]
 
@@ -48,7 +50,7 @@ def used(distribution: str) -> bool:
     name = distribution.replace("-", "_")
     signs = [SIGNS[distribution]] if distribution in SIGNS else [f"import {name}", f"from {name}"]
     files = [file for folder in ("flexmb", "crosscheck", "tests") for file in (ROOT / folder).rglob("*.py")]
-    files += [ROOT / "CONTRIBUTING.md", ROOT / "docs" / "mutation-testing.md"]
+    files += [ROOT / "CONTRIBUTING.md", ROOT / "docs" / "conf.py", ROOT / "docs" / "mutation-testing.md"]
     own = ROOT / "tests" / "repo" / "test_metadata.py"
     texts = (file.read_text(encoding="utf-8") for file in files if file != own)
     return any(sign in text for text in texts for sign in signs)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from crosscheck.library.case import CaseError, MutationKind
 from crosscheck.library.mutations import frames, gravity, hinges, inertia, loads, modes, time_courses, wheels
-from crosscheck.library.mutations.mutation import Mutation, Target
+from crosscheck.library.mutations.mutation import Mutation, MutationTarget
 from flexmb.scene.schema import Scene
 
 CATALOGUE: dict[MutationKind, Mutation] = {
@@ -26,7 +26,7 @@ def mutate(scene: Scene, mutation: MutationKind, target: str) -> Scene:
     return changed
 
 
-def applicable(scene: Scene, mutation: Mutation) -> list[Target]:
+def applicable(scene: Scene, mutation: Mutation) -> list[MutationTarget]:
     """The targets of a scene that the mutation can change, those among them that physics says nothing would show."""
     found = []
     for target in mutation.targets(scene):
@@ -38,4 +38,4 @@ def applicable(scene: Scene, mutation: Mutation) -> list[Target]:
     return found
 
 
-__all__ = ["CATALOGUE", "Mutation", "Target", "applicable", "mutate"]
+__all__ = ["CATALOGUE", "Mutation", "MutationTarget", "applicable", "mutate"]

@@ -8,7 +8,7 @@ from typing import TypeVar
 import msgspec
 
 from crosscheck.library.case import CaseError
-from crosscheck.library.mutations.mutation import FACTOR, Target
+from crosscheck.library.mutations.mutation import FACTOR, MutationTarget
 from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
 from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
@@ -91,38 +91,38 @@ def place_key(coordinate: Coordinate) -> str:
     return "angle_rad" if isinstance(coordinate, AngularCoordinate) else "position_m"
 
 
-def whole(scene: Scene) -> Iterator[Target]:
-    yield Target("", "scene")
+def whole(scene: Scene) -> Iterator[MutationTarget]:
+    yield MutationTarget("", "scene")
 
 
-def bodies(scene: Scene) -> Iterator[Target]:
-    yield from (Target(body.name, _tag(body)) for body in scene.bodies)
+def bodies(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(body.name, _tag(body)) for body in scene.bodies)
 
 
-def hinges(scene: Scene) -> Iterator[Target]:
-    yield from (Target(hinge.name, _tag(hinge)) for hinge in scene.hinges)
+def hinges(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(hinge.name, _tag(hinge)) for hinge in scene.hinges)
 
 
-def wheels(scene: Scene) -> Iterator[Target]:
-    yield from (Target(wheel.name, "wheel") for wheel in scene.wheels)
+def wheels(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(wheel.name, "wheel") for wheel in scene.wheels)
 
 
-def loads(scene: Scene) -> Iterator[Target]:
-    yield from (Target(load.name, f"{load.type} in {load.frame} axes") for load in scene.loads)
+def loads(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(load.name, f"{load.type} in {load.frame} axes") for load in scene.loads)
 
 
-def closures(scene: Scene) -> Iterator[Target]:
-    yield from (Target(closure.name, f"{closure.type} closure") for closure in scene.closures)
+def closures(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(closure.name, f"{closure.type} closure") for closure in scene.closures)
 
 
-def point_masses(scene: Scene) -> Iterator[Target]:
-    yield from (Target(mass.name, "point mass") for mass in scene.point_masses)
+def point_masses(scene: Scene) -> Iterator[MutationTarget]:
+    yield from (MutationTarget(mass.name, "point mass") for mass in scene.point_masses)
 
 
-def nodes(scene: Scene) -> Iterator[Target]:
+def nodes(scene: Scene) -> Iterator[MutationTarget]:
     for body in scene.bodies:
         if not isinstance(body, SidBody):
-            yield from (Target(f"{body.name}.{node.name}", f"node of {_tag(body)}") for node in body.nodes)
+            yield from (MutationTarget(f"{body.name}.{node.name}", f"node of {_tag(body)}") for node in body.nodes)
 
 
 def scaled(values: tuple, factor: float = FACTOR) -> tuple:

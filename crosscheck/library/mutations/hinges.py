@@ -22,7 +22,7 @@ from crosscheck.library.mutations.edits import (
     scaled,
     with_coordinates,
 )
-from crosscheck.library.mutations.mutation import FACTOR, Mutation, Target
+from crosscheck.library.mutations.mutation import FACTOR, Mutation, MutationTarget
 from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.hinges import AngularCoordinate, Free, Gimbal, Hinge, Spherical
 from flexmb.scene.quaternions import rotation_matrix
@@ -201,12 +201,12 @@ def _attitude(scene: Scene, target: str) -> Scene:
     return on_hinge(scene, target, transposed)
 
 
-def _sprung(scene: Scene) -> list[Target]:
+def _sprung(scene: Scene) -> list[MutationTarget]:
     return [*bodies(scene), *hinges(scene)]
 
 
-def _damped(scene: Scene) -> list[Target]:
-    return [*bodies(scene), *hinges(scene), *(Target(wheel.name, "wheel") for wheel in scene.wheels)]
+def _damped(scene: Scene) -> list[MutationTarget]:
+    return [*bodies(scene), *hinges(scene), *(MutationTarget(wheel.name, "wheel") for wheel in scene.wheels)]
 
 
 MUTATIONS = (

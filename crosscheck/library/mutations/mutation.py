@@ -12,7 +12,7 @@ from flexmb.scene.schema import Scene
 FACTOR = 1.01
 
 
-class Target(NamedTuple):
+class MutationTarget(NamedTuple):
     """Something of a scene that a mutation may change: its name, "" for the scene, and what kind of thing it is.
 
     Two targets of one kind are changed by the same lines of a code: a campaign tries one of each kind.
@@ -38,6 +38,6 @@ class Mutation:
     name: MutationKind
     what: str
     slip: str
-    targets: Callable[[Scene], Iterable[Target]]
+    targets: Callable[[Scene], Iterable[MutationTarget]]
     change: Callable[[Scene, str], Scene]
     idle: Callable[[Scene, str], str] = _never

@@ -16,7 +16,7 @@ from crosscheck.library.mutations.edits import (
     on_wheel,
     with_coordinates,
 )
-from crosscheck.library.mutations.mutation import FACTOR, Mutation, Target
+from crosscheck.library.mutations.mutation import FACTOR, Mutation, MutationTarget
 from crosscheck.library.time_functions import delayed, scaled
 from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene, Wheel
@@ -27,27 +27,27 @@ HUNDREDTH = 0.01
 PHASE_RAD = 0.01
 
 
-def _motors(scene: Scene) -> Iterator[Target]:
+def _motors(scene: Scene) -> Iterator[MutationTarget]:
     """Hinges and wheels with a motor."""
     for hinge in scene.hinges:
         if any(getattr(each, motor_key(each)) is not None for _, each in coordinates(hinge)):
-            yield Target(hinge.name, "motor of a hinge")
-    yield from (Target(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
+            yield MutationTarget(hinge.name, "motor of a hinge")
+    yield from (MutationTarget(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
 
 
-def _driven(scene: Scene) -> Iterator[Target]:
+def _driven(scene: Scene) -> Iterator[MutationTarget]:
     """Everything with a function of time; one kind for each kind of function."""
     for hinge in scene.hinges:
         for _, each in coordinates(hinge):
             for what, key in (("motor", motor_key(each)), ("drive", key_of(each, "prescribed"))):
                 function = getattr(each, key)
                 if function is not None:
-                    yield Target(hinge.name, f"{what}, {_kind(function)}")
+                    yield MutationTarget(hinge.name, f"{what}, {_kind(function)}")
     for wheel in scene.wheels:
         for function in (wheel.torque_Nm, wheel.prescribed_rad):
             if function is not None:
-                yield Target(wheel.name, f"wheel, {_kind(function)}")
-    yield from (Target(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
+                yield MutationTarget(wheel.name, f"wheel, {_kind(function)}")
+    yield from (MutationTarget(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
 
 
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:

@@ -7,7 +7,7 @@ from pathlib import Path
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.find import load_case
 from crosscheck.report import write_all
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.sessions import PROVIDER, copy_case
 

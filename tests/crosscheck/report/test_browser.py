@@ -19,7 +19,7 @@ import pytest
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.library.find import resolve
 from crosscheck.report import write_all
-from crosscheck.running.pool import Limits
+from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 from tests.crosscheck.report.sessions import MANY, session
 

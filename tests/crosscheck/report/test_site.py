@@ -147,7 +147,7 @@ def test_mutation_scores_are_shown(tmp_path: Path) -> None:
     write_all(tmp_path / "records.jsonl", tmp_path)
     text, page = index.read_text(encoding="utf-8"), (index.parent / "pendulum" / "single.html").read_text("utf-8")
     assert "0.50" in text and "mass of arm" in text and "none applies" in text
-    assert "Mutation score 0.50" in page and "too small to be seen" in page and "does not apply" in page
+    assert "ScoredMutation score 0.50" in page and "too small to be seen" in page and "does not apply" in page
     assert "missed by load" in page
     (tmp_path / FILE).write_text("{", encoding="utf-8")
     write_all(tmp_path / "records.jsonl", tmp_path)

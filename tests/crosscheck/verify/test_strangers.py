@@ -42,7 +42,7 @@ def no_engine_runs(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise AssertionError("an engine was asked to run")
 
-    monkeypatch.setattr("crosscheck.verify.against_case.sweep", refuse)
+    monkeypatch.setattr("crosscheck.verify.against_case.run_planned", refuse)
 
 
 def write(file: Path, times: Real, channels: dict[str, Real]) -> Path:
