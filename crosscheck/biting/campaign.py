@@ -157,7 +157,9 @@ def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int)
     return bool(np.max(distance(name, values, right[name])) > floor)
 
 
-def _falsified(what: JudgedVariant, true: Result, scene: Scene, fault: AnswerFault) -> tuple[dict[str, ShownIn], list[str]]:
+def _falsified(
+    what: JudgedVariant, true: Result, scene: Scene, fault: AnswerFault
+) -> tuple[dict[str, ShownIn], list[str]]:
     """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))

@@ -124,7 +124,7 @@ def test_heavy_tops(case: str, within: float) -> None:
 
 
 def test_the_free_body() -> None:
-    m, times = closed_form("tops/torque_free"), np.linspace(0.0, 9.0, 10)
+    m, times = closed_form("tops/free_body"), np.linspace(0.0, 9.0, 10)
     start = Rotation.from_euler("XZ", [np.arctan2(m.I1 * m.W1, m.I3 * m.W3), 0.5 * np.pi])
     inertia = np.array([m.I1, m.I2, m.I3])
     attitudes = turning(inertia, np.zeros(3), np.zeros(3), start, np.array([m.W1, 0.0, m.W3]), times)
