@@ -1,0 +1,235 @@
+"""Taking turns: each rival has a process of its own, and in every round each is timed once, one after the other.
+
+What else the machine does then slows all alike, and the order changes from round to round, so that none always runs
+behind the same neighbour. A rival that crashes, hangs or fails loses its place, and the others go on.
+"""
+
+from __future__ import annotations
+
+import gc
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from math import inf, isfinite
+from multiprocessing.connection import wait
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
+from typing import Any
+
+from crosscheck.engines.answers import BrokenContract, checked_model, checked_run
+from crosscheck.engines.contract import Effort, Model, Run
+from crosscheck.running.execute import describe, find_engine
+from crosscheck.running.plan import Job
+from crosscheck.running.worker import TICK_S, Worker
+from flexmb.run.channels import channels_of
+from flexmb.typing import Real
+
+SAMPLE_S = 0.01  # a sample shorter than this measures the clock and the scheduler
+MOST_REPEATS = 1000
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Seconds of one solve: `solve_s` by the engine's own clock, which leaves out what is observed afterwards, `call_s`
+    of the whole call by ours, `cpu_s` of the process in that call."""
+
+    solve_s: float
+    call_s: float
+    cpu_s: float
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene that was compiled twice: seconds of the first time in its process, and of the second."""
+
+    first_s: float
+    again_s: float
+
+
+@dataclass(frozen=True)
+class FirstSolve:
+    """The solve before the timed ones: times (T,) and channels (T, k), and how often to repeat it for one sample."""
+
+    times: Real
+    channels: Mapping[str, Real]
+    repeats: int
+
+
+@dataclass(frozen=True)
+class Failure:
+    """Why a rival is out."""
+
+    message: str
+
+
+@dataclass(frozen=True)
+class Turn:
+    """What a worker is asked: to compile (`effort` None), to try an effort (`repeats` 0), or to take a sample."""
+
+    job: Job
+    effort: Effort | None = None
+    repeats: int = 0
+
+
+@dataclass
+class Timed:
+    """What came of one rival at one effort: its samples, or why there are none."""
+
+    job: Job
+    effort: Effort
+    prepared: Prepared | None = None
+    first: FirstSolve | None = None
+    samples: list[Sample] = field(default_factory=list)
+    failure: str = ""
+
+
+_compiled: dict[tuple[str, str], Model] = {}  # of this worker, which serves one rival
+
+
+def take_turn(turn: Turn, emit: Callable[[Any], None]) -> None:
+    """What a worker does; whatever goes wrong is emitted as a `Failure`."""
+    try:
+        emit(_done(turn))
+    except KeyboardInterrupt:
+        raise
+    except BaseException as error:  # a fault in one adapter must not end the others' turns
+        emit(Failure(describe(error)))
+
+
+def _done(turn: Turn) -> Prepared | FirstSolve | Sample:
+    job = turn.job
+    key = (job.variant, job.engine)
+    if turn.effort is None:
+        first_s, _ = _compile(job)
+        again_s, _compiled[key] = _compile(job)
+        return Prepared(first_s, again_s)
+    model = _compiled[key]
+    if not turn.repeats:
+        return _first_solve(model, job, turn.effort)
+    with _uncollected():
+        solve_s, start, cpu = 0.0, perf_counter(), process_time()
+        for _ in range(turn.repeats):
+            run = model.simulate(Run(times=job.times.copy()), turn.effort)
+            if run.status != "finished":
+                raise BrokenContract(f"not reproducible: it finished before, and {run.status} now: {run.message}")
+            solve_s += run.wall_s
+        call_s, cpu_s = perf_counter() - start, process_time() - cpu
+    if not (isfinite(solve_s) and solve_s > 0.0):
+        raise BrokenContract(f"wall_s is {solve_s:g} s for a solve: no time that can be compared")
+    return Sample(solve_s / turn.repeats, call_s / turn.repeats, cpu_s / turn.repeats)
+
+
+def _compile(job: Job) -> tuple[float, Model]:
+    engine = find_engine(job.provider, job.engine)
+    if isinstance(engine, str):
+        raise LookupError(engine)
+    engine.version()  # imports its library, which is not compiling
+    start = perf_counter()
+    model = checked_model(engine.compile(_scene(job)))
+    model.warm_up()
+    return perf_counter() - start, model
+
+
+def _first_solve(model: Model, job: Job, effort: Effort) -> FirstSolve:
+    """Two solves: the first may still load something, the second says how many a sample needs."""
+    for _ in range(2):
+        start = perf_counter()
+        run = checked_run(model.simulate(Run(times=job.times.copy()), effort), job.times, _scene(job))
+        took = perf_counter() - start
+    if run.status != "finished":
+        raise BrokenContract(f"it finished when it was judged, and {run.status} now: {run.message}")
+    return FirstSolve(run.times, channels_of(run), min(MOST_REPEATS, max(1, round(SAMPLE_S / max(took, 1e-7)))))
+
+
+def _scene(job: Job) -> Any:
+    if job.scene is None:
+        raise ValueError(f"the scene cannot be made: {job.error}")
+    return job.scene
+
+
+@contextmanager
+def _uncollected() -> Iterator[None]:
+    """Without Python's garbage collection, whose moment is chance."""
+    gc.collect()
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()
+
+
+def in_turns(
+    entries: Sequence[tuple[Job, Effort]],
+    rounds: int,
+    listener: Callable[[int, int], None] = lambda done, of: None,
+) -> list[Timed]:
+    """Time every entry, a rival at an effort, in `rounds` rounds. Efforts of one rival share its process.
+
+    `listener` hears how many turns of how many are done. Never raises for what an engine does.
+    """
+    timed = [Timed(job, effort) for job, effort in entries]
+    crew: dict[tuple[str, str], Worker] = {}
+    total = len(timed) * (rounds + 1)
+    with TemporaryDirectory() as folder:
+        ask = _Asker(crew, str(Path(folder) / "log"))
+        try:
+            for done, each in enumerate(timed):
+                _prepare(each, timed, ask)
+                listener(done + 1, total)
+            for number in range(rounds):
+                for place in range(len(timed)):
+                    each = timed[(place + number) % len(timed)]
+                    if not each.failure and each.first is not None:
+                        answer = ask(each, Turn(each.job, each.effort, each.first.repeats))
+                        if isinstance(answer, Sample):
+                            each.samples.append(answer)
+                    listener(len(timed) * (number + 1) + place + 1, total)
+        finally:
+            for worker in crew.values():
+                worker.dismiss()
+    return timed
+
+
+def _prepare(each: Timed, timed: Sequence[Timed], ask: _Asker) -> None:
+    """Compile, unless another effort of the same rival has done so, and solve once."""
+    same = [other for other in timed if other.job is each.job and (other.prepared or other.failure)]
+    ready = next((other.prepared for other in same if other.prepared is not None), None)
+    if ready is None and same:
+        each.failure = same[0].failure
+        return
+    answer = ready or ask(each, Turn(each.job))
+    if isinstance(answer, Prepared):
+        each.prepared = answer
+        first = ask(each, Turn(each.job, each.effort))
+        each.first = first if isinstance(first, FirstSolve) else None
+
+
+class _Asker:
+    """Asks a rival's worker and waits for the answer; a failure takes the rival out of the rounds."""
+
+    def __init__(self, crew: dict[tuple[str, str], Worker], log: str) -> None:
+        self._crew = crew
+        self._log = log
+
+    def __call__(self, each: Timed, turn: Turn) -> Any:
+        key = (turn.job.variant, turn.job.engine)
+        worker = self._crew.setdefault(key, Worker())
+        if turn.effort is not None and not worker.pid:
+            each.failure = "its process ended at another of its efforts"
+            return None
+        worker.hand_out(0, turn, " ".join(key), take_turn, self._log, turn.job.time_limit_s)
+        answer: Any = Failure("it gave no answer")
+        while True:
+            ready = worker.pipe is not None and bool(wait([worker.pipe], TICK_S))
+            event = worker.news(ready, {}, inf)
+            if event is None:
+                continue
+            if event.kind == "emitted":
+                answer = event.content
+                continue
+            if event.kind != "ended":
+                answer = Failure(str(event.content))
+            if isinstance(answer, Failure):
+                each.failure = answer.message
+            return answer
