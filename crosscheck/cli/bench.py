@@ -10,7 +10,17 @@ from typing import Annotated, Any
 import typer
 
 from crosscheck.cli.common import (
-    CaseWords, EngineNames, Quiet, TimeLimit, app, check_limit, console, found, in_one_line, refuse, verbosity,
+    CaseWords,
+    EngineNames,
+    Quiet,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    in_one_line,
+    refuse,
+    verbosity,
 )  # fmt: skip
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.live import LiveProgress

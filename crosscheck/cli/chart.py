@@ -9,7 +9,16 @@ import typer
 
 from crosscheck.cli.bench import Variants
 from crosscheck.cli.common import (
-    CaseWords, EngineNames, Quiet, TimeLimit, app, check_limit, console, found, sole_writer, verbosity,
+    CaseWords,
+    EngineNames,
+    Quiet,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    sole_writer,
+    verbosity,
 )  # fmt: skip
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.live import LiveProgress

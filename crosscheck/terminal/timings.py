@@ -12,7 +12,7 @@ from crosscheck.timing.benchmark_json import statistics
 
 
 def print_bench(console: Console, bench: CaseBench) -> None:
-    """A case: the equals with their ratios, those that are timed apart, and those that are not timed with the reason."""
+    """A case: the equals with their ratios, those timed apart, and those that are not timed with the reason."""
     levels = " and ".join(sorted({f"{each.rival.job.variant} ({each.rival.level})" for each in bench.contests}))
     title = f"\n{bench.case}, {levels}: equals are within {bench.accuracy:g} of the reference; {bench.rounds} rounds"
     console.print(words(title, "bold"), soft_wrap=True)
@@ -32,7 +32,7 @@ def print_bench(console: Console, bench: CaseBench) -> None:
 def _table(timed: list[Contest]) -> Table:
     """The variant and the level of its bodies stand beside the engine where they are not the same for all."""
     right = ("min", "quartiles", "ratio", "error", "compile", "again")
-    columns = ("engine and effort", *(Column(name, justify="right", no_wrap=True) for name in right))
+    columns = [Column("engine and effort"), *(Column(name, justify="right", no_wrap=True) for name in right)]
     table = Table(*columns, header_style="bold", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     equals = [each.best_s for each in timed if each.standing == "equal" and each.best_s is not None]
     models = {(each.rival.job.variant, each.rival.level) for each in timed}

@@ -1,1 +1,1 @@
-"""Timing reports: rivals that agree take turns on one scene (`bench`), and error against time over efforts (`chart`)."""
+"""Timing reports: who agrees is timed in turns (`bench`), and error against time over efforts (`chart`)."""

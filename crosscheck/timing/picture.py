@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from itertools import cycle
 from pathlib import Path
+from typing import Any
 
 import matplotlib
 from matplotlib.axes import Axes
@@ -13,7 +14,7 @@ from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")  # told apart by all
 MARKERS = "osD^vPX*"
-STYLE = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
+STYLE: dict[Any, Any] = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
 ZERO_ERROR = 1e-17  # where an error of exactly zero is drawn: below what numbers can tell
 
 
@@ -22,14 +23,14 @@ def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 5.2), layout="constrained")
         axes = figure.add_subplot()
+        axes.set_xscale("log")
+        axes.set_yscale("log")
         drawn = [point for point in chart.points if point.error is not None]
         _series(axes, drawn, several_variants=len({point.variant for point in chart.points}) > 1)
         _front(axes, chart, drawn)
         _floor(axes, chart, drawn)
         _failures(axes, [point for point in chart.points if point.error is None])
-        axes.set_xscale("log")
-        axes.set_yscale("log")
-        axes.set_xlabel(f"shortest of {charts.rounds} solves in turns [s], bars to the upper quartile")
+        axes.set_xlabel(f"shortest solve in {charts.rounds} rounds [s], bars to the upper quartile")
         axes.set_ylabel(f"largest error up to {charts.horizon_s:g} s, of the signal's size")
         axes.set_title(f"{charts.title}: {chart.observable}", fontsize="medium")
         axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
@@ -55,7 +56,7 @@ def _series(axes: Axes, drawn: list[ChartPoint], several_variants: bool) -> None
 def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
     """A staircase: within a step nothing faster is more accurate."""
     best = sorted((point for point in drawn if point.best), key=lambda point: point.solve_s or 0.0)
-    seconds, errors = [point.solve_s for point in best], [_height(point) for point in best]
+    seconds, errors = [point.solve_s or 0.0 for point in best], [_height(point) for point in best]
     axes.step(
         seconds, errors, where="post", color="#333333", linewidth=4.0, alpha=0.25, zorder=1, label="Pareto front"
     )
@@ -64,8 +65,9 @@ def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
 def _floor(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
     if not (drawn and 0.0 < chart.floor < 1e300):
         return
-    lowest = min([chart.floor, *(_height(point) for point in drawn)])
-    axes.set_ylim(bottom=lowest / 3.0)
+    heights = [chart.floor, *(_height(point) for point in drawn)]
+    lowest = min(heights)
+    axes.set_ylim(lowest / 3.0, 3.0 * max(heights))
     axes.axhspan(lowest / 1e3, chart.floor, color="#999999", alpha=0.25, zorder=0, linewidth=0)
     axes.axhline(chart.floor, color="#555555", linewidth=1.0, linestyle="--", label="uncertainty of the reference")
 

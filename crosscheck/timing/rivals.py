@@ -10,6 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Literal
 
 import msgspec
 import numpy as np
@@ -33,7 +34,7 @@ from flexmb.typing import Real
 
 @dataclass(frozen=True)
 class Rung:
-    """One effort of a rival: how it ended, and its relative error in every channel that is judged (none if it has none).
+    """One effort of a rival: how it ended, and its relative error in every channel that is judged, if it has one.
 
     `solve_s` is the engine's own time of that single solve.
     """
@@ -184,7 +185,7 @@ def _rung(run: RunRecord, result: Result, reference: ReferenceSignals, scales: M
     if run.status == "finished" and result.status == "finished":
         channels = {name: result.values(name, run) for name in run.channels}
         errors = _errors(result.times, channels, reference, scales)
-    kind = "tolerance" if run.effort_kind == "tolerance" else "step"
+    kind: Literal["tolerance", "step"] = "tolerance" if run.effort_kind == "tolerance" else "step"
     effort = Effort(kind, run.effort_value, run.effort_method)
     return Rung(effort, run.status, run.message, run.wall_s, run.evaluations, errors)
 

@@ -25,8 +25,8 @@ from crosscheck.running.worker import TICK_S, Worker
 from flexmb.run.channels import channels_of
 from flexmb.typing import Real
 
-SAMPLE_S = 0.01  # a sample shorter than this measures the clock and the scheduler
-MOST_REPEATS = 1000
+TURN_S = 0.02  # a turn has as many solves as last this long together, so that short ones settle in the caches
+MOST_SOLVES = 50
 
 
 @dataclass(frozen=True)
@@ -49,11 +49,11 @@ class Prepared:
 
 @dataclass(frozen=True)
 class FirstSolve:
-    """The solve before the timed ones: times (T,) and channels (T, k), and how often to repeat it for one sample."""
+    """The solve before the timed ones: times (T,) and channels (T, k), and how many solves a turn has."""
 
     times: Real
     channels: Mapping[str, Real]
-    repeats: int
+    solves: int
 
 
 @dataclass(frozen=True)
@@ -65,11 +65,11 @@ class Failure:
 
 @dataclass(frozen=True)
 class Turn:
-    """What a worker is asked: to compile (`effort` None), to try an effort (`repeats` 0), or to take a sample."""
+    """What a worker is asked: to compile (`effort` None), to try an effort (`solves` 0), or to time so many solves."""
 
     job: Job
     effort: Effort | None = None
-    repeats: int = 0
+    solves: int = 0
 
 
 @dataclass
@@ -97,7 +97,7 @@ def take_turn(turn: Turn, emit: Callable[[Any], None]) -> None:
         emit(Failure(describe(error)))
 
 
-def _done(turn: Turn) -> Prepared | FirstSolve | Sample:
+def _done(turn: Turn) -> Prepared | FirstSolve | list[Sample]:
     job = turn.job
     key = (job.variant, job.engine)
     if turn.effort is None:
@@ -105,19 +105,22 @@ def _done(turn: Turn) -> Prepared | FirstSolve | Sample:
         again_s, _compiled[key] = _compile(job)
         return Prepared(first_s, again_s)
     model = _compiled[key]
-    if not turn.repeats:
+    if not turn.solves:
         return _first_solve(model, job, turn.effort)
     with _uncollected():
-        solve_s, start, cpu = 0.0, perf_counter(), process_time()
-        for _ in range(turn.repeats):
-            run = model.simulate(Run(times=job.times.copy()), turn.effort)
-            if run.status != "finished":
-                raise BrokenContract(f"not reproducible: it finished before, and {run.status} now: {run.message}")
-            solve_s += run.wall_s
-        call_s, cpu_s = perf_counter() - start, process_time() - cpu
-    if not (isfinite(solve_s) and solve_s > 0.0):
-        raise BrokenContract(f"wall_s is {solve_s:g} s for a solve: no time that can be compared")
-    return Sample(solve_s / turn.repeats, call_s / turn.repeats, cpu_s / turn.repeats)
+        return [_sample(model, job, turn.effort) for _ in range(turn.solves)]
+
+
+def _sample(model: Model, job: Job, effort: Effort) -> Sample:
+    """One solve, timed by itself: a mean of several would contain whatever disturbed one of them."""
+    start, cpu = perf_counter(), process_time()
+    run = model.simulate(Run(times=job.times.copy()), effort)
+    call_s, cpu_s = perf_counter() - start, process_time() - cpu
+    if run.status != "finished":
+        raise BrokenContract(f"not reproducible: it finished before, and {run.status} now: {run.message}")
+    if not (isfinite(run.wall_s) and run.wall_s > 0.0):
+        raise BrokenContract(f"wall_s is {run.wall_s:g} s for a solve: no time that can be compared")
+    return Sample(run.wall_s, call_s, cpu_s)
 
 
 def _compile(job: Job) -> tuple[float, Model]:
@@ -132,14 +135,14 @@ def _compile(job: Job) -> tuple[float, Model]:
 
 
 def _first_solve(model: Model, job: Job, effort: Effort) -> FirstSolve:
-    """Two solves: the first may still load something, the second says how many a sample needs."""
+    """Two solves: the first may still load something, the second says how many a turn needs."""
     for _ in range(2):
         start = perf_counter()
         run = checked_run(model.simulate(Run(times=job.times.copy()), effort), job.times, _scene(job))
         took = perf_counter() - start
     if run.status != "finished":
         raise BrokenContract(f"it finished when it was judged, and {run.status} now: {run.message}")
-    return FirstSolve(run.times, channels_of(run), min(MOST_REPEATS, max(1, round(SAMPLE_S / max(took, 1e-7)))))
+    return FirstSolve(run.times, channels_of(run), min(MOST_SOLVES, max(1, round(TURN_S / max(took, 1e-7)))))
 
 
 def _scene(job: Job) -> Any:
@@ -181,9 +184,8 @@ def in_turns(
                 for place in range(len(timed)):
                     each = timed[(place + number) % len(timed)]
                     if not each.failure and each.first is not None:
-                        answer = ask(each, Turn(each.job, each.effort, each.first.repeats))
-                        if isinstance(answer, Sample):
-                            each.samples.append(answer)
+                        answer = ask(each, Turn(each.job, each.effort, each.first.solves))
+                        each.samples += answer if isinstance(answer, list) else []
                     listener(len(timed) * (number + 1) + place + 1, total)
         finally:
             for worker in crew.values():

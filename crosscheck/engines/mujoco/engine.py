@@ -28,8 +28,8 @@ class MujocoEngine:
     algorithm = "composite bodies, sparse factors"
     settings = (
         "Its own RK4, its most accurate integrator for smooth motion, in its own C loop: one call of mj_step makes all "
-        "steps between two samples. Bodies have no geometry, hence no contacts. Prescribed motion, motors and functions "
-        "of time come from callbacks in Python where a scene has them. Outputs are observed after the timed solve."
+        "steps between two samples. Contacts are off, and bodies have no geometry. Prescribed motion, motors and "
+        "functions of time are callbacks in Python where a scene has them. Outputs are observed after the timed solve."
     )
 
     def version(self) -> str:
