@@ -11,11 +11,11 @@ from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.find import Case, load_case
 from crosscheck.records.archive import Archive, read
-from crosscheck.records.kinds import RunRecord
+from crosscheck.records.kinds import CaseRecord, RunRecord
 from crosscheck.records.machine import environment
 from crosscheck.records.session import last_session
 from crosscheck.running.execute import execute
-from crosscheck.running.plan import plan
+from crosscheck.running.plan import Job, plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import sweep
 
@@ -70,11 +70,17 @@ def only(verdicts: list[Verdict], a: str, b: str) -> Verdict:
 def sweep_here(
     cases: Iterable[Case], asked: tuple[str, ...], records: Path, *, provider: str = PROVIDER, **_: object
 ) -> None:
-    """What `sweep` records, without its worker processes, which take a second each to start."""
+    """What `sweep` records but for films, without its worker processes, which take a second each to start."""
+    run_here([plan(case, asked, provider) for case in cases], asked, records)
+
+
+def run_here(
+    plans: Iterable[tuple[CaseRecord, list[Job]]], asked: tuple[str, ...], records: Path, **_: object
+) -> None:
+    """What `run_planned` records, in this process."""
     archive = Archive(records)
-    for case in cases:
-        record, jobs = plan(case, asked, provider)
-        archive.write(environment((case.name,), asked, confirms=True))
+    for record, jobs in plans:
+        archive.write(environment((record.case,), asked, confirms=True))
         archive.write(record)
         for job in jobs:
             execute(job, lambda content: archive.write(content) if isinstance(content, RunRecord) else None)

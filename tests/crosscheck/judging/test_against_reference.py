@@ -20,7 +20,7 @@ from crosscheck.records.held import Asked
 from crosscheck.records.packing import pack, unpack
 from crosscheck.records.session import last_session
 from crosscheck.references.regenerate import regenerate
-from tests.crosscheck.sessions import PROVIDER, copy_case, sweep_here
+from tests.crosscheck.sessions import PROVIDER, copy_case, run_here, sweep_here
 
 CASE = """
 [[variant]]
@@ -60,7 +60,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A case with its reference."""
     found = copy_case(tmp_path_factory.mktemp("referenced"), CASE)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.sweep", sweep_here)
+        patch.setattr("crosscheck.references.routes.run_planned", run_here)
         regenerate(load_case(found), provider=PROVIDER)
     return found
 

@@ -14,7 +14,7 @@ from crosscheck.conformance import trial
 from crosscheck.engines.registry import engine
 from crosscheck.pytest_plugin import compared, items, request, runs
 from tests.crosscheck.fake_project import fake_project
-from tests.crosscheck.sessions import copy_case, sweep_here
+from tests.crosscheck.sessions import copy_case, run_here
 from tests.repo.project import ROOT
 
 pytest_plugins = ("pytester",)
@@ -37,7 +37,7 @@ def case(project: Path) -> Path:
 def inside(pytester: pytest.Pytester, project: Path, monkeypatch: pytest.MonkeyPatch) -> pytest.Pytester:
     """A session in this process, whose engines run in it too."""
     monkeypatch.syspath_prepend(str(project))
-    monkeypatch.setattr(runs, "sweep", sweep_here)
+    monkeypatch.setattr(runs, "run_planned", run_here)
     return pytester
 
 

@@ -15,8 +15,8 @@ from crosscheck.library.reference import KNOWLEDGE, VALUES, current_reference, l
 from crosscheck.references.regenerate import Regenerated
 from crosscheck.references.regenerate import regenerate as make_again
 from crosscheck.running.scheduler import Limits
-from crosscheck.running.sweep import sweep
-from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, sweep_here
+from crosscheck.running.sweep import run_planned
+from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, run_here
 
 VARIANT = """
 [[variant]]
@@ -59,7 +59,7 @@ source = "an elliptic integral"
 def without_workers() -> Iterator[None]:
     """Routes run in this process: only one test below needs workers."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("crosscheck.references.routes.sweep", sweep_here)
+        patch.setattr("crosscheck.references.routes.run_planned", run_here)
         yield
 
 
@@ -125,7 +125,7 @@ def test_a_reference_that_is_reproduced_is_left_as_it_is(copied: Path) -> None:
 
 def test_check_writes_nothing_and_workers_do_the_same(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     folder = case_folder(tmp_path)
-    monkeypatch.setattr("crosscheck.references.routes.sweep", sweep)
+    monkeypatch.setattr("crosscheck.references.routes.run_planned", run_planned)
     assert regenerate(folder, check=True).done == "would be written"
     assert not (folder / VALUES).exists()
     assert not (folder / KNOWLEDGE).exists()
