@@ -32,7 +32,8 @@ def print_bench(console: Console, bench: CaseBench) -> None:
 def _table(timed: list[Contest]) -> Table:
     """The variant and the level of its bodies stand beside the engine where they are not the same for all."""
     right = ("min", "quartiles", "ratio", "error", "compile", "again")
-    columns = [Column("engine and effort"), *(Column(name, justify="right", no_wrap=True) for name in right)]
+    first = Column("engine and effort", overflow="fold")
+    columns = [first, *(Column(name, justify="right", no_wrap=True) for name in right)]
     table = Table(*columns, header_style="bold", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     equals = [each.best_s for each in timed if each.standing == "equal" and each.best_s is not None]
     models = {(each.rival.job.variant, each.rival.level) for each in timed}

@@ -15,6 +15,7 @@ from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")  # told apart by all
 MARKERS = "osD^vPX*"
 STYLE: dict[Any, Any] = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
+HUGE = 1e30  # a relative uncertainty beyond it says nothing
 ZERO_ERROR = 1e-17  # where an error of exactly zero is drawn: below what numbers can tell
 
 
@@ -29,6 +30,7 @@ def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
         _series(axes, drawn, several_variants=len({point.variant for point in chart.points}) > 1)
         _front(axes, chart, drawn)
         _floor(axes, chart, drawn)
+        _limits(axes, chart, drawn)
         _failures(axes, [point for point in chart.points if point.error is None])
         axes.set_xlabel(f"shortest solve in {charts.rounds} rounds [s], bars to the upper quartile")
         axes.set_ylabel(f"largest error up to {charts.horizon_s:g} s, of the signal's size")
@@ -63,13 +65,23 @@ def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
 
 
 def _floor(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
-    if not (drawn and 0.0 < chart.floor < 1e300):
+    if not (drawn and _has_floor(chart)):
         return
-    heights = [chart.floor, *(_height(point) for point in drawn)]
-    lowest = min(heights)
-    axes.set_ylim(lowest / 3.0, 3.0 * max(heights))
-    axes.axhspan(lowest / 1e3, chart.floor, color="#999999", alpha=0.25, zorder=0, linewidth=0)
+    axes.axhspan(ZERO_ERROR / 1e3, chart.floor, color="#999999", alpha=0.25, zorder=0, linewidth=0)
     axes.axhline(chart.floor, color="#555555", linewidth=1.0, linestyle="--", label="uncertainty of the reference")
+
+
+def _limits(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
+    """Room around the points and the floor; one point has some too."""
+    heights = [_height(point) for point in drawn] or [1e-9, 1.0]
+    heights += [chart.floor] if _has_floor(chart) else []
+    seconds = [second for point in drawn for second in (point.solve_s, *(point.quartiles_s or ())) if second]
+    seconds = seconds or [1e-3, 1.0]
+    axes.set(xlim=(min(seconds) / 1.5, 1.5 * max(seconds)), ylim=(min(heights) / 3.0, 3.0 * max(heights)))
+
+
+def _has_floor(chart: ChartData) -> bool:
+    return 0.0 < chart.floor < HUGE
 
 
 def _failures(axes: Axes, failed: list[ChartPoint]) -> None:
