@@ -29,8 +29,8 @@ def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
         drawn = [point for point in chart.points if point.error is not None]
         _series(axes, drawn, several_variants=len({point.variant for point in chart.points}) > 1)
         _front(axes, chart, drawn)
-        _floor(axes, chart, drawn)
         _limits(axes, chart, drawn)
+        _floor(axes, chart, drawn)
         _failures(axes, [point for point in chart.points if point.error is None])
         axes.set_xlabel(f"shortest solve in {charts.rounds} rounds [s], bars to the upper quartile")
         axes.set_ylabel(f"largest error up to {charts.horizon_s:g} s, of the signal's size")
