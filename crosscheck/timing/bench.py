@@ -8,7 +8,7 @@ equals'. Who disagrees on the reference's own variant, or did not finish, is not
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from math import isfinite
 from typing import Literal
@@ -64,7 +64,6 @@ def bench(
     provider: str = PROVIDER,
     limits: Limits,
     listener: Listener = lambda jobs, event: None,
-    turn_listener: Callable[[int, int], None] = lambda done, of: None,
 ) -> CaseBench:
     """Judge the rivals of a case, then time them. What goes wrong is told in what is returned; nothing is raised."""
     try:
@@ -74,7 +73,7 @@ def bench(
     facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
     contests = [_entered(rival, facts[rival.job.engine], rivals, accuracy) for rival in rivals.found]
     entered = [each for each in contests if each.rung is not None]
-    timed = in_turns([(each.rival.job, each.rung.effort) for each in entered if each.rung], rounds, turn_listener)
+    timed = in_turns([(each.rival.job, each.rung.effort) for each in entered if each.rung], rounds)
     done = dict(zip((id(each) for each in entered), timed, strict=True))
     contests = [_ended(each, done.get(id(each)), rivals, accuracy) for each in contests]
     return CaseBench(case.name, accuracy, rounds, tuple(sorted(contests, key=_place)))

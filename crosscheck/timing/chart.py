@@ -6,7 +6,7 @@ timed. Below the reference's own uncertainty, the floor, nothing can be told: am
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import inf
 
@@ -77,7 +77,6 @@ def chart(
     provider: str = PROVIDER,
     limits: Limits,
     listener: Listener = lambda jobs, event: None,
-    turn_listener: Callable[[int, int], None] = lambda done, of: None,
 ) -> CaseCharts:
     """Run, judge and time all efforts of a case. What goes wrong is told in what is returned; nothing is raised."""
     try:
@@ -86,7 +85,7 @@ def chart(
     except CaseError as error:
         return CaseCharts(case.name, case.run.title, "", 0.0, rounds, problem=str(error))
     entered = [(rival, rung) for rival in rivals.found for rung in rival.rungs if rung.status == "finished"]
-    timed = in_turns([(rival.job, rung.effort) for rival, rung in entered], rounds, turn_listener)
+    timed = in_turns([(rival.job, rung.effort) for rival, rung in entered], rounds)
     times = {id(rung): each for (_, rung), each in zip(entered, timed, strict=True)}
     facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
     return CaseCharts(

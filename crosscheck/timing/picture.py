@@ -16,18 +16,21 @@ COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8
 MARKERS = "osD^vPX*"
 STYLE: dict[Any, Any] = {"svg.hashsalt": "crosscheck", "svg.fonttype": "none", "font.size": 9}
 HUGE = 1e30  # a relative uncertainty beyond it says nothing
-ZERO_ERROR = 1e-17  # where an error of exactly zero is drawn: below what numbers can tell
+ZERO_ERROR = 1e-17  # where an error of zero is drawn if there is no floor: below what numbers can tell
 
 
 def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
-    """Write the picture as SVG. Points without error stand on the margin at the right, by name."""
+    """Write the picture as SVG. Errors below the floor stand on it, as no more is known of them.
+
+    Points without error stand on the margin at the right, by name.
+    """
     with matplotlib.rc_context(STYLE):
         figure = Figure(figsize=(8.0, 5.2), layout="constrained")
         axes = figure.add_subplot()
         axes.set_xscale("log")
         axes.set_yscale("log")
         drawn = [point for point in chart.points if point.error is not None]
-        _series(axes, drawn, several_variants=len({point.variant for point in chart.points}) > 1)
+        _series(axes, chart, drawn, several_variants=len({point.variant for point in chart.points}) > 1)
         _front(axes, chart, drawn)
         _limits(axes, chart, drawn)
         _floor(axes, chart, drawn)
@@ -41,12 +44,12 @@ def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
         figure.savefig(path, metadata={"Date": None})
 
 
-def _series(axes: Axes, drawn: list[ChartPoint], several_variants: bool) -> None:
+def _series(axes: Axes, chart: ChartData, drawn: list[ChartPoint], several_variants: bool) -> None:
     looks = cycle(zip(COLOURS, MARKERS, strict=True))
     for name in dict.fromkeys((point.series, point.variant) for point in drawn):
         colour, marker = next(looks)
         points = [point for point in drawn if (point.series, point.variant) == name]
-        seconds, errors = [point.solve_s or 0.0 for point in points], [_height(point) for point in points]
+        seconds, errors = [point.solve_s or 0.0 for point in points], [_height(chart, point) for point in points]
         upper = [max(point.quartiles_s[1] - (point.solve_s or 0.0), 0.0) for point in points if point.quartiles_s]
         label = f"{name[0]} ({name[1]})" if several_variants else name[0]
         axes.errorbar(
@@ -58,7 +61,10 @@ def _series(axes: Axes, drawn: list[ChartPoint], several_variants: bool) -> None
 def _front(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
     """A staircase: within a step nothing faster is more accurate."""
     best = sorted((point for point in drawn if point.best), key=lambda point: point.solve_s or 0.0)
-    seconds, errors = [point.solve_s or 0.0 for point in best], [_height(point) for point in best]
+    seconds, errors = [point.solve_s or 0.0 for point in best], [_height(chart, point) for point in best]
+    if best:  # the last step goes on to the slowest of all
+        seconds.append(max(point.solve_s or 0.0 for point in drawn))
+        errors.append(errors[-1])
     axes.step(
         seconds, errors, where="post", color="#333333", linewidth=4.0, alpha=0.25, zorder=1, label="Pareto front"
     )
@@ -73,7 +79,7 @@ def _floor(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
 
 def _limits(axes: Axes, chart: ChartData, drawn: list[ChartPoint]) -> None:
     """Room around the points and the floor; one point has some too."""
-    heights = [_height(point) for point in drawn] or [1e-9, 1.0]
+    heights = [_height(chart, point) for point in drawn] or [1e-9, 1.0]
     heights += [chart.floor] if _has_floor(chart) else []
     seconds = [second for point in drawn for second in (point.solve_s, *(point.quartiles_s or ())) if second]
     seconds = seconds or [1e-3, 1.0]
@@ -94,5 +100,5 @@ def _failures(axes: Axes, failed: list[ChartPoint]) -> None:
         )
 
 
-def _height(point: ChartPoint) -> float:
-    return max(point.error or 0.0, ZERO_ERROR)
+def _height(chart: ChartData, point: ChartPoint) -> float:
+    return max(point.error or 0.0, chart.floor if _has_floor(chart) else ZERO_ERROR)

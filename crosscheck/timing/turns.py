@@ -40,7 +40,7 @@ class Sample:
 
 
 @dataclass(frozen=True)
-class Prepared:
+class CompileTimes:
     """A scene that was compiled twice: seconds of the first time in its process, and of the second."""
 
     first_s: float
@@ -57,7 +57,7 @@ class FirstSolve:
 
 
 @dataclass(frozen=True)
-class Failure:
+class TurnFailure:
     """Why a rival is out."""
 
     message: str
@@ -78,7 +78,7 @@ class Timed:
 
     job: Job
     effort: Effort
-    prepared: Prepared | None = None
+    prepared: CompileTimes | None = None
     first: FirstSolve | None = None
     samples: list[Sample] = field(default_factory=list)
     failure: str = ""
@@ -88,22 +88,22 @@ _compiled: dict[tuple[str, str], Model] = {}  # of this worker, which serves one
 
 
 def take_turn(turn: Turn, emit: Callable[[Any], None]) -> None:
-    """What a worker does; whatever goes wrong is emitted as a `Failure`."""
+    """What a worker does; whatever goes wrong is emitted as a `TurnFailure`."""
     try:
         emit(_done(turn))
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # a fault in one adapter must not end the others' turns
-        emit(Failure(describe(error)))
+        emit(TurnFailure(describe(error)))
 
 
-def _done(turn: Turn) -> Prepared | FirstSolve | list[Sample]:
+def _done(turn: Turn) -> CompileTimes | FirstSolve | list[Sample]:
     job = turn.job
     key = (job.variant, job.engine)
     if turn.effort is None:
         first_s, _ = _compile(job)
         again_s, _compiled[key] = _compile(job)
-        return Prepared(first_s, again_s)
+        return CompileTimes(first_s, again_s)
     model = _compiled[key]
     if not turn.solves:
         return _first_solve(model, job, turn.effort)
@@ -162,31 +162,24 @@ def _uncollected() -> Iterator[None]:
         gc.enable()
 
 
-def in_turns(
-    entries: Sequence[tuple[Job, Effort]],
-    rounds: int,
-    listener: Callable[[int, int], None] = lambda done, of: None,
-) -> list[Timed]:
+def in_turns(entries: Sequence[tuple[Job, Effort]], rounds: int) -> list[Timed]:
     """Time every entry, a rival at an effort, in `rounds` rounds. Efforts of one rival share its process.
 
-    `listener` hears how many turns of how many are done. Never raises for what an engine does.
+    Never raises for what an engine does.
     """
     timed = [Timed(job, effort) for job, effort in entries]
     crew: dict[tuple[str, str], Worker] = {}
-    total = len(timed) * (rounds + 1)
     with TemporaryDirectory() as folder:
         ask = _Asker(crew, str(Path(folder) / "log"))
         try:
-            for done, each in enumerate(timed):
+            for each in timed:
                 _prepare(each, timed, ask)
-                listener(done + 1, total)
             for number in range(rounds):
                 for place in range(len(timed)):
                     each = timed[(place + number) % len(timed)]
                     if not each.failure and each.first is not None:
                         answer = ask(each, Turn(each.job, each.effort, each.first.solves))
                         each.samples += answer if isinstance(answer, list) else []
-                    listener(len(timed) * (number + 1) + place + 1, total)
         finally:
             for worker in crew.values():
                 worker.dismiss()
@@ -201,7 +194,7 @@ def _prepare(each: Timed, timed: Sequence[Timed], ask: _Asker) -> None:
         each.failure = same[0].failure
         return
     answer = ready or ask(each, Turn(each.job))
-    if isinstance(answer, Prepared):
+    if isinstance(answer, CompileTimes):
         each.prepared = answer
         first = ask(each, Turn(each.job, each.effort))
         each.first = first if isinstance(first, FirstSolve) else None
@@ -221,7 +214,7 @@ class _Asker:
             each.failure = "its process ended at another of its efforts"
             return None
         worker.hand_out(0, turn, " ".join(key), take_turn, self._log, turn.job.time_limit_s)
-        answer: Any = Failure("it gave no answer")
+        answer: Any = TurnFailure("it gave no answer")
         while True:
             ready = worker.pipe is not None and bool(wait([worker.pipe], TICK_S))
             event = worker.news(ready, {}, inf)
@@ -231,7 +224,7 @@ class _Asker:
                 answer = event.content
                 continue
             if event.kind != "ended":
-                answer = Failure(str(event.content))
-            if isinstance(answer, Failure):
+                answer = TurnFailure(str(event.content))
+            if isinstance(answer, TurnFailure):
                 each.failure = answer.message
             return answer

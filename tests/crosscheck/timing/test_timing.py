@@ -29,7 +29,7 @@ from crosscheck.timing.chart import CaseCharts, ChartPoint, chart, with_front
 from crosscheck.timing.facts import UNSAID, facts_of
 from crosscheck.timing.page import folder_name, write_case, write_index
 from crosscheck.timing.rivals import find_rivals
-from crosscheck.timing.turns import Failure, FirstSolve, Prepared, Sample, Timed, Turn, in_turns, take_turn
+from crosscheck.timing.turns import TurnFailure, FirstSolve, CompileTimes, Sample, Timed, Turn, in_turns, take_turn
 from tests.crosscheck.sessions import copy_case, run_here
 
 PROVIDER = "tests.crosscheck.timing.racing_engines:engines"
@@ -82,7 +82,7 @@ def turns_here(monkeypatch: pytest.MonkeyPatch) -> None:
     def ask(self: object, each: Timed, turn: Turn) -> object:
         answers: list[object] = []
         take_turn(turn, answers.append)
-        if isinstance(answers[0], Failure):
+        if isinstance(answers[0], TurnFailure):
             each.failure = answers[0].message
         return answers[0]
 
@@ -155,9 +155,8 @@ def test_a_crash_in_its_turn_costs_only_its_own(case: Case) -> None:
     """Processes of their own: one dies, one has no clock, one stops solving; the sound one has all its samples."""
     effort = Effort("tolerance", 1e-6, "DOP853")
     names = ("fickle", "fine", "clockless", "forgetful")
-    heard: list[tuple[int, int]] = []
     entries = [(job(case, name), effort) for name in names]
-    timed = dict(zip(names, in_turns(entries, 2, lambda *turn: heard.append(turn)), strict=True))
+    timed = dict(zip(names, in_turns(entries, 2), strict=True))
     assert "exit code" in timed["fickle"].failure
     assert "no time that can be compared" in timed["clockless"].failure
     assert "it forgot how" in timed["forgetful"].failure
@@ -165,7 +164,6 @@ def test_a_crash_in_its_turn_costs_only_its_own(case: Case) -> None:
     assert not timed["fine"].failure
     assert timed["fine"].first is not None
     assert len(timed["fine"].samples) == 2 * timed["fine"].first.solves
-    assert heard[-1] == (12, 12)
 
 
 def test_efforts_of_one_rival_share_what_is_compiled(case: Case, turns_here: None) -> None:
@@ -269,11 +267,11 @@ def test_what_a_turn_emits(case: Case) -> None:
     for turn in (Turn(fine), Turn(fine, effort), Turn(fine, effort, 3), Turn(replace(fine, scene=None, error="why"))):
         take_turn(turn, answers.append)
     prepared, first, samples, failure = answers
-    assert isinstance(prepared, Prepared) and prepared.again_s > 0.0
+    assert isinstance(prepared, CompileTimes) and prepared.again_s > 0.0
     assert isinstance(first, FirstSolve) and "marker:tip.position" in first.channels
     assert isinstance(samples, list) and len(samples) == 3
     assert all(isinstance(each, Sample) and each.call_s > 0.0 for each in samples)
-    assert isinstance(failure, Failure) and "why" in failure.message
+    assert isinstance(failure, TurnFailure) and "why" in failure.message
 
 
 def test_names_and_times() -> None:
