@@ -29,7 +29,7 @@ from crosscheck.timing.chart import CaseCharts, ChartPoint, chart, with_front
 from crosscheck.timing.facts import UNSAID, facts_of
 from crosscheck.timing.page import folder_name, write_case, write_index
 from crosscheck.timing.rivals import find_rivals
-from crosscheck.timing.turns import TurnFailure, FirstSolve, CompileTimes, Sample, Timed, Turn, in_turns, take_turn
+from crosscheck.timing.turns import CompileTimes, FirstSolve, Sample, Timed, Turn, TurnFailure, in_turns, take_turn
 from tests.crosscheck.sessions import copy_case, run_here
 
 PROVIDER = "tests.crosscheck.timing.racing_engines:engines"
