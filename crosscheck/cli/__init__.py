@@ -1,7 +1,7 @@
 """The command `crosscheck`, one file a command: it reads the command line and shows what the other rooms do."""
 
 from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in this order
-    run, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
+    run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
 )  # fmt: skip
 from crosscheck.cli.common import app
 

@@ -148,7 +148,9 @@ class Model(Protocol):
 class Engine(Protocol):
     """An independent multibody code behind one adapter. Entry-point group: `crosscheck.engines`.
 
-    An engine may have a `summary`, one line that `crosscheck engines` shows.
+    An engine may have a `summary`, one line that `crosscheck engines` shows; and for timing reports an `algorithm`, in
+    a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
+    switched off, whose loop steps it, and what its `wall_s` contains.
     """
 
     name: str

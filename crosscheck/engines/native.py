@@ -44,6 +44,12 @@ _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the
 class NativeEngine:
     """flexmb with one of its algorithms, at the levels the scene asks for, and one of its integrators."""
 
+    settings = (
+        "flexmb's integrator in one compiled loop around its compiled equations of motion, on one thread. Workers take "
+        "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; those made for one scene are "
+        "faster. Compiling is apart, and outputs are observed after the timed solve."
+    )
+
     def __init__(
         self,
         name: str = "native",
@@ -56,6 +62,11 @@ class NativeEngine:
         self._algorithm: Algorithm = algorithm
         self._method: Method = method
         self._supported: tuple[Scene, NativeModel] | None = None  # made to see whether it can be; for `compile` to take
+
+    @property
+    def algorithm(self) -> Algorithm:
+        """Its algorithm, for timing reports."""
+        return self._algorithm
 
     def version(self) -> str:
         try:

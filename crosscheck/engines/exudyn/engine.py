@@ -24,6 +24,14 @@ class ExudynEngine:
 
     name = "exudyn"
     summary = "rigid bodies and floating frames in redundant coordinates"
+    algorithm = "redundant coordinates, Lagrange multipliers"
+    settings = (
+        "Its own solvers in their own C++ loop, without files, messages or contacts. Linear algebra is dense for "
+        "small scenes and Eigen's sparse one for large ones, whichever is faster. A sensor in Python takes the state "
+        "at every sample, and functions of time are called in Python where a scene has them; both are in the timed "
+        "solve. A single free body is restarted at every sample, as its solver does not stop there by itself. Where "
+        "Newton's method does not reach the first tolerance, the solve is made again with the next, and all count."
+    )
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing where it is not installed."""

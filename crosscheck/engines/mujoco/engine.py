@@ -25,6 +25,12 @@ class MujocoEngine:
 
     name = "mujoco"
     summary = "rigid trees in minimal coordinates, fixed steps"
+    algorithm = "composite bodies, sparse factors"
+    settings = (
+        "Its own RK4, its most accurate integrator for smooth motion, in its own C loop: one call of mj_step makes all "
+        "steps between two samples. Contacts are off, and bodies have no geometry. Prescribed motion, motors and "
+        "functions of time are callbacks in Python where a scene has them. Outputs are observed after the timed solve."
+    )
 
     def version(self) -> str:
         try:

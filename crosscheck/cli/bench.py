@@ -1,0 +1,99 @@
+"""`crosscheck bench`: engines that agree are timed in turns."""
+
+from __future__ import annotations
+
+import json
+from math import inf
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from crosscheck.cli.common import (
+    CaseWords,
+    EngineNames,
+    Quiet,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    in_one_line,
+    refuse,
+    verbosity,
+)  # fmt: skip
+from crosscheck.running.scheduler import Limits
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.text import words
+from flexmb.output.writing import check_folder, folder, writing
+
+Variants = Annotated[
+    list[str] | None,
+    typer.Option("--variant", help="Only these variants (repeat it); by default the one that the reference is of."),
+]
+
+
+@app.command()
+def bench(
+    cases: CaseWords,
+    engine: EngineNames = None,
+    variant: Variants = None,
+    rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each engine is timed.")] = 10,
+    accuracy: Annotated[
+        float, typer.Option("--accuracy", help="How near to the reference, of the signals' sizes, an equal must be.")
+    ] = 1e-4,
+    json_file: Annotated[
+        Path | None, typer.Option("--json", metavar="FILE", help="Write what `pytest-benchmark compare` reads.")
+    ] = None,
+    time_limit: TimeLimit = None,
+    quiet: Quiet = False,
+) -> None:
+    """
+    Time the engines of cases against each other, those that agree.
+
+    Every engine first climbs its efforts and is held against the stored `reference.csv`. The cheapest effort that is
+    within `--accuracy` in every channel is timed: each engine in a process of its own, all taking turns. Shown are the
+    shortest solve and the quartiles, and apart from them what compiling takes, the first time and again. Who disagrees,
+    or is less accurate, is no equal, and it says so; who crashes or hangs does not stop the others.
+
+    **Exit code**: 0 somebody was timed on every case; 1 nobody was on one of them; 2 the request makes no sense.
+
+    **Examples**: `crosscheck bench tops/gyrostat` · `crosscheck bench canonical --rounds 30 --json bench.json` ·
+    `crosscheck bench closed_chains/four_bar -e native -e pinocchio --accuracy 1e-6`
+    """
+    from crosscheck.terminal.timings import print_bench
+    from crosscheck.timing.bench import bench as bench_case
+    from crosscheck.timing.benchmark_json import MISSING, available, benchmark_document
+
+    check_limit(time_limit)
+    if not 0.0 < accuracy < inf:
+        refuse(f"--accuracy {accuracy:g}: give a positive number such as 1e-4")
+    if not available():
+        refuse(MISSING)
+    shown = verbosity(quiet, False)
+    benches = []
+    with in_one_line():
+        if json_file is not None:
+            check_folder(json_file.parent)
+        for case in found(tuple(cases)):
+            with LiveProgress(console, shown) as live:
+                done = bench_case(
+                    case, engine or (), variant or (),
+                    rounds=rounds, accuracy=accuracy, limits=Limits(1, time_limit), listener=live.hear,
+                )  # fmt: skip
+            benches.append(done)
+            if not quiet:
+                print_bench(console, done)
+        if json_file is not None:
+            _write(json_file, benchmark_document(benches))
+    empty = [each.case for each in benches if not any(contest.timed for contest in each.contests)]
+    last = f"nobody was timed on {', '.join(empty)}" if empty else f"{len(benches)} cases timed"
+    where = "" if json_file is None else f"; {json_file}"
+    console.print(words(last + where, "red" if empty else "green"))
+    raise typer.Exit(int(bool(empty)))
+
+
+def _write(file: Path, document: dict[str, Any]) -> None:
+    folder(file.parent)
+    with writing(file):
+        file.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")

@@ -1,0 +1,74 @@
+"""`crosscheck chart`: error against time over the efforts of all engines."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from crosscheck.cli.bench import Variants
+from crosscheck.cli.common import (
+    CaseWords,
+    EngineNames,
+    Quiet,
+    TimeLimit,
+    app,
+    check_limit,
+    console,
+    found,
+    sole_writer,
+    verbosity,
+)  # fmt: skip
+from crosscheck.running.scheduler import Limits
+from crosscheck.terminal.live import LiveProgress
+from crosscheck.terminal.text import marked, words
+
+
+@app.command()
+def chart(
+    cases: CaseWords,
+    engine: EngineNames = None,
+    variant: Variants = None,
+    rounds: Annotated[int, typer.Option("--rounds", min=1, help="How often each effort is timed.")] = 5,
+    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for pictures, data and pages.")] = Path("charts"),
+    time_limit: TimeLimit = None,
+    quiet: Quiet = False,
+) -> None:
+    """
+    Draw error against time: every engine and integrator over its efforts.
+
+    Errors are against the stored `reference.csv`, up to its horizon, and its uncertainty is drawn as the floor below
+    which nothing can be told. All efforts are timed in turns, as by `crosscheck bench`. Engines and efforts that failed
+    stand on the margin; the page says why, and how each engine is run so that the race is fair.
+
+    **Writes** into `--out` an index and a folder for each case: SVG pictures, `charts.json`, a page.
+
+    **Exit code**: 0 every case was drawn; 1 one was not; 2 the request makes no sense.
+
+    **Examples**: `crosscheck chart tops/gyrostat --out charts` · `crosscheck chart canonical -e native -e mujoco`
+    """
+    from crosscheck.timing.chart import chart as chart_case
+    from crosscheck.timing.page import write_case, write_index  # it loads matplotlib
+
+    check_limit(time_limit)
+    shown = verbosity(quiet, False)
+    done = []
+    with sole_writer(out):
+        for case in found(tuple(cases)):
+            with LiveProgress(console, shown) as live:
+                charts = chart_case(
+                    case, engine or (), variant or (),
+                    rounds=rounds, limits=Limits(1, time_limit), listener=live.hear,
+                )  # fmt: skip
+            done.append(charts)
+            if charts.problem:
+                console.print(marked("✕", "red", charts.problem), soft_wrap=True)
+                continue
+            page = write_case(charts, out)
+            if not quiet:
+                console.print(marked("✓", "green", f"{charts.case}: {page}"), soft_wrap=True)
+        index = write_index(done, out)
+    good = not any(each.problem for each in done)
+    console.print(words(f"Index: {index}", "green" if good else "red"), soft_wrap=True)
+    raise typer.Exit(int(not good))

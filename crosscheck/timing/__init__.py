@@ -1,0 +1,1 @@
+"""Timing reports: who agrees is timed in turns (`bench`), and error against time over efforts (`chart`)."""

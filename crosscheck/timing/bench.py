@@ -1,0 +1,115 @@
+"""Benchmarks of a case: who is as accurate as was asked is timed in turns, and who is not is told apart.
+
+An engine counts as an *equal* where every verdict on it against `reference.csv` is *agree*, and one of its efforts is
+within the accuracy asked for in every channel that is judged; the first such effort is timed, as a user would choose
+it. Others that finished are timed *apart*, at that effort or at their finest: their times stand in no ratio to the
+equals'. Who disagrees on the reference's own variant, or did not finish, is not timed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import Case
+from crosscheck.running.scheduler import Limits
+from crosscheck.running.sweep import PROVIDER, Listener
+from crosscheck.timing.facts import EngineFacts, facts_of
+from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals
+from crosscheck.timing.turns import Timed, in_turns
+
+Standing = Literal["equal", "apart", "not timed"]
+ACCURACY = 1e-4  # of the signals' sizes: what peers with fixed steps reach too
+ROUNDS = 10
+
+
+@dataclass(frozen=True)
+class Contest:
+    """Where a rival stands, why, and its times; `rung` is the effort that is timed, None where none is."""
+
+    rival: Rival
+    facts: EngineFacts
+    standing: Standing
+    why: str
+    rung: Rung | None = None
+    timed: Timed | None = None
+
+    @property
+    def best_s(self) -> float | None:
+        """The shortest solve."""
+        return min(sample.solve_s for sample in self.timed.samples) if self.timed and self.timed.samples else None
+
+
+@dataclass(frozen=True)
+class CaseBench:
+    """A case's contests, equals first and the fastest first; `problem` says why there are none."""
+
+    case: str
+    accuracy: float
+    rounds: int
+    contests: tuple[Contest, ...] = ()
+    problem: str = ""
+
+
+def bench(
+    case: Case,
+    engines: Sequence[str],
+    variants: Sequence[str],
+    *,
+    rounds: int = ROUNDS,
+    accuracy: float = ACCURACY,
+    provider: str = PROVIDER,
+    limits: Limits,
+    listener: Listener = lambda jobs, event: None,
+) -> CaseBench:
+    """Judge the rivals of a case, then time them. What goes wrong is told in what is returned; nothing is raised."""
+    try:
+        rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
+    except CaseError as error:
+        return CaseBench(case.name, accuracy, rounds, problem=str(error))
+    facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
+    contests = [_entered(rival, facts[rival.job.engine], rivals, accuracy) for rival in rivals.found]
+    entered = [each for each in contests if each.rung is not None]
+    timed = in_turns([(each.rival.job, each.rung.effort) for each in entered if each.rung], rounds)
+    done = dict(zip((id(each) for each in entered), timed, strict=True))
+    contests = [_ended(each, done.get(id(each)), rivals, accuracy) for each in contests]
+    return CaseBench(case.name, accuracy, rounds, tuple(sorted(contests, key=_place)))
+
+
+def _entered(rival: Rival, facts: EngineFacts, rivals: Rivals, accuracy: float) -> Contest:
+    finished = [rung for rung in rival.rungs if rung.status == "finished" and isfinite(rung.error)]
+    accurate = next((rung for rung in finished if rung.error <= accuracy), None)
+    another = rival.job.variant != rivals.variant
+    if rival.status not in ("agree", "unresolved", "differ") or not finished:
+        return Contest(rival, facts, "not timed", f"{rival.status}: {rival.reason}")
+    if rival.status == "differ" and not another:
+        return Contest(rival, facts, "not timed", f"disagrees with the reference: {rival.reason}")
+    if accurate is None:
+        finest = finished[-1]
+        why = f"its finest effort is {finest.error:.2g} from the reference, not within {accuracy:g}"
+        return Contest(rival, facts, "apart", why, finest)
+    if rival.status != "agree":
+        what = f"another model than {rivals.variant}" if another else "its agreement is not resolved"
+        return Contest(rival, facts, "apart", f"{what}: {rival.reason}", accurate)
+    return Contest(rival, facts, "equal", f"agrees with the reference, {accurate.error:.2g} from it", accurate)
+
+
+def _ended(each: Contest, timed: Timed | None, rivals: Rivals, accuracy: float) -> Contest:
+    """With its times; a rival that failed while it was timed, or solved something else, has none."""
+    if timed is None:
+        return each
+    if timed.failure or not timed.samples or timed.first is None:
+        why = f"it passed the verdicts, but not its turns: {timed.failure or 'it took none'}"
+        return Contest(each.rival, each.facts, "not timed", why, each.rung)
+    again = max(each.rival.errors(timed.first.times, timed.first.channels, rivals.reference).values(), default=None)
+    if again is None or (each.standing == "equal" and not again <= accuracy):
+        why = f"what was timed is not what was judged: its error is {again} instead of {each.rung and each.rung.error}"
+        return Contest(each.rival, each.facts, "not timed", why, each.rung)
+    return Contest(each.rival, each.facts, each.standing, each.why, each.rung, timed)
+
+
+def _place(each: Contest) -> tuple[int, float]:
+    return ("equal", "apart", "not timed").index(each.standing), each.best_s or 0.0

@@ -1,0 +1,173 @@
+"""Error against time: every engine over its ladder of efforts, per observable, with the Pareto front of each.
+
+Errors are distances from `reference.csv` up to its horizon, relative to the signal's size, of the very solves that are
+timed. Below the reference's own uncertainty, the floor, nothing can be told: among results there only time counts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import inf
+
+from crosscheck.library.case import CaseError
+from crosscheck.library.find import Case
+from crosscheck.running.scheduler import Limits
+from crosscheck.running.sweep import PROVIDER, Listener
+from crosscheck.timing.facts import EngineFacts, facts_of
+from crosscheck.timing.rivals import Rival, Rivals, Rung, find_rivals
+from crosscheck.timing.turns import Timed, in_turns
+
+ROUNDS = 5
+
+
+@dataclass(frozen=True)
+class ChartPoint:
+    """One effort of a rival in one observable: the shortest solve (s) and the relative error, or why it has none.
+
+    `quartiles_s` are of the solves. `best` says that no faster point is as accurate, as far as the floor lets one tell.
+    """
+
+    variant: str
+    engine: str
+    integrator: str
+    effort: str
+    solve_s: float | None
+    quartiles_s: tuple[float, float] | None
+    error: float | None
+    message: str = ""
+    best: bool = False
+
+    @property
+    def series(self) -> str:
+        """What it is a point of."""
+        return f"{self.engine}, {self.integrator}" if self.integrator else self.engine
+
+
+@dataclass(frozen=True)
+class ChartData:
+    """One chart: an observable, the relative uncertainty of its reference, and all points, those without error too."""
+
+    observable: str
+    floor: float
+    points: tuple[ChartPoint, ...]
+
+
+@dataclass(frozen=True)
+class CaseCharts:
+    """The charts of a case; `verdicts` say of each rival how it stands to the reference. `problem`: why none are."""
+
+    case: str
+    title: str
+    variant: str
+    horizon_s: float
+    rounds: int
+    charts: tuple[ChartData, ...] = ()
+    verdicts: tuple[tuple[str, str, str], ...] = ()
+    facts: tuple[tuple[str, EngineFacts], ...] = ()
+    problem: str = ""
+
+
+def chart(
+    case: Case,
+    engines: Sequence[str],
+    variants: Sequence[str],
+    *,
+    rounds: int = ROUNDS,
+    provider: str = PROVIDER,
+    limits: Limits,
+    listener: Listener = lambda jobs, event: None,
+) -> CaseCharts:
+    """Run, judge and time all efforts of a case. What goes wrong is told in what is returned; nothing is raised."""
+    try:
+        rivals = find_rivals(case, engines, variants, provider=provider, limits=limits, listener=listener)
+        observables = _observables(case, rivals)
+    except CaseError as error:
+        return CaseCharts(case.name, case.run.title, "", 0.0, rounds, problem=str(error))
+    entered = [(rival, rung) for rival in rivals.found for rung in rival.rungs if rung.status == "finished"]
+    timed = in_turns([(rival.job, rung.effort) for rival, rung in entered], rounds)
+    times = {id(rung): each for (_, rung), each in zip(entered, timed, strict=True)}
+    facts = facts_of(sorted({each.job.engine for each in rivals.found}), provider)
+    return CaseCharts(
+        case=case.name,
+        title=case.run.title,
+        variant=rivals.variant,
+        horizon_s=float(rivals.reference.times[-1]),
+        rounds=rounds,
+        charts=tuple(_chart(name, rivals, times) for name in observables),
+        verdicts=tuple((rival.name, rival.status, rival.reason) for rival in rivals.found),
+        facts=tuple(facts.items()),
+    )
+
+
+def _observables(case: Case, rivals: Rivals) -> list[str]:
+    """Those of the case's charts that are judged; where none is, the first channel that is."""
+    judged = list(dict.fromkeys(name for rival in rivals.found for name in rival.scales))
+    if not judged:
+        raise CaseError(f"{case.name}: no engine finished, so that there is nothing to draw: {_first(rivals)}")
+    wanted = dict.fromkeys(each.observable for each in case.run.charts)
+    return [name for name in wanted if name in judged] or judged[:1]
+
+
+def _first(rivals: Rivals) -> str:
+    return "; ".join(f"{rival.name} {rival.status}: {rival.reason}" for rival in rivals.found[:1])
+
+
+def _chart(observable: str, rivals: Rivals, times: dict[int, Timed]) -> ChartData:
+    scale = next(rival.scales[observable] for rival in rivals.found if observable in rival.scales)
+    floor = rivals.reference.uncertainties.get(observable, inf) / scale
+    points = []
+    for rival in rivals.found:
+        if not rival.rungs:
+            points.append(_without(rival, None, f"{rival.status}: {rival.reason}"))
+        for rung in rival.rungs:
+            points.append(_point(observable, rival, rung, times.get(id(rung)), rivals))
+    return ChartData(observable, floor, tuple(with_front(points, floor)))
+
+
+def _point(observable: str, rival: Rival, rung: Rung, timed: Timed | None, rivals: Rivals) -> ChartPoint:
+    if timed is None:
+        return _without(rival, rung, f"{rung.status}: {rung.message}")
+    if timed.failure or timed.first is None or not timed.samples:
+        return _without(rival, rung, timed.failure or "it was not timed")
+    errors = rival.errors(timed.first.times, timed.first.channels, rivals.reference)
+    if observable not in errors:
+        return _without(rival, rung, f"it does not offer {observable}, or not at the reference's times")
+    if not errors[observable] < inf:
+        return _without(rival, rung, "its error is no number")
+    solves = sorted(sample.solve_s for sample in timed.samples)
+    return ChartPoint(
+        variant=rival.job.variant,
+        engine=rival.job.engine,
+        integrator=rung.effort.method,
+        effort=rung.effort.label,
+        solve_s=solves[0],
+        quartiles_s=(_quantile(solves, 0.25), _quantile(solves, 0.75)),
+        error=errors[observable],
+    )
+
+
+def _without(rival: Rival, rung: Rung | None, message: str) -> ChartPoint:
+    """A point that has no error: a failure, for the margin of the chart."""
+    method, label = (rung.effort.method, rung.effort.label) if rung is not None else ("", "")
+    return ChartPoint(rival.job.variant, rival.job.engine, method, label, None, None, None, message)
+
+
+def _quantile(rising: Sequence[float], part: float) -> float:
+    place = part * (len(rising) - 1)
+    low = int(place)
+    high = min(low + 1, len(rising) - 1)
+    return rising[low] + (place - low) * (rising[high] - rising[low])
+
+
+def with_front(points: Sequence[ChartPoint], floor: float) -> list[ChartPoint]:
+    """The points in their order, with those marked that no faster one equals; below the floor none is better."""
+    smallest, front = inf, set()
+    timed = [each for each in points if each.solve_s is not None and each.error is not None]
+    for point in sorted(timed, key=lambda each: (each.solve_s, each.error)):
+        assert point.error is not None
+        error = max(point.error, floor)
+        if error < smallest:
+            smallest = error
+            front.add(id(point))
+    return [replace(each, best=True) if id(each) in front else each for each in points]

@@ -1,0 +1,35 @@
+"""What engines say of themselves for a timing report: their algorithm, and the settings that make a race fair."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from crosscheck.engines.answers import clean
+from crosscheck.running.execute import find_engine
+
+UNSAID = "it does not say with which settings it runs"
+
+
+@dataclass(frozen=True)
+class EngineFacts:
+    """An engine's `algorithm` ("" where it does not say) and its `settings`, in words."""
+
+    algorithm: str
+    settings: str
+
+
+def facts_of(names: Iterable[str], provider: str) -> dict[str, EngineFacts]:
+    """The facts of each engine by its name; an engine that cannot be made says nothing."""
+    return {name: _facts(name, provider) for name in names}
+
+
+def _facts(name: str, provider: str) -> EngineFacts:
+    try:
+        engine = find_engine(provider, name)
+        if isinstance(engine, str):
+            return EngineFacts("", engine)
+        algorithm, settings = (getattr(engine, what, "") for what in ("algorithm", "settings"))
+    except Exception as error:  # a plug-in may raise anything
+        return EngineFacts("", clean(f"it cannot be asked: {error}"))
+    return EngineFacts(clean(str(algorithm)), clean(str(settings)) or UNSAID)

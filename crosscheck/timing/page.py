@@ -1,0 +1,67 @@
+"""The files of charts: a folder for each case with its pictures, its data as JSON and a page, and an index of them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import msgspec
+from jinja2 import Environment, PackageLoader
+
+from crosscheck.records.machine import environment
+from crosscheck.timing.chart import CaseCharts
+from crosscheck.timing.picture import draw_chart
+from flexmb.output.printable import printable
+from flexmb.output.writing import folder, writing
+
+INDEX, DATA = "index.html", "charts.json"
+
+
+def write_case(charts: CaseCharts, out: Path) -> Path:
+    """Write the pictures, the data and the page of a case below `out`; returns the page."""
+    place = folder(out / folder_name(charts.case))
+    pictures = [f"{folder_name(chart.observable)}.svg" for chart in charts.charts]
+    for chart, name in zip(charts.charts, pictures, strict=True):
+        with writing(place / name):
+            draw_chart(charts, chart, place / name)
+    machine = environment((charts.case,))
+    _write(place / DATA, msgspec.json.format(msgspec.json.encode({"machine": machine, "charts": charts})))
+    drawn = list(zip(charts.charts, pictures, strict=True))
+    _write(place / INDEX, _page("case.html.j2", charts=charts, drawn=drawn, machine=machine))
+    return place / INDEX
+
+
+def write_index(cases: Sequence[CaseCharts], out: Path) -> Path:
+    """Write the page that leads to all cases; returns it."""
+    entries = [(each, folder_name(each.case)) for each in cases]
+    _write(folder(out) / INDEX, _page("cases.html.j2", entries=entries, machine=environment()))
+    return out / INDEX
+
+
+def folder_name(name: str) -> str:
+    """A name as a file or a folder can have it everywhere."""
+    return re.sub(r"[^\w.-]+", "_", name).strip(".") or "_"
+
+
+def _page(template: str, **content: Any) -> bytes:
+    return _templates().get_template(template).render(**content).encode()
+
+
+@cache
+def _templates() -> Environment:
+    """What they print is escaped, and without control characters."""
+    return Environment(
+        loader=PackageLoader("crosscheck.timing"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=lambda value: printable(value) if type(value) is str else value,
+    )
+
+
+def _write(file: Path, content: bytes) -> None:
+    with writing(file):
+        file.write_bytes(content)

@@ -1,0 +1,206 @@
+"""Rivals: who runs a case, how far each effort is from the stored reference, and whether its results may be compared.
+
+Nothing is timed before it is judged. Every engine climbs its efforts in a worker of its own, the usual way, and is
+held against `reference.csv` by the verdicts of any other run.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Literal
+
+import msgspec
+import numpy as np
+
+from crosscheck.engines.contract import Effort
+from crosscheck.judging.against_reference import ReferenceSignals, hold, of_record, shared_times
+from crosscheck.judging.results import Result, collect
+from crosscheck.judging.verdict import Finding
+from crosscheck.library.case import CaseError, RunFile, Variant
+from crosscheck.library.find import Case
+from crosscheck.records.archive import read
+from crosscheck.records.held import Asked, RecordedReference
+from crosscheck.records.kinds import RunRecord
+from crosscheck.running.held import held_reference
+from crosscheck.running.plan import Job, plan
+from crosscheck.running.scheduler import Limits
+from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from flexmb.run.channels import distance
+from flexmb.typing import Real
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One effort of a rival: how it ended, and its relative error in every channel that is judged, if it has one.
+
+    `solve_s` is the engine's own time of that single solve.
+    """
+
+    effort: Effort
+    status: str
+    message: str
+    solve_s: float
+    evaluations: int
+    errors: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def error(self) -> float:
+        """The largest of its errors; infinite where it has none."""
+        return max(self.errors.values(), default=np.inf)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """One engine on one variant: its efforts, coarse to fine, and what the verdicts say of the finest.
+
+    `status` is the worst of the verdicts' and `reason` one that explains it. `level` is that of the scene's bodies,
+    `compile_s` what the first compilation took, or the loading of kernels that a cache on disk holds.
+    """
+
+    job: Job
+    level: str
+    version: str
+    status: str
+    reason: str
+    compile_s: float
+    rungs: tuple[Rung, ...]
+    scales: Mapping[str, float]
+
+    @property
+    def name(self) -> str:
+        """How reports name it."""
+        return f"{self.job.variant} · {self.job.engine}"
+
+    def errors(self, times: Real, channels: Mapping[str, Real], reference: ReferenceSignals) -> dict[str, float]:
+        """Relative errors of signals (T, k) at `times` (T,) in the channels that are judged, those that it has."""
+        return _errors(times, channels, reference, self.scales)
+
+
+@dataclass(frozen=True)
+class Rivals:
+    """All rivals of a case, and the stored reference that they are held against."""
+
+    case: Case
+    variant: str
+    reference: ReferenceSignals
+    found: tuple[Rival, ...]
+
+
+ORDER = ("did not run", "crashed", "did not finish", "failed", "refused", "diverged", "differ", "unresolved", "agree")
+"""Statuses of verdicts from the worst; what an engine does not offer counts only where it offers nothing."""
+
+
+def find_rivals(
+    case: Case,
+    engines: Sequence[str] = (),
+    variants: Sequence[str] = (),
+    *,
+    provider: str = PROVIDER,
+    limits: Limits,
+    listener: Listener = lambda jobs, event: None,
+) -> Rivals:
+    """Run every engine (`engines`, by default those of the variants) and judge it by the case's reference.
+
+    `variants` are by default the one that the reference is of; all are held against it. CaseError where the case has no
+    reference that can be used, or no such variant.
+    """
+    held = _reference(case)
+    chosen = [_asked(case.run.variant(name), engines) for name in variants or (held.variant,)]
+    chosen = [variant for variant in chosen if variant.engines]
+    if not chosen:
+        raise CaseError(f"{case.name}: none of {', '.join(engines)} runs {', '.join(variants or (held.variant,))}")
+    reference = of_record(held)
+    run = RunFile(
+        title=case.run.title,
+        duration_s=case.run.duration_s,
+        samples=case.run.samples,
+        time_limit_s=case.run.time_limit_s,
+        variants=tuple(chosen),
+    )
+    record, jobs = plan(replace(case, run=run), (), provider, limits.time_s)
+    jobs = [replace(job, kept=tuple(reference.channels)) for job in jobs]
+    with TemporaryDirectory() as folder:
+        records = Path(folder) / "records.jsonl"
+        run_planned([(record, jobs)], (), records, limits=limits, listener=listener)
+        (results,) = collect(read(records)).cases
+    return Rivals(
+        case=case,
+        variant=held.variant,
+        reference=reference,
+        found=tuple(
+            _rival(job, record.variants[job.variant].level, results.get(job.variant, job.engine), reference, held)
+            for job in jobs
+        ),
+    )
+
+
+def _reference(case: Case) -> RecordedReference:
+    held = held_reference(case, case.run)
+    if held is None:
+        raise CaseError(f"{case.name}: no stored reference to hold rivals against: `crosscheck regenerate` makes it")
+    if held.fault:
+        raise CaseError(f"{case.name}: its stored reference cannot be used: {held.fault}")
+    return held
+
+
+def _asked(variant: Variant, engines: Sequence[str]) -> Variant:
+    """The variant with all its engines, charted ones too, or with those asked for; none is compared across models."""
+    everyone = tuple(engines) or (*variant.engines, *variant.also)
+    efforts = tuple(ladder for ladder in variant.efforts if ladder.engine in everyone)
+    return msgspec.structs.replace(variant, engines=everyone, also=(), efforts=efforts, refined=None)
+
+
+def _rival(job: Job, level: str, result: Result, reference: ReferenceSignals, held: RecordedReference) -> Rival:
+    asked = held.asked.get(job.engine) or _of_all(held)
+    findings = list(hold(result, reference, asked))
+    scales = {name: finding.scale for name, _, finding in findings if finding.scale is not None and finding.scale > 0.0}
+    offered = [finding for _, _, finding in findings if finding.status != "refused"] or [each[2] for each in findings]
+    worst = min(offered, key=_place, default=Finding("did not run", "nothing of it can be judged"))
+    return Rival(
+        job=job,
+        level=level,
+        version=result.runs[-1].version if result.runs else "",
+        status=worst.status,
+        reason=worst.reason,
+        compile_s=result.runs[0].compile_s if result.runs else 0.0,
+        rungs=tuple(_rung(run, result, reference, scales) for run in result.runs),
+        scales=scales,
+    )
+
+
+def _of_all(held: RecordedReference) -> Asked:
+    """What an engine is asked that no comparison expects to agree: what the first of the others is."""
+    return next(iter(held.asked.values()))
+
+
+def _place(finding: Finding) -> int:
+    return ORDER.index(finding.status) if finding.status in ORDER else 0
+
+
+def _rung(run: RunRecord, result: Result, reference: ReferenceSignals, scales: Mapping[str, float]) -> Rung:
+    errors: dict[str, float] = {}
+    if run.status == "finished" and result.status == "finished":
+        channels = {name: result.values(name, run) for name in run.channels}
+        errors = _errors(result.times, channels, reference, scales)
+    kind: Literal["tolerance", "step"] = "tolerance" if run.effort_kind == "tolerance" else "step"
+    effort = Effort(kind, run.effort_value, run.effort_method)
+    return Rung(effort, run.status, run.message, run.wall_s, run.evaluations, errors)
+
+
+def _errors(
+    times: Real, channels: Mapping[str, Real], reference: ReferenceSignals, scales: Mapping[str, float]
+) -> dict[str, float]:
+    """The largest distance up to the horizon over the size of the signal; infinite where it is no number."""
+    places = shared_times(reference.times, times)
+    if places is None:
+        return {}
+    found = {}
+    for name, scale in scales.items():
+        if name in channels and channels[name].shape[1:] == reference.channels[name].shape[1:]:
+            with np.errstate(over="ignore", invalid="ignore"):
+                apart = float(np.max(distance(name, channels[name][places], reference.channels[name]))) / scale
+            found[name] = apart if np.isfinite(apart) else np.inf
+    return found
