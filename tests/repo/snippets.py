@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 from tests.repo.project import ROOT
 
-PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md"))
+PAGES = sorted(page for page in (ROOT / "docs").rglob("*.md") if "engine-template" not in page.parts)
 BLOCK = re.compile(r"(?:<!-- not run: (?P<why>[^\n]+?) -->\n+)?^```(?P<language>\w+)\n(?P<code>.*?)^```$", re.M | re.S)
 
 
