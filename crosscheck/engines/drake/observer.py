@@ -59,9 +59,10 @@ class DrakeObserver:
         applied = self._loads.applied(t, plant.get_body_poses_output_port().Eval(context))
         forces = MultibodyForces(plant)
         plant.CalcForceElementsContribution(context, forces)  # gravity, springs and dampers
-        world = plant.world_frame()
         for load in applied:
-            plant.get_body(load.body_index).AddInForce(context, load.p_BoBq_B, load.F_Bq_W, world, forces)
+            body = plant.get_body(load.body_index)
+            arm = body.EvalPoseInWorld(context).rotation().matrix() @ load.p_BoBq_B
+            body.AddInForce(context, arm, load.F_Bq_W, plant.world_frame(), forces)
         needed = plant.CalcInverseDynamics(context, acceleration, forces) - tau
         named: dict[str, list[float]] = {}
         for slot in self._drives.slots:
