@@ -39,6 +39,7 @@ SIGNS = {
     "pin": "import pinocchio", "dask": "distributed import", "pytest-benchmark": "benchmark(", "pytest-xdist": "--dist",
     "import-linter": "importlinter.cli import", "ruff": '"ruff", "check"', "mypy": '"-m", "mypy"',
     "hatchling": '"hatchling", "build"', "pyyaml": "import yaml", "mutmut": "mutmut run",
+    "drake": "import pydrake",
 }  # fmt: skip
 EXTRAS = PYPROJECT["project"]["optional-dependencies"]
 

@@ -29,7 +29,11 @@ class JointActions:
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
         self._springs = [slot for slot in scalars if slot.freedom.stiffness < 0.0]
         self._dampers = [slot for slot in scalars if slot.freedom.damping < 0.0]
-        self._balls = [(k, slot) for k, slot in enumerate(tree.balls) if slot.freedom.stiffness or slot.freedom.damping < 0]
+        self._balls = [
+            (k, slot)
+            for k, slot in enumerate(tree.balls)
+            if slot.freedom.stiffness or slot.freedom.damping < 0.0
+        ]
         self._sprung = [slot for slot in scalars if slot.freedom.stiffness]
 
     def __bool__(self) -> bool:
@@ -116,7 +120,7 @@ class _NodeLoad:
 
 
 class DrakeActions(LeafSystem):
-    """The three above as a Drake system, whose outputs go into the plant that is integrated.
+    """Joint actions, drives and loads as a Drake system, whose outputs go into the plant that is integrated.
 
     `before_end` (s) caps the time seen by the functions, so that the last stage before a jump sees the limit from the
     left. `turned` are the inboard frames of the ball joints at present.

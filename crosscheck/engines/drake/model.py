@@ -43,7 +43,8 @@ class DrakeModel:
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         start = time.perf_counter()
-        states, evaluations, message = self._integrate(run.times, effort)
+        with np.errstate(over="ignore", invalid="ignore"):  # divergence is a status
+            states, evaluations, message = self._integrate(run.times, effort)
         wall = time.perf_counter() - start
         reached = run.times[: len(states)]
         status: Status = "finished" if len(states) == len(run.times) else "diverged"

@@ -1,4 +1,4 @@
-"""The scene's links as a `MultibodyPlant` in continuous time: every hinge a chain of elementary joints on massless bodies.
+"""The scene's links as a continuous `MultibodyPlant`: every hinge a chain of elementary joints on massless bodies.
 
 Conventions of Drake: quaternions wxyz; spatial vectors [angular; linear]; the velocities of ball and floating joints
 are those of the outboard frame in the *inboard* one, in inboard axes; a floating joint's coordinates are quaternion,
