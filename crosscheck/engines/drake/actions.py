@@ -12,7 +12,7 @@ from pydrake.systems.framework import BasicVector, Context, LeafSystem
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Ball, Scalar, attachment
+from crosscheck.engines.links import Scalar, attachment
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 

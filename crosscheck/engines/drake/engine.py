@@ -35,7 +35,7 @@ class DrakeEngine:
         return Support("no", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """Accuracies: bounds of the error of a step, absolute. That of a run of seconds is a thousand times as large."""
+        """Accuracies bound the error of one step, absolutely; that of a run is a thousand times as large."""
         return tuple(Effort("tolerance", accuracy, "runge_kutta5") for accuracy in (1e-8, 1e-10, 1e-12, 1e-13))
 
     def compile(self, scene: Scene) -> DrakeModel:

@@ -1,7 +1,8 @@
 """What the project promises of its engines at random states, pinned on the shipped cases and on random trees.
 
-Rigid variants: accelerations equal Pinocchio's, MuJoCo's and Drake's to 1e-10 and hinge loads to 1e-9. Level `full`: mass matrix
-and accelerations equal those of Exudyn's floating frame to 1e-9. Free flight equals Exudyn's explicit run to 1e-7.
+Rigid variants: accelerations equal Pinocchio's, MuJoCo's and Drake's to 1e-10 and hinge loads to 1e-9. Level `full`:
+mass matrix and accelerations equal those of Exudyn's floating frame to 1e-9. Free flight equals Exudyn's explicit run
+to 1e-7.
 """
 
 from __future__ import annotations
