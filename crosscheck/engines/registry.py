@@ -24,6 +24,7 @@ BUILT_IN = {
     "mujoco": "crosscheck.engines.mujoco:MujocoEngine",
     "exudyn": "crosscheck.engines.exudyn:ExudynEngine",
     "exudyn-beam": "crosscheck.engines.exudyn:ExudynBeamEngine",
+    "drake": "crosscheck.engines.drake:DrakeEngine",
 }
 # Engines whose compiled code is another's: what that one leaves in caches on disk serves them too.
 COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}

@@ -3,8 +3,9 @@
 In the reduced run file every comparison is an explicit pair, and `engines` of a variant include those of `also`.
 
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
-only these. An engine that the case does not name (a user's own, or a misspelt one) joins every variant that is compared
-engine by engine, and the variant of the stored reference; if it does not exist, that shows as *did not run*.
+only these. An engine that the case names in no variant (one of ours, a user's own, or a misspelt one) joins every
+variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, that shows as
+*did not run*. One that the case names stays where the case has put it.
 """
 
 from __future__ import annotations
@@ -14,7 +15,6 @@ from itertools import combinations
 
 import msgspec
 
-from crosscheck.engines.registry import BUILT_IN
 from crosscheck.library.case import Chart, Comparison, ComparisonSide, Conservation, Control, RunFile, Variant
 from flexmb.scene.problems import closest
 
@@ -120,8 +120,8 @@ def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
 
 
 def _foreign(run: RunFile, engine: str) -> bool:
-    """Whether the run file does not know an engine: it is neither ours nor one of its variants'."""
-    return engine not in BUILT_IN and all(engine not in _all(variant) for variant in run.variants)
+    """Whether the run file does not know an engine: none of its variants has it."""
+    return all(engine not in _all(variant) for variant in run.variants)
 
 
 def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:

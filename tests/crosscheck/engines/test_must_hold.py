@@ -1,7 +1,8 @@
 """What the project promises of its engines at random states, pinned on the shipped cases and on random trees.
 
-Rigid variants: accelerations equal Pinocchio's and MuJoCo's to 1e-10 and hinge loads to 1e-9. Level `full`: mass matrix
-and accelerations equal those of Exudyn's floating frame to 1e-9. Free flight equals Exudyn's explicit run to 1e-7.
+Rigid variants: accelerations equal Pinocchio's, MuJoCo's and Drake's to 1e-10 and hinge loads to 1e-9. Level `full`:
+mass matrix and accelerations equal those of Exudyn's floating frame to 1e-9. Free flight equals Exudyn's explicit run
+to 1e-7.
 """
 
 from __future__ import annotations
@@ -82,20 +83,20 @@ def compare_rigid(scene: s.Scene, name: str) -> None:
     compare_loads(scene, ours, theirs, LOAD)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])
 @pytest.mark.parametrize("path", CASES, ids=lambda path: "/".join(path.parts[-3:-1]))
 def test_rigid_variants_of_the_cases(path, name):
     compare_rigid(randomise(rigidify(flexmb.load_scene(path)), np.random.default_rng(0)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])
 @pytest.mark.parametrize(("kind", "seed"), RANDOM)
 def test_rigid_variants_of_random_flexible_trees(kind, seed, name):
     recipe = trees.FULL if kind == "grounded" else trees.FREE_FLYING
     compare_rigid(rigidify(trees.random_scene(seed, recipe)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])
 @pytest.mark.parametrize("seed", range(2))
 def test_finite_segments_of_a_beam(seed, name):
     """Sixteen stiff segments: a surrogate is a rigid tree like any other."""

@@ -120,14 +120,28 @@ def test_a_foreign_engine_joins_what_is_compared_engine_by_engine() -> None:
     assert all("mine" in pair for pair in pairs(run))
 
 
-def test_a_shipped_engine_that_the_case_leaves_out_stays_out() -> None:
-    run = msgspec.structs.replace(
+def left_out(engine: str, variants: tuple[str, ...]) -> RunFile:
+    """The example without an engine in some of its variants."""
+    return msgspec.structs.replace(
         example(),
         variants=tuple(
-            msgspec.structs.replace(v, engines=tuple(e for e in v.engines if e != "exudyn")) for v in example().variants
+            msgspec.structs.replace(v, engines=tuple(e for e in v.engines if e != engine)) if v.name in variants else v
+            for v in example().variants
         ),
     )
-    assert pairs(select(run, ("native", "exudyn"))) == set()
+
+
+def test_a_shipped_engine_that_the_case_does_not_name_joins_like_a_foreign_one() -> None:
+    nowhere = left_out("exudyn", tuple(variant.name for variant in example().variants))
+    assert ("native", "exudyn") in pairs(select(nowhere, ("native", "exudyn")))
+    assert not any("exudyn" in pair for pair in pairs(select(nowhere, ()))), "only when it is asked for"
+
+
+def test_a_shipped_engine_stays_out_of_a_variant_where_the_case_names_it_elsewhere() -> None:
+    """`native-frisch` runs beside variant "full" of the example, so that it joins nothing of variant "rigid"."""
+    assert "native-frisch" in example().variant("full").also
+    chosen = select(example(), ("native-frisch",)).variants
+    assert not any("native-frisch" in variant.engines for variant in chosen if variant.name == "rigid")
 
 
 def test_charts_follow_their_variants() -> None:

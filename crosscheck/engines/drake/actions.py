@@ -1,0 +1,155 @@
+"""What Drake's own elements do not give, as a system beside the plant: motors, drives, loads, balls' springs."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.common.value import Value
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.systems.framework import BasicVector, Context, LeafSystem
+
+from crosscheck.engines.conventions import quaternion_of, rotation_vector
+from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Scalar, attachment
+from flexmb.scene.schema import Load, Scene
+from flexmb.typing import Real
+
+
+class JointActions:
+    """Generalised forces (nv,) of motors, of balls' springs, and of negative springs and dampers.
+
+    `turned` are the inboard frames of the ball joints, as in `DrakeState`.
+    """
+
+    def __init__(self, tree: DrakeTree) -> None:
+        scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        self._nv = tree.plant.num_velocities()
+        self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
+        self._springs = [slot for slot in scalars if slot.freedom.stiffness < 0.0]
+        self._dampers = [slot for slot in scalars if slot.freedom.damping < 0.0]
+        self._balls = [
+            (k, slot)
+            for k, slot in enumerate(tree.balls)
+            if slot.freedom.stiffness or slot.freedom.damping < 0.0
+        ]
+        self._sprung = [slot for slot in scalars if slot.freedom.stiffness]
+
+    def __bool__(self) -> bool:
+        return bool(self._motors or self._springs or self._dampers or self._balls)
+
+    def forces(self, t: float, q: Real, v: Real, turned: tuple[Real, ...]) -> Real:
+        tau = np.zeros(self._nv)
+        for index, motor in self._motors:
+            tau[index] += motor(t).value
+        for slot in self._springs:
+            tau[slot.v] -= slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)
+        for slot in self._dampers:
+            tau[slot.v] -= slot.freedom.damping * v[slot.v]
+        for k, slot in self._balls:
+            # A rotation vector is the same in inboard and outboard axes; the joint's force is in those of its frame F.
+            turn = ball_rotation(slot, q) @ _ball_turn(slot, q, turned[k])
+            tau[slot.v : slot.v + 3] -= slot.freedom.stiffness * turn
+            tau[slot.v : slot.v + 3] -= min(slot.freedom.damping, 0.0) * v[slot.v : slot.v + 3]
+        return tau
+
+    def spring_energy(self, q: Real, turned: tuple[Real, ...]) -> float:
+        energy = sum(0.5 * slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest) ** 2 for slot in self._sprung)
+        for k, slot in self._balls:
+            turn = _ball_turn(slot, q, turned[k])
+            energy += 0.5 * slot.freedom.stiffness * (turn @ turn)
+        return float(energy)
+
+
+class Drives:
+    """The prescribed coordinates of a tree."""
+
+    def __init__(self, tree: DrakeTree) -> None:
+        self.slots: list[DrakeSlot] = [slot for slot in tree.slots if slot.driven]
+        self._motions = [(slot, profile(slot.freedom.prescribed)) for slot in self.slots]
+
+    def __bool__(self) -> bool:
+        return bool(self.slots)
+
+    def accelerate(self, t: float, tau: Real) -> None:
+        """Add to tau (nv,) what moves the rotors."""
+        for slot, motion in self._motions:
+            tau[slot.v] += BALLAST * motion(t).acceleration
+
+    def follow(self, t: float, q: Real, v: Real) -> None:
+        """Put the coordinates where their functions say, so that the integrator's error cannot pile up."""
+        for slot, motion in self._motions:
+            q[slot.q], v[slot.v], _ = motion(t)
+
+
+class NodeLoads:
+    """Forces and torques at nodes of bodies, in World axes at points of the bodies."""
+
+    def __init__(self, tree: DrakeTree, scene: Scene) -> None:
+        self._loads = [_NodeLoad(tree, scene, load) for load in scene.loads]
+
+    def __bool__(self) -> bool:
+        return bool(self._loads)
+
+    def applied(self, t: float, poses: list[RigidTransform]) -> list[ExternallyAppliedSpatialForce]:
+        """`poses` are X_WB of all bodies by their index."""
+        return [load.applied(t, poses) for load in self._loads]
+
+
+class _NodeLoad:
+    def __init__(self, tree: DrakeTree, scene: Scene, load: Load) -> None:
+        at = attachment(scene, tree.links, load)
+        self._body = tree.bodies[at.link].index()
+        self._point = at.frame.position
+        self._in_world = load.frame == "world"
+        direction = np.array(load.direction, dtype=float)
+        self._direction = direction if self._in_world else at.frame.rotation @ direction
+        self._is_force = load.type == "force"
+        self._size = profile(load.function)
+
+    def applied(self, t: float, poses: list[RigidTransform]) -> ExternallyAppliedSpatialForce:
+        R = poses[int(self._body)].rotation().matrix()
+        vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
+        nothing = np.zeros(3)
+        found = ExternallyAppliedSpatialForce()
+        found.body_index = self._body
+        found.p_BoBq_B = self._point
+        found.F_Bq_W = SpatialForce(nothing, vector) if self._is_force else SpatialForce(vector, nothing)
+        return found
+
+
+class DrakeActions(LeafSystem):
+    """Joint actions, drives and loads as a Drake system, whose outputs go into the plant that is integrated.
+
+    `before_end` (s) caps the time seen by the functions, so that the last stage before a jump sees the limit from the
+    left. `turned` are the inboard frames of the ball joints at present.
+    """
+
+    def __init__(self, tree: DrakeTree, joints: JointActions, drives: Drives, loads: NodeLoads) -> None:
+        super().__init__()
+        self.before_end = np.inf
+        self.turned: tuple[Real, ...] = ()
+        self._joints, self._drives, self._loads = joints, drives, loads
+        self._nq = tree.plant.num_positions()
+        states = tree.plant.num_multibody_states()
+        self.state = self.DeclareVectorInputPort("state", states)
+        self.poses = self.DeclareAbstractInputPort("poses", Value[list[RigidTransform]]())
+        self.forces = self.DeclareVectorOutputPort("forces", tree.plant.num_velocities(), self._give_forces)
+        wrenches = Value[list[ExternallyAppliedSpatialForce]]
+        self.wrenches = self.DeclareAbstractOutputPort("wrenches", wrenches, self._give_wrenches)
+
+    def _give_forces(self, context: Context, output: BasicVector) -> None:
+        t, state = min(context.get_time(), self.before_end), self.state.Eval(context)
+        tau = self._joints.forces(t, state[: self._nq], state[self._nq :], self.turned)
+        self._drives.accelerate(t, tau)
+        output.SetFromVector(tau)
+
+    def _give_wrenches(self, context: Context, output: object) -> None:
+        t = min(context.get_time(), self.before_end)
+        output.set_value(self._loads.applied(t, self.poses.Eval(context)))
+
+
+def _ball_turn(slot: DrakeSlot, q: Real, frame: Real) -> Real:
+    """Rotation vector (3,) of a ball joint, from the hinge's inboard frame to its outboard one."""
+    return rotation_vector(quaternion_of(slot.link.inboard.rotation.T @ frame @ ball_rotation(slot, q)))

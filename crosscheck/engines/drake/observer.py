@@ -1,0 +1,100 @@
+"""From a state of the plant to what engines exchange: World axes, angular first, scalar-first."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.multibody.tree import MultibodyForces
+
+from crosscheck.engines.contract import MarkerSnapshot, Snapshot
+from crosscheck.engines.conventions import cross, quaternion_of
+from crosscheck.engines.drake.actions import Drives, JointActions, NodeLoads
+from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
+from crosscheck.engines.links import Attachment, attachment
+from flexmb.scene.schema import Scene
+from flexmb.typing import Real
+
+
+class DrakeObserver:
+    """Reads a plant without rotors: Drake counts theirs in energies and inverse dynamics.
+
+    Drake's reaction is what a joint's constraint and its forces together do to the child body, about the child's frame
+    and in its axes, which here are those of the link.
+    """
+
+    def __init__(self, tree: DrakeTree, scene: Scene) -> None:
+        self._tree = tree
+        self._context = tree.plant.CreateDefaultContext()
+        self._joints, self._drives, self._loads = JointActions(tree), Drives(tree), NodeLoads(tree, scene)
+        self._gravity = np.array(scene.gravity_m_s2, dtype=float)
+        self._names = [(link.kind, link.joint) for link in tree.links]
+        self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
+
+    def observe(self, t: float, state: DrakeState, acceleration: Real) -> Snapshot:
+        """`acceleration` (nv,) is that of the plant with rotors in the same state."""
+        plant, context = self._tree.plant, self._context
+        context.SetTime(t)
+        place(self._tree, context, state)
+        drives = self._act(t, state, acceleration)
+        loads = dict(zip(self._names, self._reactions(), strict=True))
+        momentum = plant.CalcSpatialMomentumInWorldAboutPoint(context, np.zeros(3))
+        centre = plant.CalcCenterOfMassPositionInWorld(context)
+        return Snapshot(
+            markers={name: self._marker(at) for name, at in self._markers.items()},
+            loads={name: load for (kind, name), load in loads.items() if kind == "body"},
+            wheel_loads={name: load for (kind, name), load in loads.items() if kind == "wheel"},
+            drives=drives,
+            energy={
+                "kinetic": plant.CalcKineticEnergy(context),
+                "strain": 0.0,
+                "spring": self._joints.spring_energy(state.q, state.turned),
+                "gravity": -float(plant.CalcTotalMass(context) * (centre @ self._gravity)),
+            },
+            momentum=np.concatenate([momentum.rotational(), momentum.translational()]),
+        )
+
+    def _act(self, t: float, state: DrakeState, acceleration: Real) -> dict[str, Real]:
+        """Apply motors, loads and drives to the plant; the drives, by joint name, from inverse dynamics."""
+        plant, context = self._tree.plant, self._context
+        tau = self._joints.forces(t, state.q, state.v, state.turned)
+        applied = self._loads.applied(t, plant.get_body_poses_output_port().Eval(context))
+        forces = MultibodyForces(plant)
+        plant.CalcForceElementsContribution(context, forces)  # gravity, springs and dampers
+        for load in applied:
+            body = plant.get_body(load.body_index)
+            arm = body.EvalPoseInWorld(context).rotation().matrix() @ load.p_BoBq_B
+            body.AddInForce(context, arm, load.F_Bq_W, plant.world_frame(), forces)
+        needed = plant.CalcInverseDynamics(context, acceleration, forces) - tau
+        named: dict[str, list[float]] = {}
+        for slot in self._drives.slots:
+            named.setdefault(slot.link.joint, []).append(float(needed[slot.v]))
+            tau[slot.v] += needed[slot.v]
+        plant.get_applied_generalized_force_input_port().FixValue(context, tau)
+        plant.get_applied_spatial_force_input_port().FixValue(context, applied)
+        return {name: np.array(values) for name, values in named.items()}
+
+    def _reactions(self) -> list[Real]:
+        """[torque; force] (6,) on every link about its frame's origin."""
+        plant, context = self._tree.plant, self._context
+        reactions = plant.get_reaction_forces_output_port().Eval(context)
+        found = []
+        for body, joint in zip(self._tree.bodies, self._tree.joints, strict=True):
+            R = body.EvalPoseInWorld(context).rotation().matrix()
+            load = reactions[int(joint.index())]
+            found.append(np.concatenate([R @ load.rotational(), R @ load.translational()]))
+        return found
+
+    def _marker(self, at: Attachment) -> MarkerSnapshot:
+        body, context = self._tree.bodies[at.link], self._context
+        pose = body.EvalPoseInWorld(context)
+        R = pose.rotation().matrix()
+        arm = R @ at.frame.position
+        velocity, acceleration = body.EvalSpatialVelocityInWorld(context), body.EvalSpatialAccelerationInWorld(context)
+        w, alpha = velocity.rotational(), acceleration.rotational()
+        v = velocity.translational() + cross(w, arm)
+        a = acceleration.translational() + cross(alpha, arm) + cross(w, cross(w, arm))
+        return MarkerSnapshot(
+            position=pose.translation() + arm,
+            quaternion=quaternion_of(R @ at.frame.rotation),
+            velocity=np.concatenate([w, v]),
+            acceleration=np.concatenate([alpha, a]),
+        )
