@@ -83,11 +83,11 @@ class Drives:
             q[slot.q], v[slot.v], _ = motion(t)
 
 
-class NodeLoads:
+class DrakeLoads:
     """Forces and torques at nodes of bodies, in World axes at points of the bodies."""
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
-        self._loads = [_NodeLoad(tree, scene, load) for load in scene.loads]
+        self._loads = [_DrakeLoad(tree, scene, load) for load in scene.loads]
 
     def __bool__(self) -> bool:
         return bool(self._loads)
@@ -97,7 +97,7 @@ class NodeLoads:
         return [load.applied(t, poses) for load in self._loads]
 
 
-class _NodeLoad:
+class _DrakeLoad:
     def __init__(self, tree: DrakeTree, scene: Scene, load: Load) -> None:
         at = attachment(scene, tree.links, load)
         self._body = tree.bodies[at.link].index()
@@ -126,7 +126,7 @@ class DrakeActions(LeafSystem):
     left. `turned` are the inboard frames of the ball joints at present.
     """
 
-    def __init__(self, tree: DrakeTree, joints: JointActions, drives: Drives, loads: NodeLoads) -> None:
+    def __init__(self, tree: DrakeTree, joints: JointActions, drives: Drives, loads: DrakeLoads) -> None:
         super().__init__()
         self.before_end = np.inf
         self.turned: tuple[Real, ...] = ()

@@ -10,7 +10,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, EventStatus
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
-from crosscheck.engines.drake.actions import DrakeActions, Drives, JointActions, NodeLoads
+from crosscheck.engines.drake.actions import DrakeActions, Drives, JointActions, DrakeLoads
 from crosscheck.engines.drake.observer import DrakeObserver
 from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state, place, recentred
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions
@@ -27,7 +27,7 @@ class DrakeModel:
         chain = links(scene)
         self._tree = build_tree(scene, chain, ballasted=True)
         self._drives = Drives(self._tree)
-        joints, loads = JointActions(self._tree), NodeLoads(self._tree, scene)
+        joints, loads = JointActions(self._tree), DrakeLoads(self._tree, scene)
         self._actions = DrakeActions(self._tree, joints, self._drives, loads)
         self._diagram = self._connected(bool(joints or self._drives), bool(loads))
         self._observer = DrakeObserver(build_tree(scene, chain, ballasted=False), scene)

@@ -7,7 +7,7 @@ from pydrake.multibody.tree import MultibodyForces
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of
-from crosscheck.engines.drake.actions import Drives, JointActions, NodeLoads
+from crosscheck.engines.drake.actions import Drives, JointActions, DrakeLoads
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
 from crosscheck.engines.links import Attachment, attachment
 from flexmb.scene.schema import Scene
@@ -24,7 +24,7 @@ class DrakeObserver:
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._tree = tree
         self._context = tree.plant.CreateDefaultContext()
-        self._joints, self._drives, self._loads = JointActions(tree), Drives(tree), NodeLoads(tree, scene)
+        self._joints, self._drives, self._loads = JointActions(tree), Drives(tree), DrakeLoads(tree, scene)
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._names = [(link.kind, link.joint) for link in tree.links]
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
