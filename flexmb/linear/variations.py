@@ -27,6 +27,7 @@ from flexmb.tables.arrays import Constants
 from flexmb.tables.functions import pack as pack_functions
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.tables.status import OK, Status
+from flexmb.tables.workspaces import workspace
 from flexmb.typing import Index, Real, Record
 
 
@@ -69,7 +70,7 @@ class Equations:
         indifferent = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         self.movable: Index = np.flatnonzero(~np.isin(self.free, indifferent))
         self._w = tangent_workspace(self.constants, system.nq, system.nu)
-        self._real_w = system.workspace()
+        self._real_w = workspace(self.constants, system.nq, system.nu)  # with a row for each of their functions
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""
@@ -89,7 +90,7 @@ class Equations:
         return Equations(self.system, replace(self.constants, function=rows, table=table, speed=speed))
 
     def _constant_functions(self, t: float) -> list[Function]:
-        w = self.system.workspace()
+        w = self._real_w
         articulated.accelerations(t, pack(self.system.initial_state), self.constants, w)  # fills in the functions
         return [Constant(value=float(value)) for value in w.function[:, 0]]
 
