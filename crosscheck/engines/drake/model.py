@@ -10,7 +10,7 @@ from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorC
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder, EventStatus
 
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
-from crosscheck.engines.drake.actions import DrakeActions, Drives, JointActions, DrakeLoads
+from crosscheck.engines.drake.actions import DrakeActions, DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.observer import DrakeObserver
 from crosscheck.engines.drake.tree import DrakeState, build_tree, initial_state, place, recentred
 from crosscheck.engines.functions_of_time import breaks_between, scene_functions

@@ -7,7 +7,7 @@ from pydrake.multibody.tree import MultibodyForces
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import cross, quaternion_of
-from crosscheck.engines.drake.actions import Drives, JointActions, DrakeLoads
+from crosscheck.engines.drake.actions import DrakeLoads, Drives, JointActions
 from crosscheck.engines.drake.tree import DrakeState, DrakeTree, place
 from crosscheck.engines.links import Attachment, attachment
 from flexmb.scene.schema import Scene

@@ -16,7 +16,7 @@ from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures
-from crosscheck.engines.pinocchio.forces import JointForces, NodeLoads
+from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -46,7 +46,7 @@ class Dynamics:
         self.tree = tree
         self.data = tree.model.createData()
         self.forces = JointForces(tree)
-        self.loads = NodeLoads(tree, scene)
+        self.loads = PlacedLoads(tree, scene)
         self.closures = PinocchioClosures(tree, scene)
         self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]

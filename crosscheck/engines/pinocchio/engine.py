@@ -11,6 +11,9 @@ from flexmb.scene.schema import Scene
 if TYPE_CHECKING:
     from crosscheck.engines.pinocchio.model import PinocchioModel
 
+MOST_JOINTS = 500
+WHY_NOT_MORE = "Pinocchio's data hold arrays of n x n x n numbers for n speeds, and more than 20 GB for 1000"
+
 
 class PinocchioEngine:
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
@@ -32,6 +35,8 @@ class PinocchioEngine:
         return pinocchio.__version__
 
     def supports(self, scene: Scene) -> Support:
+        if len(scene.hinges) > MOST_JOINTS:
+            return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
         reason = obstacle(scene, "Pinocchio", ("weld", "spherical")) or (scene.closures and _beside_closures(scene))
         return Support("no", reason) if reason else Support("exact")
 

@@ -58,7 +58,7 @@ class JointForces:
         return float(energy)
 
 
-class NodeLoads:
+class PlacedLoads:
     """Loads at nodes as wrenches on the joints, in joint axes; needs the kinematics of `data` to be up to date."""
 
     def __init__(self, tree: PinocchioTree, scene: Scene) -> None:

@@ -43,5 +43,5 @@ def test_every_snippet_of_the_page_runs(tmp_path, monkeypatch):
         "run/trajectory.npz",
     ):
         assert (tmp_path / name).stat().st_size > 500, name
-    assert (tmp_path / "run" / "trajectory.rrd").exists() == viewer
+    assert (tmp_path / "swing.rrd").exists() == viewer
     assert (tmp_path / "strip.sid").read_text() == (tmp_path / "again.sid").read_text()

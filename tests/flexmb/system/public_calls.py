@@ -294,7 +294,10 @@ EXEMPT = {
     "System.workspace", "System.recursion_workspace", "System.composite_workspace", "NestedSystem.workspace",  # nothing
     "System.fault_name", "ClosedSystem.fault_name",  # of the status of a kernel
     "Trajectory.columns", "LinearModel.to_scipy", "LinearModel.to_control",  # nothing
-    "Trajectory.to_csv", "Trajectory.plot", "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
+    "Trajectory.to_csv", "Trajectory.plot", "Trajectory.to_npz", "Trajectory.to_parquet",  # a path
+    "Trajectory.to_rerun",  # a path
+    "Trajectory.to_pandas", "Trajectory.to_xarray",  # nothing
+    "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise", "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",
     "ClosedSystem.coordinate", "ClosedSystem.speed", "ClosedSystem.state",
