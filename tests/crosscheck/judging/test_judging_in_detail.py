@@ -197,6 +197,8 @@ def test_why_there_is_nothing_to_compare(a: Signal, b: Signal, scale: float | No
         (values(0.0, 0.0, sizes=(0.0, 0.25)), values(0.0, 0.0, sizes=(0.0,)), 0.25),
         (values(0.0, 0.5, doubt=0.5), values(0.0, 0.5, sizes=(4.0,)), 4.0),
         (values(0.0, 0.5, doubt=0.5), values(0.0, 0.25, sizes=(0.125,)), 0.5),
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**24,)), 0.5),
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**25,)), 2.0**25),  # 2^-26 of its family: it is rounding
     ],
 )
 def test_a_signal_that_is_zero_within_its_doubt_is_measured_by_its_family(a: Signal, b: Signal, size: float) -> None:
@@ -215,15 +217,36 @@ def result(text: str, runs: list, variant: str = "rigid", engine: str = "one") -
     return results(text, runs).get(variant, engine)
 
 
-def test_a_torque_that_vanishes_is_measured_by_forces_at_distances() -> None:
-    """No torque anywhere, a force of 10 N, 2 m away: 20 Nm is the size; without a force there is none."""
-    none, force = np.zeros((len(TIMES), 3)), way(10.0)
-    signals = {"load:pivot.torque": none, "load:pivot.force": force, TIP: way(2.0)}
-    sizes = result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.torque", False).sizes
-    assert np.allclose(sizes, (0.0, 20.0), rtol=1e-5)
-    assert len(result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.force", False).sizes) == 1
-    alone = result(ONE_PAIR, ladder("one", {"load:pivot.torque": none}))
-    assert alone.signal("load:pivot.torque", False).sizes == (0.0, 0.0)
+FLIGHT = {  # 3 m/s, 2 rad/s and 12 J, 1.5 m from the origin
+    "marker:tip.position": way(1.5),
+    "marker:tip.velocity": way(3.0),
+    "marker:tip.angular_velocity": way(2.0),
+    "energy.kinetic": way(12.0)[:, :1],
+}
+
+
+@pytest.mark.parametrize(
+    ("signals", "channel", "size"),
+    [
+        ({"load:pivot.force": way(10.0), TIP: way(2.0)}, "load:pivot.torque", 20.0),
+        ({"load:pivot.torque": way(10.0), TIP: way(2.0)}, "load:pivot.force", 5.0),
+        (FLIGHT, "momentum.linear", 8.0),
+        (FLIGHT, "momentum.angular", 12.0),
+        ({name: FLIGHT[name] for name in FLIGHT if "angular" not in name}, "marker:tip.angular_velocity", 2.0),
+        ({name: FLIGHT[name] for name in FLIGHT if ".velocity" not in name}, "marker:tip.velocity", 3.0),
+        ({}, "marker:tip.orientation", 1.0),
+        ({}, "momentum.linear", 0.0),
+        ({}, "load:pivot.force", 0.0),
+        ({}, "drive:pivot", 0.0),
+    ],
+)
+def test_a_family_that_vanishes_is_measured_by_the_scene(signals: dict, channel: str, size: float) -> None:
+    """Twice the kinetic energy over a speed is a momentum, a torque over a length a force; of nothing comes nothing."""
+    rest = np.zeros((len(TIMES), 3))
+    if channel.endswith(".orientation"):
+        rest = np.tile([1.0, 0.0, 0.0, 0.0], (len(TIMES), 1))
+    sizes = result(ONE_PAIR, ladder("one", signals | {channel: rest})).signal(channel, False).sizes
+    assert np.allclose(sizes, (0.0, size), rtol=1e-5)
 
 
 def test_spatial_doubt_is_added_over_time() -> None:
