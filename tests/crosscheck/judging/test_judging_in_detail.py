@@ -71,7 +71,7 @@ def test_a_control_says_all_of_itself() -> None:
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
     assert np.isclose(control.E, 0.5 / 4.0, rtol=1e-4)
-    assert np.isclose(control.U, 2 * 9e-6 / 4.0, rtol=1e-3)
+    assert np.isclose(control.U, 3 * 2 * 9e-6 / 4.0, rtol=1e-3)
 
 
 def test_a_control_of_the_whole_scene_says_so_and_needs_its_runs() -> None:
@@ -106,7 +106,7 @@ def test_a_comparison_says_all_of_itself() -> None:
         "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5}, "worse": "",
         "expected_reason": "",
     }  # fmt: skip
-    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+    assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
     other = single(judged(ONE_PAIR + 'reason = "why"\n', [*runs[:3], *ladder("two", {TIP: way(2.0)})]))
     assert (other.status, other.outside, other.expected_reason) == ("differ", "", "why")
 
@@ -264,7 +264,7 @@ engines = ["one"]
     extra = spatial(TIP, way(), way(1.01), 3.0, 1.0)
     assert np.allclose(doubt.envelope, own.envelope + extra, rtol=1e-3)
     assert (doubt.value, doubt.order) == (doubt.envelope[-1], own.order)
-    assert doubt.how == "difference of the two finest tolerances; spatial refinement"
+    assert doubt.how == "3 x the difference of the two finest tolerances; spatial refinement"
     assert np.isclose(extra[-1], 1.25 * 1.5 * 0.01, rtol=1e-3)
 
 
@@ -397,7 +397,7 @@ def test_bounds_are_held_against_what_was_expected_alone() -> None:
     text = ONE_PAIR + 'expect = "differ"\nreason = "why"\nband = { "marker:tip" = [0.1, 1.0] }\n'
     verdict = single(judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
     assert (verdict.status, verdict.outside, verdict.ok) == ("agree", "", False)
-    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+    assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
 
 
 @pytest.mark.parametrize(
