@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.interruption import Interrupted
+    from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
     from flexmb.run.trajectory import Trajectory
@@ -51,6 +52,7 @@ _LATER = {
     "LinearModel": "flexmb.linear.linear_model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
+    "Restart": "flexmb.run.restart",
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
@@ -68,7 +70,7 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
+    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
     "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
     "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin",
     *schema.__all__,

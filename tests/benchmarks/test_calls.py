@@ -68,7 +68,7 @@ def test_a_run_besides_its_steps(benchmark, method, samples):
 
         def steps() -> None:
             counts[:] = 0
-            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts)
+            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts, settings.integrator.memory(len(out[0])), None)
 
         found = np.array([[_wall(whole), _wall(steps)] for _ in range(100)])
     besides = float(np.percentile(found[:, 0] - found[:, 1], 20))
