@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexmb.run import exports
+from flexmb.run.joining import joined
 from flexmb.run.restart import Restart
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
@@ -103,6 +104,15 @@ class Trajectory:
         """The same by the names of coordinates and speeds, for a scene that shares some of them."""
         values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
         return {name: float(value) for (name, _), value in values}
+
+    def then(self, later: Trajectory) -> Trajectory:
+        """This run and a later one as one: output times of this one, as far as the later one does not have them.
+
+        Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
+        them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        the last time of this one.
+        """
+        return joined(self, later)
 
     @property
     def total_energy(self) -> Real:

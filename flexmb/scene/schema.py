@@ -6,7 +6,8 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from flexmb.scene.bodies import (
     ZERO,
@@ -44,6 +45,7 @@ from flexmb.scene.hinges import (
     Universal,
     Weld,
 )
+from flexmb.scene.values import with_values
 
 
 class Wheel(SceneStruct, frozen=True, kw_only=True):
@@ -127,6 +129,14 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
+
+        Paths go by keys, items by their name, number or `*` for all: see `flexmb.scene.values.with_values`. Raises
+        PathError, a ValueError, for a path that leads to nothing, and for a value of another kind.
+        """
+        return with_values(self, values)
 
 
 __all__ = [
