@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
-    from flexmb.run.stages import Stage, simulate_stages
+    from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.system.batch import Batch, compile_batch
     from flexmb.system.compile import compile
@@ -57,7 +57,7 @@ _LATER = {
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
     "simulate_stages": "flexmb.run.stages",
-    "Stage": "flexmb.run.stages",
+    "RunStage": "flexmb.run.stages",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
     "Batch": "flexmb.system.batch",
     "compile_batch": "flexmb.system.batch",
@@ -73,9 +73,10 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "SceneBuilder", "SceneError", "Stage", "State", "Status", "SteadySpin",
-    "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
-    "load_scene", "save_scene", "simulate", "simulate_batch", "simulate_stages", "steady_spin",
+    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError", "State",
+    "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch",
+    "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "simulate_batch", "simulate_stages",
+    "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 

@@ -39,7 +39,8 @@ def flow(system: System, start: Real, time: float) -> Real:
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
     counts, accuracy = np.zeros(COUNTS, np.int64), Accuracy(RTOL, ATOL, system.nq + system.nu, MAX_STEPS)
     equations = recursion(system.recursion_constants, system.recursion_workspace())
-    status, _ = dop853(equations, start.copy(), Clock(times, times[1:]), accuracy, out, counts, memory(len(start), 0), None)
+    clock, begins = Clock(times, times[1:]), memory(len(start), 0)
+    status, _ = dop853(equations, start.copy(), clock, accuracy, out, counts, begins, None)
     if status != OK:
         raise StoppedError(Status(status))
     return np.asarray(out[1])

@@ -259,6 +259,7 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
 
 
 INTEGRATOR = Integrator(
-    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True, pauses=False, damps=True, algebra=(2.0 / 3.0, 2.0),
+    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True, pauses=False,
+    damps=True, algebra=(2.0 / 3.0, 2.0),
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

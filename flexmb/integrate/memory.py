@@ -17,8 +17,8 @@ from flexmb.typing import Real
 
 # Entries of `numbers`: whether a run is taken up; the time of y; the next step and the error norm of the last one, and
 # whether it was rejected; of methods of equal steps, the start of the stretch and how many of its steps are done; of
-# methods with Jacobians, the step of the factors and the step before, 0 for none, whether the Jacobian is to be renewed,
-# and whether it is of this place.
+# methods with Jacobians, the step of the factors and the step before, 0 for none, whether the Jacobian is to be
+# renewed, and whether it is of this place.
 (
     TAKEN_UP, TIME, STEP, ERROR_BEFORE, RETRIED, STRETCH, DONE, FACTORED, STEP_BEFORE, RENEW, FRESH,
 ) = range(11)  # fmt: skip

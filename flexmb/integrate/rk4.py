@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, all_finite, copy, derivative, permitted, stretch
+from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, all_finite, copy, derivative, permitted, stretch
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
 from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed
@@ -40,12 +40,13 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
 
 
 @helper
-def end_at_crossing(problem, t, last, y, h, k, trial, counts, watch):
-    """y at the first level that a step of size h crosses, by shorter steps from the same start.
+def end_at_crossing(problem, step, y, k, trial, counts, watch):
+    """y at the first level that a step crosses, by shorter steps from the same start.
 
     The regula falsi of Illinois for each level; a shorter step is as accurate as the whole one. Returns (status, the
     time): CROSSED, or the status of a stage that fails.
     """
+    t, last, h = step.start, step.last, step.end - step.start
     whole, shortest = trial.copy(), h
     for i in range(watch.entry.shape[0]):
         if crosses_one(watch, i, y, whole):
@@ -102,7 +103,7 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                 if status != OK:
                     return status, t
                 if watch is not None and is_crossed(watch, y, trial):
-                    return end_at_crossing(problem, t, last, y, h, k, trial, counts, watch)
+                    return end_at_crossing(problem, Interval(t, t + h, last), y, k, trial, counts, watch)
                 t = end if j == steps - 1 else start + (j + 1) * h
                 copy(trial, y)
                 problem.project(t, y, problem.constants)

@@ -20,8 +20,8 @@ Given = State | Restart | Values | None
 SAME = 1e-9  # relative difference of a value that is given and one that a prescribed motion has
 
 
-class Origin(NamedTuple):
-    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; memory: of a run taken up."""
+class Beginning(NamedTuple):
+    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; memory: of one taken up."""
 
     state: State
     y: Real
@@ -42,7 +42,7 @@ def start_time(t_start: float | None, state: Given) -> float:
     return t_start
 
 
-def origin(system: System, t: float, state: Given, method: str) -> Origin:
+def origin(system: System, t: float, state: Given, method: str) -> Beginning:
     """What a run by this method begins with at time t (s).
 
     ValueError for a restart of another scene or method, for values that do not belong to the scene or contradict its
@@ -59,17 +59,17 @@ def origin(system: System, t: float, state: Given, method: str) -> Origin:
         found = _named(system, t, state)
     else:
         raise TypeError(f"state is {type(state).__name__}: give a State, a Restart, or values by name")
-    return Origin(found, found.y.copy(), None)
+    return Beginning(found, found.y.copy(), None)
 
 
-def _taken_up(system: System, restart: Restart, method: str) -> Origin:
+def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
     remedy = "; to start from its last state instead, give the state `last_state` of its trajectory"
     if restart.method != method:
         raise ValueError(f'the run that is taken up was by method "{restart.method}": give the same{remedy}')
     if restart.scene != system.scene:
         raise ValueError(f'the run that is taken up was of scene "{restart.scene.name}" with other contents{remedy}')
     t, y = system.layout.whole(restart.since, restart.memory.y.copy())
-    return Origin(system.layout.known(t, np.r_[y[:-1], 0.0]), y, restart.taken_up())
+    return Beginning(system.layout.known(t, np.r_[y[:-1], 0.0]), y, restart.taken_up())
 
 
 def _named(system: System, t: float, values: Values) -> State:

@@ -13,21 +13,21 @@ from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory
-from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
+from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import batch
-from flexmb.run.origin import Origin
+from flexmb.run.origin import Beginning
 from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 
 class Raw(NamedTuple):
@@ -110,7 +110,7 @@ def integration(
 
 
 def integrate(
-    system: System, solve: Integration, begin: Origin, times: Real, settings: Settings, watch: Watch | None = None
+    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None
 ) -> Raw:
     """Run over the whole time, after what has to be compiled for it."""
     method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)

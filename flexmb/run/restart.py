@@ -13,7 +13,6 @@ from flexmb.integrate.catalogue import integrator
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import NUMBERS, TAKEN_UP, TIME, Memory
 from flexmb.scene.schema import Scene
-from flexmb.typing import Real
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,10 +20,10 @@ class Restart:
     """Where a run ended, and what its method knew then: `simulate(scene, t_end, method, state=restart)` takes it up.
 
     The runs before and after it are, to the last bit, one that had never ended, whatever the method. It asks for the
-    same scene, method and settings; of methods that take equal steps also for the same output times, between which they
-    divide the time. Methods that adapt their steps cut the last one short where a run ends: they are taken up at `since`
-    (s), from where that step began, and output times of the second run may begin at any time from there to `t`. By
-    default they begin at `t` (s), where the run ended. Closed chains choose the independent rows of their closures
+    same scene, method and settings; of methods that take equal steps also for the same output times, between which
+    they divide the time. Methods that adapt their steps cut the last one short where a run ends: they are taken up at
+    `since` (s), where that step began, and output times of the second run may begin at any time from there to `t` (s),
+    where the run ended and where they begin by default. Closed chains choose the independent rows of their closures
     anew, and are the same unless two choices are equally good.
     """
 

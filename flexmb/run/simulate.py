@@ -16,7 +16,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
 from flexmb.run.observing import Sampler, observe
-from flexmb.run.origin import Origin, Values, origin, start_time
+from flexmb.run.origin import Beginning, Values, origin, start_time
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
@@ -70,12 +70,12 @@ def simulate(
     equal steps and damps the modes that they do not resolve, by `spectral_radius` from 1 (no damping) to 0 (all in one
     step), 0.8 if left out; rtol and atol bound the remaining error of its Newton iterations. See docs/integrators.md.
     max_steps: a run of more steps stops, 1,000,000 if left out. samples: how many equally spaced output times, both
-    ends included, or the times themselves, from start to end. algorithm: "articulated", the O(N) recursion; "composite",
-    the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which take bodies
-    of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how closures are kept
-    closed. 0: after every step coordinates and speeds are projected back to where all closures are closed, to 1e-13 of
-    the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0 (Baumgarte), which
-    costs less and leaves a drift; k times the step should stay below 1.
+    ends included, or the times themselves, from start to end. algorithm: "articulated", the O(N) recursion;
+    "composite", the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which
+    take bodies of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how
+    closures are kept closed. 0: after every step coordinates and speeds are projected back to where all closures are
+    closed, to 1e-13 of the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0
+    (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
 
     t_start (s), any finite time, which functions of time know: 0 or the state's own if left out. state: a `State`, such
     as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being the scene's: names as in
@@ -85,10 +85,10 @@ def simulate(
 
     Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
     not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion, or the state that is given is far from it. A run that fails raises nothing: `status` and `message` of the
-    trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run at its next step and raises
-    `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a second Ctrl-C while their
-    outputs are evaluated keeps those that are finished.
+    closes the closures or they leave no motion, or the state that is given is far from it. A run that fails raises
+    nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
+    ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
+    to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
     """
     refuse_unknown("simulate", settings)
     t_end, t = _end(t_end), start_time(t_start, state)
@@ -148,7 +148,7 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _not_begun(begin: Origin, start: Precision, settings: Settings) -> Raw:
+def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
     """The result of a run whose first state has no accelerations."""
     nothing, memory = np.empty((0, len(begin.y))), settings.integrator.memory(len(begin.y))
     return Raw(

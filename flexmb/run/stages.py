@@ -17,7 +17,7 @@ from flexmb.tables import arguments
 
 
 @dataclass(frozen=True)
-class Stage:
+class RunStage:
     """So long (s), and what is different from the stage before: another scene, other values in it, or nothing.
 
     values: see `Scene.with_values`; they stay in the stages that follow. samples: number of output times, both ends
@@ -32,7 +32,7 @@ class Stage:
 
 def simulate_stages(
     scene: Scene,
-    stages: Sequence[Stage],
+    stages: Sequence[RunStage],
     method: Method = "dop853",
     *,
     t_start: float | None = None,
@@ -66,7 +66,7 @@ def simulate_stages(
     return whole
 
 
-def _systems(scene: Scene, stages: Sequence[Stage]) -> list[System]:
+def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
     """Of all stages, which fit each other; a scene that does not change is compiled once."""
     if not stages:
         raise ValueError("there are no stages: give at least one")

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from functools import partial
+from numbers import Real
+from typing import Any, cast
 
 import msgspec
 
@@ -28,7 +30,7 @@ def with_values(scene: Any, values: Mapping[str, Any]) -> Any:
     checked when it is run.
     """
     for path, value in values.items():
-        scene = changed_at(scene, path, lambda old, path=path, value=value: _replaced(old, value, path))
+        scene = changed_at(scene, path, partial(_replaced, new=value, path=path))
     return scene
 
 
@@ -92,12 +94,9 @@ def _replaced(old: Any, new: Any, path: str) -> Any:
         if not isinstance(new, str):
             raise PathError(f'parameter "{path}" is a word: give one, not {new!r}')
         return new
-    if isinstance(new, bool) or not isinstance(new, int | float):
-        try:
-            new = new.item()  # a number of numpy
-        except AttributeError:
-            raise PathError(f'parameter "{path}" is a number: give one, not {new!r}') from None
-    return number_at(path, old, new)
+    if isinstance(new, bool) or not isinstance(new, Real):
+        raise PathError(f'parameter "{path}" is a number: give one, not {new!r}')
+    return number_at(path, old, float(new))
 
 
 def _structure(old: Any, new: Any, path: str) -> Any:
@@ -106,7 +105,7 @@ def _structure(old: Any, new: Any, path: str) -> Any:
         return new
     if isinstance(new, dict) and (old is None or isinstance(old, Function)):
         try:
-            return to_struct(new, Function)
+            return to_struct(new, cast(type, Function))
         except SceneError as error:
             raise PathError(f'parameter "{path}": {"; ".join(map(str, error.problems))}') from None
     what = "nothing" if old is None else "a structure"

@@ -116,7 +116,7 @@ class System(Mechanics):
         return self.layout.known(0.0, self._at_start.copy())
 
     def admissible(self, t: float, y: Real) -> State:
-        """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for, with prescribed motions as they are then.
+        """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
 
         Of closed chains the nearest one that closes all closures; ClosureError where that is far.
         """

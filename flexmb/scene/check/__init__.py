@@ -41,7 +41,8 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
 
 def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]:
     refuse_wrong_types(scene)  # a struct built by hand may hold values of any type
-    problems = [*_run_time(t_end, t_start), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]
+    problems = [*_run_time(t_end, t_start)]
+    problems += [problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene)]
     problems += functions(scene, t_end, t_start)
     if not problems:  # needs sound numbers, names and a tree to stand on
         problems += moved_inertia(scene)
@@ -49,8 +50,8 @@ def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]
 
 
 def check_run(scene: Scene, t_end: float, t_start: float = 0.0) -> None:
-    """Raise SceneError unless a scene that was checked before can be run from t_start to `t_end` (s): its profiles cover
-    the run."""
+    """Raise SceneError unless a scene that was checked before can be run from `t_start` to `t_end` (s), which its
+    profiles have to cover."""
     problems = [*_run_time(t_end, t_start), *functions(scene, t_end, t_start)]
     if problems:
         raise SceneError(scene.name, problems)

@@ -49,7 +49,9 @@ def start_of(function: Function) -> tuple[float, float] | None:
             return _smooth_step_start(function)
         case SpinUp(duration_s=duration) if duration > 0.0:
             return 0.0, 0.0
-        case Table(times_s=times, values=samples) if not any((*_table(ROOT, function), *_covers(ROOT, function, None, 0.0))):
+        case Table(times_s=times, values=samples) if not any(
+            (*_table(ROOT, function), *_covers(ROOT, function, None, 0.0))
+        ):
             # here, because this import takes longer than everything else a scene without tables imports
             from scipy.interpolate import make_interp_spline
 

@@ -137,6 +137,7 @@ def test_simulate_sets_values_begins_later_and_goes_on(scene_file, tmp_path):
     assert result.exit_code == 0 and "restart.npz" in result.output, result.output
     whole, later = ((tmp_path / name / "trajectory.csv").read_text().splitlines() for name in ("whole", "later"))
     assert whole[-1].startswith("2,") and later[-1] == whole[-1]
-    for more, message in ((("--set", "bob.mass=1"), 'did you mean "mass_kg"'), (("--restart", scene_file), "no restart")):
+    wrong = ("--set", "bob.mass=1"), ("--restart", scene_file)
+    for more, message in zip(wrong, ('did you mean "mass_kg"', "no restart"), strict=True):
         result = invoke(*on, "--t-end", 2, *more)
         assert result.exit_code == 2 and message in result.output, result.output

@@ -124,7 +124,8 @@ def test_stages_are_one_trajectory():
     """A torque is let go, then the shoulder is held: work and energy balance over all stages."""
     scene = arm().with_values({"shoulder.rotation.damping_Nms_rad": 2000.0})
     held = {"shoulder.rotation.torque_Nm": None}
-    stages = [fm.Stage(0.5, samples=6), fm.Stage(1.0, held, samples=11), fm.Stage(0.25, {"wheel.torque_Nm": PUSH})]
+    turned = fm.RunStage(0.25, {"wheel.torque_Nm": PUSH})
+    stages = [fm.RunStage(0.5, samples=6), fm.RunStage(1.0, held, samples=11), turned]
     run = fm.simulate_stages(scene, stages)
     assert run.finished and run.stopped_at == 1.75 and np.all(np.diff(run.t) > 0.0)
     assert len(run.t) == 6 + 10 + 200 and len(run.work) == len(run.t) == len(run.markers["hand"].position)
@@ -140,9 +141,11 @@ def test_a_stage_that_prescribes_a_motion():
     scene = fm.SceneBuilder("crank").rigid_body("crank", mass=1.0, inertia=(1.0, 1.0, 1.0))
     scene = scene.revolute("pin", "ground", "crank", angle=0.7).scene()
     turn = fm.SmoothStep(start_value=0.7, end_value=1.2, start_s=1.0, duration_s=1.0)
-    stages = [fm.Stage(1.0, samples=3), fm.Stage(1.0, {"pin.rotation.angle_rad": 0.0, "pin.rotation.prescribed_rad": turn})]
+    driven = {"pin.rotation.angle_rad": 0.0, "pin.rotation.prescribed_rad": turn}
+    stages = [fm.RunStage(1.0, samples=3), fm.RunStage(1.0, driven)]
     run = fm.simulate_stages(scene, stages)
-    assert run.q[-1, 0] == 1.2 and np.all(np.isnan(run.drives["pin"][:2])) and np.all(np.isfinite(run.drives["pin"][2:]))
+    assert run.q[-1, 0] == 1.2
+    assert np.all(np.isnan(run.drives["pin"][:2])) and np.all(np.isfinite(run.drives["pin"][2:]))
     assert np.isclose(run.drives["pin"][52, 0], np.gradient(run.u[:, 0], run.t)[52], rtol=1e-2)
     moving = fm.simulate_stages(scene.with_values({"pin.rotation.rate_rad_s": 0.1}), stages[:1])
     with pytest.raises(ValueError, match='"pin.rotation.rate" is prescribed'):
@@ -152,16 +155,17 @@ def test_a_stage_that_prescribes_a_motion():
 def test_stages_that_do_not_fit_are_refused():
     other = fm.SceneBuilder("other").rigid_body("one", mass=1.0, inertia=(1.0, 1.0, 1.0)).free("f", "ground", "one")
     with pytest.raises(ValueError, match=r"stages\[1\] has other coordinates"):
-        fm.simulate_stages(arm(), [fm.Stage(1.0), fm.Stage(1.0, scene=other.scene())])
+        fm.simulate_stages(arm(), [fm.RunStage(1.0), fm.RunStage(1.0, scene=other.scene())])
     with pytest.raises(ValueError, match="no stages"):
         fm.simulate_stages(arm(), [])
     with pytest.raises(ValueError, match=r"stages\[0\] lasts -1 s"):
-        fm.simulate_stages(arm(), [fm.Stage(-1.0)])
+        fm.simulate_stages(arm(), [fm.RunStage(-1.0)])
 
 
 def test_a_stage_that_fails_is_the_last():
     scene = arm()
-    run = fm.simulate_stages(scene, [fm.Stage(0.1, samples=3), fm.Stage(5.0, samples=3), fm.Stage(1.0)], max_steps=12)
+    stages = [fm.RunStage(0.1, samples=3), fm.RunStage(5.0, samples=3), fm.RunStage(1.0)]
+    run = fm.simulate_stages(scene, stages, max_steps=12)
     assert run.status is fm.Status.MAX_STEPS and 0.1 < run.stopped_at < 5.1
 
 
