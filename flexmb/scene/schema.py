@@ -29,6 +29,7 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -129,6 +130,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    events: tuple[SceneEvent, ...] = ()
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
         """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
@@ -140,9 +142,9 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
-    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
+    "Cylindrical", "EndRun", "Free", "Function", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level",
+    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar",
+    "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene", "SceneEvent",
+    "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
 ]  # fmt: skip
