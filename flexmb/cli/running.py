@@ -8,7 +8,7 @@ from typing import Annotated, get_args
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, console, no_traceback
+from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
 from flexmb.integrate.integrator import Method
 from flexmb.output.writing import check_folder, folder, writing
 from flexmb.scene.files import load_scene
@@ -51,6 +51,7 @@ def simulate(
         typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
     ] = None,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+    strict: Strict = False,
 ) -> None:
     """
     Simulate a scene; write `trajectory.csv` and charts; print a summary.
@@ -68,10 +69,10 @@ def simulate(
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
 
     **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
-    wrong, 130 interrupted by Ctrl-C (what was reached is written).
+    wrong, or the scene is doubtful with `--strict`, 130 interrupted by Ctrl-C (what was reached is written).
     """
     interrupted = False
-    with no_traceback():
+    with no_traceback(strict):
         from flexmb.run.interruption import Interrupted
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.run.summary import summary

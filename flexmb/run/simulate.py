@@ -20,7 +20,7 @@ from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_end
 from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
@@ -72,19 +72,19 @@ def simulate(
     the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0 (Baumgarte), which
     costs less and leaves a drift; k times the step should stay below 1.
 
-    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion. A run that fails raises nothing: `status` and `message` of the
-    trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run at its next step and raises
-    `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a second Ctrl-C while their
-    outputs are evaluated keeps those that are finished.
+    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
+    sense, ClosureError where no initial state closes the closures or they leave no motion. A run that fails raises
+    nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
+    ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
+    to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
     """
     refuse_unknown("simulate", settings)
     t_end = _end(t_end)
     if isinstance(scene, System):
         refuse_end(scene, t_end)
     else:
-        check_scene(scene, t_end)
+        check_and_warn(scene, t_end)
     chosen = Settings(method, **settings).checked(t_end)
     stabilise = arguments.number("stabilise", stabilise)
     times = sample_times(samples, t_end)

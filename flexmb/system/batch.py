@@ -25,7 +25,7 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
@@ -227,7 +227,7 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
     """
     scenes = _listed("scenes", scenes)
     for scene in scenes:
-        check_scene(scene)
+        check_and_warn(scene)
     return Batch([assembled(scene, "explicit") for scene in scenes])
 
 

@@ -58,6 +58,25 @@ def test_methods_for_stiff_scenes_tell_their_jacobians(scene_file, tmp_path):
     assert 'spectral_radius is for method "generalised_alpha"' in result.output
 
 
+def test_a_doubtful_scene_is_warned_of_and_with_strict_an_error(scene_file, tmp_path):
+    """By check and by simulate; not where the scene says that it is meant."""
+    text = scene_file.read_text().replace("child = ", "rotation = { damping_Nms_rad = -0.1 }\nchild = ", 1)
+    scene_file.write_text(text)
+    for words in (("check", scene_file), ("simulate", scene_file, "--t-end", 0.1, "--out", tmp_path, "--no-plots")):
+        result = invoke(*words)
+        assert result.exit_code == 0, result.output
+        for word in ("warning: ", "negative damping: -0.1", "-> give a damping", 'allow = ["negative_damping"]'):
+            assert word in result.stderr
+            assert word not in result.stdout
+        assert "damping_Nms_rad" in result.stderr
+        strictly = invoke(*words, "--strict")
+        assert strictly.exit_code == 2
+        assert "error: " in strictly.stderr and "negative damping" in strictly.stderr
+    scene_file.write_text('allow = ["negative_damping"]\n' + text)
+    result = invoke("check", scene_file, "--strict")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
 def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
     assert invoke("check", scene_file).exit_code == 0
     scene_file.write_text(scene_file.read_text().replace('child = "bob"', 'child = "bop"'))

@@ -308,7 +308,7 @@ EXEMPT = {
     "Batch.initial_states", "Batch.tables", "Batch.constants",  # nothing; of those who fill lanes
     "BatchTrajectory",  # a result
     "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "PrecisionWarning",
-    "SceneError",
+    "SceneError", "SceneWarning",
 }  # fmt: skip
 CLASSES = (
     fm.System,
