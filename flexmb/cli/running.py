@@ -51,6 +51,9 @@ def simulate(
         typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
     ] = None,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+    error: Annotated[
+        bool, typer.Option("--error-estimate", help="Run again, tighter, and print the largest error of each channel.")
+    ] = False,
     strict: Strict = False,
 ) -> None:
     """
@@ -75,7 +78,7 @@ def simulate(
     with no_traceback(strict):
         from flexmb.run.interruption import Interrupted
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
-        from flexmb.run.summary import summary
+        from flexmb.run.summary import errors_table, summary
 
         check_folder(out)
         strange = [word for word in also or () if word not in FORMATS]
@@ -91,6 +94,10 @@ def simulate(
             except Interrupted as stopped:
                 trajectory, interrupted = stopped.trajectory, True
         console.print(summary(trajectory))  # first: a full disk takes the files only
+        if error and not interrupted:
+            with console.status(Text("running again, tighter")):
+                estimated = errors_table(trajectory, trajectory.error_estimate())
+            console.print(estimated)
         folder(out)
         with writing(out / "trajectory.csv"):
             trajectory.to_csv(out / "trajectory.csv")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
 from typing import TypedDict, Unpack
 
@@ -16,6 +17,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
 from flexmb.run.observing import Sampler, observe
+from flexmb.run.origin import Origin
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_end
@@ -100,12 +102,24 @@ def simulate(
             return _observed(system, times, raw, algorithm, solve.batch)
         raw = integrate(system, solve, times, chosen)
         trajectory = _observed(system, times, raw, algorithm, solve.batch)
+    again = partial(_again, system, t_end, times, algorithm, stabilise)
+    trajectory = replace(trajectory, origin=Origin(system, chosen, again))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory
+
+
+def _again(
+    system: System, t_end: float, times: Real, algorithm: Algorithm, stabilise: float, settings: Settings
+) -> Trajectory:
+    """The same run with other settings."""
+    return simulate(
+        system, t_end, settings.method, samples=times, algorithm=algorithm, stabilise=stabilise, rtol=settings.rtol,
+        atol=settings.atol, step=settings.step, max_steps=settings.max_steps, spectral_radius=settings.spectral_radius,
+    )  # fmt: skip
 
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:

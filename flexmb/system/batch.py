@@ -33,7 +33,7 @@ from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
 from flexmb.tables.state import DynamicsError
-from flexmb.tables.status import NONFINITE, OK
+from flexmb.tables.status import NONFINITE, OK, Status
 from flexmb.typing import Index, Real
 
 _WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
@@ -63,6 +63,11 @@ class BatchAccelerations(NamedTuple):
 
     accelerations: Real
     status: Index
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """The same by their names."""
+        return tuple(map(Status, self.status.tolist()))
 
     @property
     def failed(self) -> Index:

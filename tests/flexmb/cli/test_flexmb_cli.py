@@ -77,6 +77,16 @@ def test_a_doubtful_scene_is_warned_of_and_with_strict_an_error(scene_file, tmp_
     assert (result.exit_code, result.stderr) == (0, "")
 
 
+def test_errors_are_estimated_on_request(scene_file, tmp_path):
+    words = ("simulate", scene_file, "--t-end", 0.5, "--samples", 11, "--out", tmp_path, "--no-plots", "--rtol", 1e-6)
+    assert "largest error" not in invoke(*words).output
+    result = invoke(*words, "--error-estimate")
+    assert result.exit_code == 0, result.output
+    for word in ("Errors by a tighter run", "marker:centre.position", "e-", "load:pivot.force"):
+        assert word in result.output
+    assert "nan" not in result.output
+
+
 def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
     assert invoke("check", scene_file).exit_code == 0
     scene_file.write_text(scene_file.read_text().replace('child = "bob"', 'child = "bop"'))
