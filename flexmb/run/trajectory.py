@@ -10,12 +10,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flexmb.run import exports
 from flexmb.run.origin import Origin, error_estimate
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
+from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -102,6 +104,16 @@ class Trajectory:
         have in common, such as too few modes, do not show. ValueError where settings cannot be tighter.
         """
         return error_estimate(self, self._origin("its error"))
+
+    def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
+        """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
+
+        See `System.section_loads`. Raises DynamicsError where a state has no accelerations.
+        """
+        balance = SectionBalance(self._origin("a section's load").system, body, x)
+        states = np.column_stack([self.q, self.u, np.zeros(len(self.t))])
+        loads = [balance.at(float(t), y) for t, y in zip(self.t, states, strict=True)]
+        return balance.loads(np.array(loads).reshape(len(self.t), -1, 6))
 
     def _origin(self, wanted: str) -> Origin:
         if self.origin is None:

@@ -33,6 +33,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
+from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
@@ -270,6 +271,23 @@ class System(Mechanics):
             rates = self.layout.rates("accelerations", accelerations)
             loads, w = finite_result(self._inverse(t, y, rates)[1], t), self._w
         return referred(self, w, self._by_hinge(loads), axes, about)
+
+    def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
+        """Axial force, shear, bending and torsion across the sections of a beam at x (X,) m, of the free motion.
+
+        By the momentum balance of the part beyond each section, not by the modes' curvature. A body of level `linear`
+        is taken as `full`; at level `stiffened` the balance differs from the dynamics in the fourth order of the
+        deformation. ValueError for anything but a beam, and positions off it.
+        """
+        t, y = self.layout.entering(state)
+        balance = SectionBalance(self, body, x)
+        return balance.loads(finite_result(balance.at(t, y), t))
+
+    def _all_loads(self, t: float, y: Real) -> tuple[dict[str, Real], dict[str, Real]]:
+        """Loads of hinges and closures, and of wheels, by name; leaves the motion that the equations see in `_w`."""
+        found = self._evaluate(t, y, "articulated")
+        self._inverse(t, y, found.accelerations)
+        return found.loads, found.wheel_loads
 
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.
