@@ -11,12 +11,16 @@ from rich.text import Text
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
 from flexmb.integrate.integrator import Method
 from flexmb.output.writing import check_folder, folder, writing
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
+from flexmb.scene.schema import Scene
 
 METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
+
+SECTIONS = 21  # equally spaced, where no positions are given
 
 
 def simulate(
@@ -51,6 +55,10 @@ def simulate(
         typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
     ] = None,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+    sections: Annotated[
+        list[str] | None,
+        typer.Option(help="Loads across a beam's sections, to sections-BEAM.csv: `BEAM`, or `BEAM:x,x,...` in m."),
+    ] = None,
     error: Annotated[
         bool, typer.Option("--error-estimate", help="Run again, tighter, and print the largest error of each channel.")
     ] = False,
@@ -67,6 +75,7 @@ def simulate(
         flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
         flexmb simulate boom.toml --t-end 60 --also parquet --also rrd
+        flexmb simulate boom.toml --t-end 60 --sections strip --sections mast:0,0.5,1 --error-estimate
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
@@ -77,6 +86,7 @@ def simulate(
     interrupted = False
     with no_traceback(strict):
         from flexmb.run.interruption import Interrupted
+        from flexmb.run.section_table import write_sections
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.run.summary import errors_table, summary
 
@@ -84,10 +94,12 @@ def simulate(
         strange = [word for word in also or () if word not in FORMATS]
         if strange:
             raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
+        loaded = load_scene(scene)
+        wanted = dict(_sections(loaded, word) for word in sections or ())
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
             try:
                 trajectory = run(
-                    load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                    loaded, t_end, method,  # type: ignore[arg-type]
                     rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
                     spectral_radius=spectral_radius,
                 )  # fmt: skip
@@ -98,16 +110,40 @@ def simulate(
             with console.status(Text("running again, tighter")):
                 estimated = errors_table(trajectory, trajectory.error_estimate())
             console.print(estimated)
+        cut = {name: trajectory.section_loads(name, x) for name, x in wanted.items()}
         folder(out)
         with writing(out / "trajectory.csv"):
             trajectory.to_csv(out / "trajectory.csv")
+        for name, loads in cut.items():
+            with writing(out / f"sections-{name}.csv"):
+                write_sections(out / f"sections-{name}.csv", trajectory.t, loads)
         with writing(out):
             others = [out / f"trajectory.{word}" for word in dict.fromkeys(also or ())]
             for path in others:
                 getattr(trajectory, FORMATS[path.suffix[1:]])(path)
-            written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
+            written = [out / "trajectory.csv", *(out / f"sections-{name}.csv" for name in cut), *others]
+            written += trajectory.plot(out) if plots else []
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:
+    """A beam and positions along it (m), by default equally spaced ones; ValueError where there is no such beam."""
+    name, _, places = word.rpartition(":") if ":" in word else (word, "", "")
+    beams = {body.name: body for body in scene.bodies if isinstance(body, BeamBody)}
+    if word in beams:  # a name may hold a colon
+        name, places = word, ""
+    if name not in beams:
+        raise ValueError(f"--sections: there is no beam {name!r}; these are: {', '.join(beams) or 'none'}")
+    if not places:
+        return name, [beams[name].length_m * i / (SECTIONS - 1) for i in range(SECTIONS)]
+    try:
+        found = [float(place) for place in places.split(",")]
+    except ValueError:
+        raise ValueError(f"--sections is BEAM or BEAM:x,x,...; got {word!r}") from None
+    if not all(0.0 <= x <= beams[name].length_m for x in found):
+        raise ValueError(f"--sections: beam {name!r} reaches from 0 to {beams[name].length_m:g} m, not {places}")
+    return name, found

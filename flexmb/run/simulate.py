@@ -94,16 +94,15 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    origin = Origin(system, chosen, partial(_again, system, t_end, times, algorithm, stabilise))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         start = system.start_precision
         if start is not None and start.status != Status.OK:
             nothing = np.empty((0, system.nq + system.nu + 1))
             raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
-            return _observed(system, times, raw, algorithm, solve.batch)
+            return _observed(origin, times, raw, algorithm, solve.batch)
         raw = integrate(system, solve, times, chosen)
-        trajectory = _observed(system, times, raw, algorithm, solve.batch)
-    again = partial(_again, system, t_end, times, algorithm, stabilise)
-    trajectory = replace(trajectory, origin=Origin(system, chosen, again))
+        trajectory = _observed(origin, times, raw, algorithm, solve.batch)
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
@@ -151,9 +150,9 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
+def _observed(origin: Origin, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
-    start = perf_counter()
+    start, system = perf_counter(), origin.system
     rows, trouble = observe(system, algorithm, times, raw.states, batch)
     status, stopped_at, message = raw.status, raw.t, _message(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
@@ -185,6 +184,7 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch
             run_s=raw.run_s,
             output_s=perf_counter() - start,
         ),
+        origin=origin,
     )
 
 

@@ -112,8 +112,10 @@ class Trajectory:
         """
         balance = SectionBalance(self._origin("a section's load").system, body, x)
         states = np.column_stack([self.q, self.u, np.zeros(len(self.t))])
-        loads = [balance.at(float(t), y) for t, y in zip(self.t, states, strict=True)]
-        return balance.loads(np.array(loads).reshape(len(self.t), -1, 6))
+        loads = np.zeros((len(self.t), len(balance.x), 6))
+        for i, (t, y) in enumerate(zip(self.t, states, strict=True)):
+            loads[i] = balance.at(float(t), y)
+        return balance.loads(loads)
 
     def _origin(self, wanted: str) -> Origin:
         if self.origin is None:

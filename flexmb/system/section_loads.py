@@ -50,22 +50,22 @@ class SectionLoads:
     @property
     def axial(self) -> Real:
         """(...,X) N, positive in tension."""
-        return -self.load[..., 3]
+        return 0.0 - self.load[..., 3]
 
     @property
     def shear(self) -> Real:
         """(...,X,2) N along the section's y and z."""
-        return -self.load[..., 4:]
+        return 0.0 - self.load[..., 4:]
 
     @property
     def torsion(self) -> Real:
         """(...,X) N m about the section's x."""
-        return -self.load[..., 0]
+        return 0.0 - self.load[..., 0]
 
     @property
     def bending(self) -> Real:
         """(...,X,2) N m about the section's y and z."""
-        return -self.load[..., 1:3]
+        return 0.0 - self.load[..., 1:3]
 
     def normal_stress(self, E: float, y: float, z: float) -> Real:
         """(...,X) Pa, tension positive, in the fibre at y, z (m) of the section, with Young's modulus E (Pa).

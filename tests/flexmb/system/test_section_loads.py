@@ -178,7 +178,7 @@ def test_stresses_of_a_bent_pulled_and_twisted_beam() -> None:
 
 
 def test_loads_of_a_free_vibration_converge() -> None:
-    """A cantilever let go from its deflection under a tip force F: at first the root has the moment F L and the shear F.
+    """A cantilever let go from its deflection under a tip force F: at first its root has the moment F L, the shear F.
 
     Of sums of modes, the error of the moment falls as the square of their number, that of the shear as the number
     itself: at the tip, shear jumps from F to 0 when it is let go, which sums of modes follow slowly.
