@@ -16,8 +16,8 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIO
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
+from flexmb.run.making import Making
 from flexmb.run.observing import Sampler, observe
-from flexmb.run.origin import Origin
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_end
@@ -94,15 +94,15 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
-    origin = Origin(system, chosen, partial(_again, system, t_end, times, algorithm, stabilise))
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, times, algorithm, stabilise))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         start = system.start_precision
         if start is not None and start.status != Status.OK:
             nothing = np.empty((0, system.nq + system.nu + 1))
             raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
-            return _observed(origin, times, raw, algorithm, solve.batch)
+            return _observed(made_by, raw, algorithm, solve.batch)
         raw = integrate(system, solve, times, chosen)
-        trajectory = _observed(origin, times, raw, algorithm, solve.batch)
+        trajectory = _observed(made_by, raw, algorithm, solve.batch)
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
@@ -150,9 +150,9 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(origin: Origin, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
+def _observed(made_by: Making, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
-    start, system = perf_counter(), origin.system
+    start, system, times = perf_counter(), made_by.system, made_by.times
     rows, trouble = observe(system, algorithm, times, raw.states, batch)
     status, stopped_at, message = raw.status, raw.t, _message(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
@@ -184,7 +184,7 @@ def _observed(origin: Origin, times: Real, raw: Raw, algorithm: Algorithm, batch
             run_s=raw.run_s,
             output_s=perf_counter() - start,
         ),
-        origin=origin,
+        made_by=made_by,
     )
 
 

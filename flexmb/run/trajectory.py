@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.run import exports
-from flexmb.run.origin import Origin, error_estimate
+from flexmb.run.making import Making, error_estimate
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
@@ -93,7 +93,7 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
-    origin: Origin | None = field(default=None, repr=False, compare=False)
+    made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
     def error_estimate(self) -> dict[str, Real]:
@@ -103,24 +103,27 @@ class Trajectory:
         one but for a hundredth, or a third, which is added. NaN where the second run did not come. Errors that both
         have in common, such as too few modes, do not show. ValueError where settings cannot be tighter.
         """
-        return error_estimate(self, self._origin("its error"))
+        return error_estimate(self, self._making("its error"))
 
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
         See `System.section_loads`. Raises DynamicsError where a state has no accelerations.
         """
-        balance = SectionBalance(self._origin("a section's load").system, body, x)
+        balance = SectionBalance(self._making("a section's load").system, body, x)
         states = np.column_stack([self.q, self.u, np.zeros(len(self.t))])
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, (t, y) in enumerate(zip(self.t, states, strict=True)):
             loads[i] = balance.at(float(t), y)
         return balance.loads(loads)
 
-    def _origin(self, wanted: str) -> Origin:
-        if self.origin is None:
-            raise ValueError(f"this trajectory does not know how it was made, and {wanted} needs that: run simulate")
-        return self.origin
+    def _making(self, wanted: str) -> Making:
+        made_by = self.made_by
+        if made_by is None or not np.array_equal(self.t, made_by.times[: len(self.t)]):
+            raise ValueError(
+                f"this trajectory is not one run as simulate made it, and {wanted} needs that: ask each run for itself"
+            )
+        return made_by
 
     @property
     def finished(self) -> bool:

@@ -49,10 +49,10 @@ def test_it_is_the_error(method: str, settings: dict, low: float, high: float, t
 def test_a_second_run_that_stops_early_leaves_nan() -> None:
     """Only common times are compared; the end of the first run says nothing of itself."""
     run = fm.simulate(double_pendulum(), 1.0, samples=11, rtol=1e-6, atol=1e-8)
-    assert run.origin is not None
-    again = run.origin.again
-    origin = replace(run.origin, again=lambda settings: again(replace(settings, max_steps=20)))
-    short = replace(run, origin=origin).error_estimate()
+    assert run.made_by is not None
+    again = run.made_by.again
+    made_by = replace(run.made_by, again=lambda settings: again(replace(settings, max_steps=20)))
+    short = replace(run, made_by=made_by).error_estimate()
     assert np.isnan(short["energy.total"][-1]) and np.isfinite(short["energy.total"][0])
 
 
@@ -60,5 +60,6 @@ def test_what_cannot_be_tighter_or_is_not_known_is_refused() -> None:
     run = fm.simulate(double_pendulum(), 0.1, samples=3, rtol=1e-13, atol=1e-15)
     with pytest.raises(ValueError, match="estimate the error of a run with rtol 2.2e-12 or more"):
         run.error_estimate()
-    with pytest.raises(ValueError, match="does not know how it was made"):
-        replace(run, origin=None).error_estimate()
+    for other in (replace(run, made_by=None), replace(run, t=run.t + 1.0)):
+        with pytest.raises(ValueError, match="not one run as simulate made it"):
+            other.error_estimate()

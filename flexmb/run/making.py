@@ -21,21 +21,22 @@ HALF = 4.0 / 3.0  # error over its change where the step is halved, of a method 
 
 
 @dataclass(frozen=True)
-class Origin:
-    """The system of a run, its settings, and how to run the same from start to end with other settings."""
+class Making:
+    """The system of a run, its output times (T,) s and settings, and how to run the same with other settings."""
 
     system: System
+    times: Real
     settings: Settings
     again: Callable[[Settings], Trajectory]
 
 
-def error_estimate(trajectory: Trajectory, origin: Origin) -> dict[str, Real]:
+def error_estimate(trajectory: Trajectory, made_by: Making) -> dict[str, Real]:
     """Distance (T,) of every channel from that of a second run, a hundred times as tight or in half the step.
 
     NaN after the end of a second run that stops earlier. ValueError where the settings cannot be tighter.
     """
-    settings, share = _tighter(origin.settings)
-    other = channels_of(origin.again(settings))
+    settings, share = _tighter(made_by.settings)
+    other = channels_of(made_by.again(settings))
     found = {}
     for name, values in channels_of(trajectory).items():
         common = min(len(values), len(other[name]))
