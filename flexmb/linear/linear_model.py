@@ -38,7 +38,8 @@ class Mode:
             return "rigid-body motion"
         if self.eigenvalue.imag == 0.0:
             return f"no oscillation, {self.eigenvalue.real:.6g} 1/s"
-        return f"{self.frequency_hz:.6g} Hz, damping ratio {self.damping_ratio:.3g}"
+        ratio = self.damping_ratio if abs(self.eigenvalue.real) > self.tolerance else 0.0
+        return f"{self.frequency_hz:.6g} Hz, damping ratio {ratio:.3g}"
 
     @property
     def is_rigid_body(self) -> bool:

@@ -25,6 +25,7 @@ from flexmb.typing import Real
 
 MORE = 2  # times the modes, and the elements that they need
 ALIKE = 0.5  # modal assurance: with less, a mode of the finer model is another one
+NEARNESS = 0.1  # weight of the eigenvalues' distance: growth and decay of one motion have one shape
 SEEN_AT = 4  # positions along a beam for each mode that is looked for there
 
 
@@ -53,11 +54,13 @@ def truncation(
     across, modes = _embedding(model, finer, scene), model.modes
     candidates = [mode for mode in finer.modes if not mode.is_rigid_body]
     likeness = np.zeros((len(modes), len(candidates)))
+    apart = np.ones_like(likeness)
     for i, mode in enumerate(modes):
         if not mode.is_rigid_body:
             likeness[i] = [_likeness(finer.mass, across @ mode.shape, other.shape) for other in candidates]
+            apart[i] = [abs(other.eigenvalue - mode.eigenvalue) / abs(mode.eigenvalue) for other in candidates]
     found, change, alike = np.full(len(modes), np.nan, complex), np.full(len(modes), np.nan), np.zeros(len(modes))
-    for i, j in zip(*linear_sum_assignment(-likeness), strict=True):
+    for i, j in zip(*linear_sum_assignment(NEARNESS * np.minimum(apart, 1.0) - likeness), strict=True):
         if likeness[i, j] >= ALIKE:
             found[i], alike[i] = candidates[j].eigenvalue, likeness[i, j]
             change[i] = abs(found[i] - modes[i].eigenvalue) / abs(modes[i].eigenvalue)

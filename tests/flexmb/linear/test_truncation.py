@@ -88,6 +88,21 @@ def test_the_estimate_is_of_the_size_of_the_error(count: int) -> None:
     assert abs(found.eigenvalues[0]) < model.modes[0].natural_rad_s  # by Rayleigh and Ritz
 
 
+def test_growth_is_not_taken_for_decay() -> None:
+    """A beam that stands on a hinge: both real eigenvalues have one shape, and each is matched with itself."""
+    wanted = fm.Modes(count=2, families=("bending_y",))
+    scene = (
+        fm.SceneBuilder("upright", gravity=(-9.81, 0.0, 0.0))
+        .beam("beam", length=2.0, elements=16, section=SECTION, modes=wanted)
+        .revolute("foot", "ground", "beam")
+        .scene()
+    )
+    model = fm.linearize(scene)
+    found = truncation(model, scene)
+    real = [i for i, mode in enumerate(model.modes) if mode.eigenvalue.imag == 0.0]
+    assert len(real) == 2 and np.all(found.change[real] < 1e-3)
+
+
 def test_with_the_modes_for_its_load_nothing_is_open() -> None:
     model = fm.linearize(loaded(6, static=True))
     assert truncation(model, loaded(6, static=True)).change[0] < 1e-9
