@@ -48,7 +48,7 @@ class Mode:
 
     @property
     def natural_rad_s(self) -> float:
-        """|eigenvalue|."""
+        """Modulus of the eigenvalue."""
         return abs(self.eigenvalue)
 
     @property
@@ -63,7 +63,7 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """-Re / |eigenvalue|; NaN for an eigenvalue that is zero."""
+        """Real part over modulus, with the opposite sign; NaN for an eigenvalue that is zero."""
         return -self.eigenvalue.real / abs(self.eigenvalue) if abs(self.eigenvalue) > self.tolerance else np.nan
 
 

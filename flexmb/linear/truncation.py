@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import TypeGuard
 
 import msgspec
 import numpy as np
@@ -17,7 +18,7 @@ from scipy.optimize import linear_sum_assignment
 from flexmb.linear.linear_model import Complex, LinearModel
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
-from flexmb.scene.bodies import BeamBody, BeamNode, RigidBody
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -33,7 +34,7 @@ SEEN_AT = 4  # positions along a beam for each mode that is looked for there
 class Truncation:
     """By mode of a model, in its order: eigenvalue (rad/s) in the finer one, NaN where none is alike.
 
-    `change`: |difference| over |eigenvalue|, NaN for rigid-body motions too. `likeness`: modal assurance of the two
+    `change`: of it relative to its modulus, NaN for rigid-body motions too. `likeness`: modal assurance of the two
     shapes by kinetic energy, 0 to 1. `unrefined`: flexible bodies of which there is no finer model.
     """
 
@@ -76,7 +77,7 @@ def finer_scene(scene: Scene) -> Scene:
     return msgspec.structs.replace(scene, bodies=bodies, modal_states=states)
 
 
-def _bends(body: object) -> bool:
+def _bends(body: Body) -> TypeGuard[BeamBody]:
     return isinstance(body, BeamBody) and body.level != "rigid"
 
 
@@ -93,7 +94,8 @@ def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> Modal
     """The same shape and speed of deformation in the modes of the finer beam."""
     if state.body not in finer:
         return state
-    across = _across(next(body for body in scene.bodies if body.name == state.body), finer[state.body])
+    coarse = next(body for body in scene.bodies if body.name == state.body and _bends(body))
+    across = _across(coarse, finer[state.body])
     return ModalState(
         body=state.body, coordinates=tuple((across @ state.coordinates).tolist()),
         rates=tuple((across @ state.rates).tolist()) if state.rates else (),

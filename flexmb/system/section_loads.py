@@ -172,7 +172,8 @@ class SectionBalance:
             if table["frame"] == NODE_AXES:
                 value = carrier.rotation @ w.port["R"][port].reshape(3, 3) @ value
             point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
-            add(load_of.node, *((value, none) if table["type"] == TORQUE else (none, value)), point)
+            torque, force = (value, none) if table["type"] == TORQUE else (none, value)
+            add(load_of.node, torque, force, point)
         for closure in scene.closures:
             load, point = loads[closure.name], frames[closure.name].point
             for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
