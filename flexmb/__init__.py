@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.check import SceneError, SceneWarning, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
@@ -73,10 +73,10 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError", "State",
-    "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch",
-    "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "simulate_batch", "simulate_stages",
-    "steady_spin",
+    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError",
+    "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene",
+    "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "simulate_batch", "simulate_stages", "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from time import perf_counter
-from typing import TypedDict, Unpack
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIO
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
+from flexmb.run.making import Making
 from flexmb.run.observing import Sampler, observe
 from flexmb.run.origin import Beginning, Values, origin, start_time
 from flexmb.run.propagate import Raw, integrate, integration
@@ -22,7 +24,7 @@ from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
@@ -83,9 +85,10 @@ def simulate(
     all its speeds; closed chains take the nearest state that closes their closures. Or a `Restart`, by which a run of
     the same scene and method is taken up to the last bit.
 
-    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion, or the state that is given is far from it. A run that fails raises
+    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
+    sense, ClosureError where no initial state closes the closures or they leave no motion, or the state that is given
+    is far from it. A run that fails raises
     nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
     ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
     to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
@@ -95,7 +98,7 @@ def simulate(
     if isinstance(scene, System):
         refuse_times(scene, t, t_end)
     else:
-        check_scene(scene, t_end, t)
+        check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     stabilise = arguments.number("stabilise", stabilise)
     times = sample_times(samples, t_end, t)
@@ -103,13 +106,15 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    same = {"t_start": t, "state": state, "samples": times, "algorithm": algorithm, "stabilise": stabilise}
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
-            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve.batch)
+            return observed(made_by, _not_begun(begin, start, chosen), algorithm, solve.batch)
         raw = integrate(system, solve, begin, times, chosen)
-        trajectory = observed(system, times, raw, algorithm, solve.batch)
+        trajectory = observed(made_by, raw, algorithm, solve.batch)
     trajectory = replace(trajectory, restart=_restart(system, raw, method))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
@@ -117,6 +122,16 @@ def simulate(
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory
+
+
+def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
+    """The same run with other settings; ValueError for one that was taken up, whose beginning is another run's."""
+    if isinstance(same["state"], Restart):
+        raise ValueError("this run took up another, and only that one's beginning is exact: ask a run of both for this")
+    return simulate(
+        system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
+        max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
+    )  # fmt: skip
 
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
@@ -164,9 +179,9 @@ def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
     return None
 
 
-def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
+def observed(made_by: Making, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
-    start = perf_counter()
+    start, system, times = perf_counter(), made_by.system, made_by.times
     rows, trouble = observe(system, algorithm, times, raw.states, batch)
     status, stopped_at, message = raw.status, raw.t, _message(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
@@ -198,6 +213,7 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch:
             run_s=raw.run_s,
             output_s=perf_counter() - start,
         ),
+        made_by=made_by,
     )
 
 

@@ -88,9 +88,13 @@ class SceneBuilder:
     ... )
     """
 
-    def __init__(self, name: str, *, gravity: ArrayLike = ZERO, description: str = "") -> None:
-        """`gravity`: uniform acceleration (m/s²) in World axes."""
-        self._head: dict[str, Any] = {"name": name, "description": description, "gravity_m_s2": plain(gravity)}
+    def __init__(
+        self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
+    ) -> None:
+        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are meant, see `Scene`."""
+        self._head: dict[str, Any] = {
+            "name": name, "description": description, "allow": list(allow), "gravity_m_s2": plain(gravity)
+        }  # fmt: skip
         self._lists: dict[str, list[msgspec.Struct]] = {key: [] for key in COLLECTIONS.values()}
 
     def add(self, *structs: msgspec.Struct) -> Self:
@@ -103,7 +107,10 @@ class SceneBuilder:
         return self
 
     def scene(self, *, t_end: float | None = None) -> s.Scene:
-        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs."""
+        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs.
+
+        What is doubtful is for `check_scene` to return, and for runs to warn of.
+        """
         with collector_paused():
             data = self._head | {key: plain(items) for key, items in self._lists.items()}
             scene = to_struct(data, s.Scene)

@@ -116,11 +116,29 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
     rates: tuple[float, ...] = ()
 
 
+Waiver = Literal[
+    "wave_speed",
+    "thick_section",
+    "shear_stiffness",
+    "modal_frequency",
+    "negative_stiffness",
+    "negative_damping",
+]
+
+
 class Scene(SceneStruct, frozen=True, kw_only=True):
-    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
+
+    Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
+    meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
+    above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
+    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
+    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    """
 
     name: str
     description: str = ""
+    allow: tuple[Waiver, ...] = ()
     gravity_m_s2: Vector = ZERO
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
@@ -144,7 +162,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 __all__ = [
     "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
     "Cylindrical", "EndRun", "Free", "Function", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level",
-    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar",
-    "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene", "SceneEvent",
-    "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node",
+    "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene",
+    "SceneEvent", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector",
+    "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

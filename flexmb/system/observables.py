@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
+from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
@@ -28,6 +29,10 @@ class MarkerMotion:
     def quaternion(self) -> Real:
         """Scalar first, unit."""
         return quaternion_of(self.rotation)
+
+    def angles(self, sequence: str = "zyx") -> Angles:
+        """Angles (3,) rad of a gimbal's `sequence` of axes: see `flexmb.scene.angles.angles_of`."""
+        return angles_of(self.quaternion, sequence)
 
 
 @dataclass(frozen=True)

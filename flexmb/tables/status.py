@@ -20,6 +20,13 @@ class Status(IntEnum):
     INTERRUPTED = 9
     BRANCH_UNKNOWN = 10
 
+    def __str__(self) -> str:
+        return self.name
+
+    def __format__(self, spec: str) -> str:
+        """Its name; its number for formats of integers."""
+        return format(int(self), spec) if spec.endswith(tuple("bcdoxXn")) else format(self.name, spec)
+
     @property
     def advice(self) -> str:
         """What happened and what to try."""
