@@ -22,6 +22,7 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import roundoff_floor
 from crosscheck.judging.verdict import Signal, Verdict, compare
+from crosscheck.library.case import Control
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
@@ -127,17 +128,16 @@ def _mutant(control: Control, verdicts: Sequence[Verdict], reference: dict[str, 
     )
 
 
-def _answers(
-    what: JudgedVariant, true: Result, stored: ByReference | None
-) -> tuple[list[Mutant], list[PassedOver]]:
+def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> tuple[list[Mutant], list[PassedOver]]:
     """Faults planted in the true run; passed over are those that change nothing, or nothing that the case judges."""
     found: list[Mutant] = []
     passed: list[PassedOver] = []
     if true.status != "finished":
         return found, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
     scene = variant_scene(what.case.scene(what.variant), what.variant)
+    rounding = _rounding(true)
     for fault in FAULTS:
-        wrong = _falsified(true, scene, fault)
+        wrong = _falsified(true, scene, fault, rounding)
         changed, channels = list(wrong), _judged(what, true, wrong)
         if not changed:
             passed.append(PassedOver(mutation=fault.name, target="", reason="it changes nothing in this run"))
@@ -164,19 +164,24 @@ def _answers(
     return found, passed
 
 
-def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int) -> bool:
-    """Whether a channel differs by more than the rounding of its family: an axis may be the same in body and World."""
-    size = max(magnitude(each, rows) for each, rows in right.items() if family(each) == family(name))
-    floor = roundoff_floor(size, max(evaluations, len(values)))
-    return bool(np.max(distance(name, values, right[name])) > floor)
+def _rounding(true: Result) -> dict[str, float]:
+    """The rounding (SI) of each family of channels: an axis may be the same in body and World but for that."""
+    sizes: dict[str, float] = {}
+    for name in true.channels:
+        values = true.values(name)
+        sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
+    sums = max(true.finest.evaluations, len(true.times))
+    return {group: roundoff_floor(size, sums) for group, size in sizes.items()}
 
 
-def _falsified(true: Result, scene: Scene, fault: AnswerFault) -> dict[str, Real]:
-    """The channels (T, k) that the fault changes, as it leaves them."""
+def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
+    """The channels (T, k) that the fault changes by more than their rounding, as it leaves them."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
     return {
-        name: values for name, values in wrong.items() if _is_other(name, values, right, true.finest.evaluations)
+        name: values
+        for name, values in wrong.items()
+        if np.max(distance(name, values, right[name])) > rounding[family(name)]
     }
 
 

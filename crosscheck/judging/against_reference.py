@@ -86,8 +86,9 @@ def hold(
 ) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference for which there is a goal, with that goal. Never raises.
 
-    `like` is the result whose U `result` takes, as that of a control is that of the true run. A kind of energy that the engine does not know is left out; any other channel that it does not offer it refuses. A
-    result that did not finish gives its status for each goal.
+    `like` is the result whose U `result` takes, as that of a control is that of the true run. A kind of energy that the
+    engine does not know is left out; any other channel that it does not offer it refuses. A result that did not finish
+    gives its status for each goal.
     """
     if result.status != "finished":
         ending = result.ending
