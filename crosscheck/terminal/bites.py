@@ -31,13 +31,10 @@ def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = Fal
 
 
 def _table(bites: Sequence[CaseBite]) -> Table:
-    headings = ("mutants", "noticed", "score", "at goals", "by reference")
-    numbers = [Column(name, justify="right") for name in headings]
+    headings = ("noticed", "score", "at goals", "by reference")
     table = Table(
         Column("case", no_wrap=True),
-        "variant",
-        *numbers,
-        "weakest channel",
+        *(Column(name, justify="right", no_wrap=True) for name in headings),
         box=SIMPLE_HEAD,
         pad_edge=False,
         header_style="bold",
@@ -46,8 +43,7 @@ def _table(bites: Sequence[CaseBite]) -> Table:
         counted = each.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)
         figures = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
-        cells = (each.case, each.variant, str(len(counted)), str(noticed), *figures, _weakest(each))
-        table.add_row(*(words(cell) for cell in cells))
+        table.add_row(*(words(cell) for cell in (each.case, f"{noticed}/{len(counted)}", *figures)))
     return table
 
 
@@ -55,16 +51,8 @@ def _figure(score: float | None) -> str:
     return "–" if score is None else f"{score:.3f}"
 
 
-def _weakest(each: CaseBite) -> str:
-    """Of the channels that notice anything: those of quantities that the case does not have notice nothing."""
-    seeing = {name: score for name, score in each.channels.items() if score.noticed}
-    if not seeing:
-        return ""
-    name, score = min(seeing.items(), key=lambda item: item[1].noticed / item[1].mutants)
-    return f"{name} {score.noticed}/{score.mutants}"
-
-
 def _details(console: Console, each: CaseBite) -> None:
+    console.print(words(f"  {each.case}: variant {each.variant}, run by {each.engine}"), soft_wrap=True)
     for name, score in each.channels.items():
         console.print(words(f"  {each.case}: {name}: {score.noticed} of {score.mutants}"), soft_wrap=True)
     for mutant in each.mutants:
