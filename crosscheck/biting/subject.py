@@ -29,14 +29,16 @@ class JudgedVariant:
 
 
 def subject(case: Case, engine: str) -> JudgedVariant:
-    """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
+    """The variant of the case's reference if a comparison judges it or the engine is held against it there, else the
+    first that a comparison judges and the engine runs.
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
     """
     judged = [_variants(each) for each in _agreeing(case)]
     names = [name for group in judged for name in group]
-    if case.run.reference is not None and case.run.reference.variant in names:
-        names.insert(0, case.run.reference.variant)
+    recipe = case.run.reference
+    if recipe is not None and (recipe.variant in names or _held(case, recipe.variant, engine)[0]):
+        names.insert(0, recipe.variant)
     named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):
         variant = case.run.variant(name)
@@ -92,9 +94,14 @@ def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dic
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales
+    further, sizes = _held(case, variant, engine)
+    goals |= {pattern: min(goal, goals.get(pattern, goal)) for pattern, goal in further.items()}
+    return goals, sizes | scales
+
+
+def _held(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Goals and scales by which the engine is held against the stored reference of a variant, none if it is not."""
     recipe = case.run.reference
-    if recipe is not None and recipe.variant == variant and has_reference(case.folder):
-        further, sizes = held(case.run, (engine,)).get(engine, ({}, {}))
-        goals |= {pattern: min(goal, goals.get(pattern, goal)) for pattern, goal in further.items()}
-        scales = sizes | scales
-    return goals, scales
+    if recipe is None or recipe.variant != variant or not has_reference(case.folder):
+        return {}, {}
+    return held(case.run, (engine,)).get(engine, ({}, {}))

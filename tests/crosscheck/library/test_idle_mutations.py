@@ -1,4 +1,4 @@
-"""What symmetry and rest leave out of a motion: mutations that physics says nothing shows, and their near neighbours."""
+"""What symmetry and rest leave out of a motion: mutations that nothing can show, and their near neighbours."""
 
 from __future__ import annotations
 
