@@ -51,7 +51,8 @@ def _is_own_image(scene: Scene, axis: int) -> bool:
 
 def _mounted(scene: Scene, body: str) -> set[str]:
     """The nodes of a body at which more than markers are."""
-    ends = [(item.body, item.node) for item in (*scene.wheels, *scene.loads)]
+    carried: tuple[Wheel | Load, ...] = (*scene.wheels, *scene.loads)
+    ends = [(item.body, item.node) for item in carried]
     ends += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
     ends += [end for each in scene.closures for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
     return {node for name, node in ends if name == body}
