@@ -29,15 +29,14 @@ class JudgedVariant:
 
 
 def subject(case: Case, engine: str) -> JudgedVariant:
-    """The variant of the case's reference if a comparison judges it or the engine is held against it there, else the
-    first that a comparison judges and the engine runs.
+    """The variant of the case's reference if a comparison judges it, else the first that one does and the engine runs.
 
     CaseError where there is none. An engine that the case does not name (a user's own) runs the first judged variant.
     """
     judged = [_variants(each) for each in _agreeing(case)]
     names = [name for group in judged for name in group]
     recipe = case.run.reference
-    if recipe is not None and (recipe.variant in names or _held(case, recipe.variant, engine)[0]):
+    if recipe is not None and recipe.variant in names:
         names.insert(0, recipe.variant)
     named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import msgspec
+import numpy as np
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import bodies, on_body, whole
@@ -14,6 +15,8 @@ from crosscheck.library.mutations.resting import rests, twists_only
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode, RigidBody
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
+
+ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes
 
 
 def _unstiffened(scene: Scene, target: str) -> Scene:
@@ -103,6 +106,16 @@ def _order(body: ModalBody) -> ModalBody:
     return msgspec.structs.replace(body, stiffness=stiffness)
 
 
+def _equally_stiff(scene: Scene, target: str) -> str:
+    """Of two modes that are equally stiff and coupled alike the order is a name, say those of a round section."""
+    body = _in_modes(scene, target)
+    if not isinstance(body, ModalBody):
+        return ""
+    right, wrong = (np.asarray(each.stiffness) for each in (body, _order(body)))
+    same = np.max(np.abs(wrong - right)) <= ROUNDING * np.max(np.abs(right[:2, :2]))
+    return "the first two modes are equally stiff: exchanged, their stiffness is the same" if same else ""
+
+
 def _no_rotation(body: ModalBody) -> ModalBody:
     """Slopes of the modes left out at the nodes."""
 
@@ -154,6 +167,7 @@ MUTATIONS = (
         "modes sorted in one file and not in the other",
         bodies,
         _of_modes("mode_order", _order),
+        _equally_stiff,
     ),
     Mutation(
         "mode_rotation",

@@ -131,6 +131,14 @@ def test_a_mode_out_of_the_plane_is_never_excited(family: Any, axis: int) -> Non
     assert idle(with_(scene, gravity_m_s2=tuple(flat)), "mode_sign", "bar") == ""
 
 
+@pytest.mark.parametrize(("stiffness", "round_one"), [(10.0, True), (11.0, False)])
+def test_the_modes_of_a_round_section_have_no_order(stiffness: float, round_one: bool) -> None:
+    stations = tuple(with_(each, EIz_Nm2=stiffness) for each in BAR.stations)
+    beam = with_(BAR, stations=stations, modes=Modes(count=2, families=("bending_y", "bending_z")))
+    scene = with_(TWISTED, bodies=(beam,))
+    assert bool(idle(scene, "mode_order", "bar")) == round_one
+
+
 @pytest.mark.parametrize(
     ("rotation", "named"),
     [
