@@ -18,6 +18,7 @@ SYMBOLS: dict[str, str] = {
     "did not finish": "⧖",
     "crashed": "☠",
     "did not run": "–",
+    "not applicable": "○",
 }
 
 
@@ -37,6 +38,7 @@ class VerdictCell:
 
 
 EMPTY = VerdictCell("", "empty", "", "")
+INAPPLICABLE = VerdictCell("not applicable", "empty", "not applicable", "")
 
 
 @dataclass(frozen=True)
