@@ -98,8 +98,9 @@ class DartDynamics:
             qdot[place] = quaternion_rate(own[place], state.v[slot.v : slot.v + 3])
         for slot in self._floating:
             place = slice(slot.q + 3, slot.q + 7)
-            turning = rotation_matrix(state.q[place]).T @ state.v[slot.v : slot.v + 3]
-            qdot[slot.q : slot.q + 3] = state.v[slot.v + 3 : slot.v + 6]
+            inboard = slot.link.inboard.rotation.T
+            turning = rotation_matrix(state.q[place]).T @ inboard @ state.v[slot.v : slot.v + 3]
+            qdot[slot.q : slot.q + 3] = inboard @ state.v[slot.v + 3 : slot.v + 6]
             qdot[place] = quaternion_rate(own[place], turning)
         return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
 

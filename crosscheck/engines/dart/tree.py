@@ -1,8 +1,8 @@
 """The scene's links as a DART `Skeleton`: every hinge a chain of elementary joints on bodies next to massless.
 
 Conventions of DART: spatial vectors [angular; linear]; a ball joint's coordinates are a rotation vector and its speeds
-are in outboard axes; those of a free joint are a rotation vector, then the position, and its speeds, angular first, are
-in *inboard* axes. Its own springs and dampers are part of an implicit step, and are not used.
+are in outboard axes; those of a free joint are a rotation vector, then the position, in the joint's inboard frame, and
+its speeds, angular first, are in the axes of the *parent body*, wherever the joint's frame is turned to. Its own springs and dampers are part of an implicit step, and are not used.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def initial_state(tree: DartTree) -> tuple[Real, Real]:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
             case Floating() as freedom:
-                R = rotation_matrix(freedom.quaternion)
+                R = slot.link.inboard.rotation @ rotation_matrix(freedom.quaternion)
                 q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
                 v[slot.v : slot.v + 6] = [*(R @ freedom.angular_velocity), *(R @ freedom.velocity)]
     return q, v
