@@ -32,15 +32,16 @@ class Inapplicable:
 
 def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verdict], tuple[Inapplicable, ...]]:
     """The verdicts that count, and what is not applicable, each once whatever number of verdicts it would have been."""
-    counting: list[Verdict] = []
-    found: dict[Inapplicable, None] = {}
     joined = {engine for engine in case.case.joined if not _has_figures(case, engine)}
+    refused = [each for each in case.results.values() if each.status == "refused" and each.engine in joined]
+    found = {_inapplicable(case, result, ""): None for result in refused}
+    counting: list[Verdict] = []
     for verdict in verdicts:
         refusing = _refusing(case, verdict)
         if verdict.ok or not refusing or any(result.engine not in joined for result in refusing):
             counting.append(verdict)
         else:
-            found |= dict.fromkeys(_inapplicable(case, result, verdict) for result in refusing)
+            found |= {_inapplicable(case, result, verdict.channel): None for result in refusing}
     return counting, tuple(found)
 
 
@@ -59,10 +60,10 @@ def _refusing(case: CaseResults, verdict: Verdict) -> list[Result]:
     return []
 
 
-def _inapplicable(case: CaseResults, result: Result, verdict: Verdict) -> Inapplicable:
+def _inapplicable(case: CaseResults, result: Result, channel: str) -> Inapplicable:
     whole = result.status == "refused"
-    channel, reason = ("", result.message) if whole else (verdict.channel, f"{result.engine} does not offer it")
-    return Inapplicable(case.case.case, result.variant, result.engine, channel, reason)
+    named, reason = ("", result.message) if whole else (channel, f"{result.engine} does not offer it")
+    return Inapplicable(case.case.case, result.variant, result.engine, named, reason)
 
 
 def _has_figures(case: CaseResults, engine: str) -> bool:
