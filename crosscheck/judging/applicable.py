@@ -16,7 +16,7 @@ from crosscheck.judging.verdict import Verdict
 
 @dataclass(frozen=True)
 class Inapplicable:
-    """What an engine cannot represent; `channel` is "" where that is the whole variant. `reason` is the engine's own."""
+    """What an engine cannot represent; `channel` is "" where that is the whole variant. The reason is the engine's."""
 
     case: str
     variant: str

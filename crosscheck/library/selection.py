@@ -5,8 +5,8 @@ In the reduced run file every comparison is an explicit pair, and `engines` of a
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case names in no variant (one of ours, a user's own, or a misspelt one) joins every
 variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, that shows as
-*did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. One that the case
-names stays where the case has put it.
+*did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. One that the
+case names stays where the case has put it.
 """
 
 from __future__ import annotations

@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
 from crosscheck.engines.conventions import IDENTITY_FRAME, Frame
 from crosscheck.engines.links import Floating, Link, Scalar, links, placed
 from flexmb.scene.schema import Scene
@@ -23,8 +21,8 @@ class NoCraft(ValueError):
 
 
 @dataclass(frozen=True)
-class Part:
-    """What one turn or shift carries: `inboard` is its joint's frame in the part (or hub) `parent`, `inertia` its own."""
+class CraftPart:
+    """What one turn or shift carries: `inboard` is its joint's frame in the part or hub `parent`, `inertia` its own."""
 
     parent: int
     inboard: Frame
@@ -52,7 +50,7 @@ class Craft:
     flight: Floating
     hub: Inertia
     wheels: tuple[CraftWheel, ...]
-    parts: tuple[Part, ...]
+    parts: tuple[CraftPart, ...]
     chains: tuple[tuple[int, ...], ...]
     where: tuple[tuple[int, Frame], ...]
     links: tuple[Link, ...]
@@ -83,7 +81,7 @@ def craft_of(scene: Scene) -> Craft:
                 part, frame = len(joints) - 1, IDENTITY_FRAME
         where.append((part, frame))
         masses.setdefault(part, []).append(placed(link.inertia, frame))
-    parts = tuple(Part(*joint, combine(masses.get(k, []))) for k, joint in enumerate(joints))
+    parts = tuple(CraftPart(*joint, combine(masses.get(k, []))) for k, joint in enumerate(joints))
     hub = combine(masses[HUB])
     for load in scene.loads:
         if where[next(i for i, link in enumerate(chain) if link.kind == "body" and link.name == load.body)][0] != HUB:
@@ -107,7 +105,7 @@ def _simple(link: Link, freedom: object) -> Scalar:
     return freedom
 
 
-def _chains(parts: tuple[Part, ...]) -> tuple[tuple[int, ...], ...]:
+def _chains(parts: tuple[CraftPart, ...]) -> tuple[tuple[int, ...], ...]:
     """Every chain from the hub outward."""
     chains: dict[int, list[int]] = {}
     for number, part in enumerate(parts):

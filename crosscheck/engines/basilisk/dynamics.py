@@ -35,7 +35,7 @@ class CraftState(NamedTuple):
 
 
 class CraftSolution(NamedTuple):
-    """Accelerations: of the hub, in World and in hub axes, of the wheels, of the parts; power of all but springs (W)."""
+    """Accelerations of the hub, in World and in hub axes, of wheels and of parts; power of all but springs (W)."""
 
     linear: Real
     angular: Real

@@ -6,10 +6,10 @@ import time
 
 import numpy as np
 
-from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
+from crosscheck.engines.basilisk.craft import craft_of
 from crosscheck.engines.basilisk.dynamics import CraftDynamics
 from crosscheck.engines.basilisk.observer import BasiliskObserver
-from crosscheck.engines.basilisk.craft import craft_of
+from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
 from crosscheck.engines.functions_of_time import scene_functions
 from crosscheck.engines.scipy_loop import integrate
 from crosscheck.engines.trajectories import stack

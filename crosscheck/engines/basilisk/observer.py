@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from crosscheck.engines.basilisk.craft import HUB, Part
+from crosscheck.engines.basilisk.craft import HUB, CraftPart
 from crosscheck.engines.basilisk.dynamics import CraftDynamics, CraftSolution, CraftState
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
 from crosscheck.engines.conventions import Frame, axis_rotation, cross, quaternion_of, rotation_matrix
@@ -20,7 +20,7 @@ from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
-class Motion:
+class PartMotion:
     """A frame's rotation (3,3) and position in World, and its velocities and accelerations in World axes."""
 
     rotation: Real
@@ -30,26 +30,26 @@ class Motion:
     angular: Real
     linear: Real
 
-    def at(self, frame: Frame) -> Motion:
+    def at(self, frame: Frame) -> PartMotion:
         """The motion of a frame fixed in this one."""
         arm = self.rotation @ frame.position
         w = self.turning
         velocity = self.velocity + cross(w, arm)
         linear = self.linear + cross(self.angular, arm) + cross(w, cross(w, arm))
-        return Motion(self.rotation @ frame.rotation, self.position + arm, w, velocity, self.angular, linear)
+        return PartMotion(self.rotation @ frame.rotation, self.position + arm, w, velocity, self.angular, linear)
 
-    def moved(self, part: Part, value: float, rate: float, acceleration: float) -> Motion:
+    def moved(self, part: CraftPart, value: float, rate: float, acceleration: float) -> PartMotion:
         """The motion of a part whose joint's inboard frame moves like this."""
         axis = self.rotation @ part.freedom.axis
         w = self.turning
         if part.freedom.angular:
             rotation = self.rotation @ axis_rotation(part.freedom.axis, value)
             angular = self.angular + axis * acceleration + cross(w, axis * rate)
-            return Motion(rotation, self.position, w + axis * rate, self.velocity, angular, self.linear)
+            return PartMotion(rotation, self.position, w + axis * rate, self.velocity, angular, self.linear)
         arm = axis * value
         velocity = self.velocity + cross(w, arm) + axis * rate
         linear = self.linear + cross(self.angular, arm) + cross(w, cross(w, arm) + 2.0 * axis * rate)
-        return Motion(self.rotation, self.position + arm, w, velocity, self.angular, linear + axis * acceleration)
+        return PartMotion(self.rotation, self.position + arm, w, velocity, self.angular, linear + axis * acceleration)
 
 
 class BasiliskObserver:
@@ -80,10 +80,10 @@ class BasiliskObserver:
             momentum=dynamics.vehicle.momentum(motions[HUB].rotation, state.velocity, state.turning),
         )
 
-    def _motions(self, state: CraftState, found: CraftSolution) -> dict[int, Motion]:
+    def _motions(self, state: CraftState, found: CraftSolution) -> dict[int, PartMotion]:
         """Of the hub and of all parts."""
         R = rotation_matrix(state.quaternion)
-        hub = Motion(R, state.position, R @ state.turning, state.velocity, R @ found.angular, found.linear)
+        hub = PartMotion(R, state.position, R @ state.turning, state.velocity, R @ found.angular, found.linear)
         motions = {HUB: hub}
         for number, part in enumerate(self._dynamics.craft.parts):
             joint = motions[part.parent].at(part.inboard)
@@ -92,7 +92,7 @@ class BasiliskObserver:
         return motions
 
 
-def _marker(motion: Motion) -> MarkerSnapshot:
+def _marker(motion: PartMotion) -> MarkerSnapshot:
     return MarkerSnapshot(
         position=motion.position,
         quaternion=quaternion_of(motion.rotation),

@@ -1,7 +1,7 @@
 """A craft as Basilisk's `Spacecraft` with its effectors: states put in, rates of states taken out.
 
 Conventions of Basilisk: the hub's states are the position and velocity of its frame's origin in inertial axes, modified
-Rodrigues parameters, and the angular velocity in hub axes; matrices named DCM_BA map components in A to components in B.
+Rodrigues parameters, and the angular velocity in hub axes; matrices named DCM_BA map components in A to those in B.
 Wheels belong to the hub's mass and inertia, and their speeds are relative to it. A motor's torque holds over a step, so
 it is put in anew for every evaluation: that of wheels at once, that of chains by a message.
 """
@@ -20,12 +20,12 @@ from Basilisk.simulation import (
     spinningBodyNDOFStateEffector,
 )
 
-from crosscheck.engines.basilisk.craft import Craft, CraftWheel, Part
+from crosscheck.engines.basilisk.craft import Craft, CraftPart, CraftWheel
 from flexmb.typing import Real
 
 _STEP = 1.0  # s; equations of motion take a step for noise, of which there is none
 NEXT_TO_NOTHING = 1e-200
-"""kg or kg m^2: Basilisk refuses parts without mass or inertia; this is below the round-off of whatever it is added to."""
+"""kg or kg m^2: Basilisk refuses parts without mass or inertia; this is below the round-off of what it is added to."""
 
 
 class Vehicle:
@@ -100,7 +100,7 @@ class Vehicle:
 class _Chain:
     """A chain of parts as one effector."""
 
-    def __init__(self, parts: list[Part]) -> None:
+    def __init__(self, parts: list[CraftPart]) -> None:
         turns = parts[0].freedom.angular
         self.effector, self._names = _turning_chain(parts) if turns else _sliding_chain(parts)
         self._payload = messaging.ArrayMotorTorqueMsgPayload if turns else messaging.ArrayMotorForceMsgPayload
@@ -143,7 +143,7 @@ def _wheel(wheel: CraftWheel) -> Any:
     return made
 
 
-def _turning_chain(parts: list[Part]) -> tuple[Any, tuple[str, str]]:
+def _turning_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
     effector = spinningBodyNDOFStateEffector.SpinningBodyNDOFStateEffector()
     for part in parts:
         body = spinningBodyNDOFStateEffector.SpinningBody()
@@ -159,7 +159,7 @@ def _turning_chain(parts: list[Part]) -> tuple[Any, tuple[str, str]]:
     return effector, (effector.getNameOfThetaState(), effector.getNameOfThetaDotState())
 
 
-def _sliding_chain(parts: list[Part]) -> tuple[Any, tuple[str, str]]:
+def _sliding_chain(parts: list[CraftPart]) -> tuple[Any, tuple[str, str]]:
     effector = linearTranslationNDOFStateEffector.LinearTranslationNDOFStateEffector()
     for part in parts:
         body = linearTranslationNDOFStateEffector.TranslatingBody()

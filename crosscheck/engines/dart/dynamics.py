@@ -1,6 +1,6 @@
 """Hybrid dynamics of a DART tree as an ordinary differential equation.
 
-State y = [free coordinates, free speeds, work]. Quaternions are integrated as four numbers: qdot is linear in q, so the
+State y = [free coordinates, free speeds, work], speeds of free joints in outboard axes. Quaternions are integrated as four numbers: qdot is linear in q, so the
 norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates follow their
 functions of time: DART takes their accelerations as commands, and gives the forces that they need.
 """
@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from crosscheck.engines.conventions import quaternion_rate, rotation_matrix, rotation_vector
+from crosscheck.engines.conventions import cross, quaternion_rate, rotate_spatial, rotation_matrix, rotation_vector
 from crosscheck.engines.dart.forces import DartJointForces, DartLoads
 from crosscheck.engines.dart.tree import DartTree, initial_state
 from crosscheck.engines.functions_of_time import profile
@@ -21,7 +21,7 @@ from flexmb.typing import Real
 
 
 class DartState(NamedTuple):
-    """The scene's coordinates (nq,) with unit quaternions, DART's speeds (nv,), driven accelerations (d,)."""
+    """The scene's coordinates (nq,) with unit quaternions and its speeds (nv,), driven accelerations (d,)."""
 
     q: Real
     v: Real
@@ -29,7 +29,7 @@ class DartState(NamedTuple):
 
 
 class DartSolution(NamedTuple):
-    """Accelerations (nv,), loads of the driven coordinates (d,), power of drives, motors, dampers and loads (W)."""
+    """DART's accelerations (nv,), loads of the driven coordinates (d,), power of all but springs and gravity (W)."""
 
     acceleration: Real
     drive: Real
@@ -73,7 +73,7 @@ class DartDynamics:
         """Leaves the tree in the state, with its accelerations and the loads across its joints."""
         skeleton, D = self.tree.skeleton, self._driven_v
         skeleton.setPositions(self._positions(state.q))
-        skeleton.setVelocities(state.v)
+        skeleton.setVelocities(self._speeds(state))
         power = self._loads.apply(t) if self._loads else 0.0
         lost = self.forces.dampers_and_motors(t, state.v)
         tau = self.forces.springs(state.q) + lost
@@ -91,18 +91,29 @@ class DartDynamics:
         solution = self.solve(t, state)
         qdot = np.empty(self.tree.nq)
         qdot[self._scalar_q] = state.v[self._scalar_v]
+        vdot = solution.acceleration.copy()
         own = np.empty(self.tree.nq)  # the quaternions' own values, not normalised, enter their rates
         own[self._free_q] = y[: len(self._free_q)]
         for slot in self._balls:
             place = slice(slot.q, slot.q + 4)
             qdot[place] = quaternion_rate(own[place], state.v[slot.v : slot.v + 3])
         for slot in self._floating:
-            place = slice(slot.q + 3, slot.q + 7)
-            inboard = slot.link.inboard.rotation.T
-            turning = rotation_matrix(state.q[place]).T @ inboard @ state.v[slot.v : slot.v + 3]
-            qdot[slot.q : slot.q + 3] = inboard @ state.v[slot.v + 3 : slot.v + 6]
+            place, speeds = slice(slot.q + 3, slot.q + 7), slice(slot.v, slot.v + 6)
+            R, v = rotation_matrix(state.q[place]), state.v[speeds]
+            turning = v[:3]
+            qdot[slot.q : slot.q + 3] = R @ v[3:]
             qdot[place] = quaternion_rate(own[place], turning)
-        return np.concatenate([qdot[self._free_q], solution.acceleration[self._free_v], [solution.power]])
+            changing = rotate_spatial((slot.link.inboard.rotation @ R).T, vdot[speeds])
+            vdot[speeds] = changing - np.concatenate([np.zeros(3), cross(turning, v[3:])])
+        return np.concatenate([qdot[self._free_q], vdot[self._free_v], [solution.power]])
+
+    def _speeds(self, state: DartState) -> Real:
+        """DART's speeds (nv,) of the scene's."""
+        found = state.v.copy()
+        for slot in self._floating:
+            R = slot.link.inboard.rotation @ rotation_matrix(state.q[slot.q + 3 : slot.q + 7])
+            found[slot.v : slot.v + 6] = rotate_spatial(R, state.v[slot.v : slot.v + 6])
+        return found
 
     def _positions(self, q: Real) -> Real:
         """DART's coordinates (nv,) of the scene's (nq,)."""

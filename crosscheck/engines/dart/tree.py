@@ -2,7 +2,8 @@
 
 Conventions of DART: spatial vectors [angular; linear]; a ball joint's coordinates are a rotation vector and its speeds
 are in outboard axes; those of a free joint are a rotation vector, then the position, in the joint's inboard frame, and
-its speeds, angular first, are in the axes of the *parent body*, wherever the joint's frame is turned to. Its own springs and dampers are part of an implicit step, and are not used.
+its speeds, angular first, are in the axes of the *parent body*, wherever the joint's frame is turned to. Its own
+springs and dampers are part of an implicit step, and are not used.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 import dartpy
 import numpy as np
 
-from crosscheck.engines.conventions import Frame, rotation_matrix
+from crosscheck.engines.conventions import Frame
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar
 from flexmb.scene.schema import Scene
@@ -79,7 +80,7 @@ def build_tree(scene: Scene, chain: tuple[Link, ...]) -> DartTree:
 
 
 def initial_state(tree: DartTree) -> tuple[Real, Real]:
-    """The scene's coordinates (nq,) and DART's speeds (nv,) at t = 0."""
+    """The scene's coordinates (nq,) and speeds (nv,) at t = 0, those of free joints in outboard axes."""
     q, v = np.zeros(tree.nq), np.zeros(tree.skeleton.getNumDofs())
     for slot in tree.slots:
         match slot.freedom:
@@ -91,9 +92,8 @@ def initial_state(tree: DartTree) -> tuple[Real, Real]:
                 q[slot.q : slot.q + 4] = freedom.quaternion
                 v[slot.v : slot.v + 3] = freedom.angular_velocity
             case Floating() as freedom:
-                R = slot.link.inboard.rotation @ rotation_matrix(freedom.quaternion)
                 q[slot.q : slot.q + 7] = [*freedom.position, *freedom.quaternion]
-                v[slot.v : slot.v + 6] = [*(R @ freedom.angular_velocity), *(R @ freedom.velocity)]
+                v[slot.v : slot.v + 6] = [*freedom.angular_velocity, *freedom.velocity]
     return q, v
 
 

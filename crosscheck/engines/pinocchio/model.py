@@ -15,7 +15,6 @@ from crosscheck.engines.pinocchio.tree import build_tree
 from crosscheck.engines.scipy_loop import integrate
 from crosscheck.engines.trajectories import stack
 from flexmb.scene.schema import Scene
-from flexmb.typing import Real
 
 
 class PinocchioModel:

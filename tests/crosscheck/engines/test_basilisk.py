@@ -11,7 +11,7 @@ from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.randomise import randomise
 from crosscheck.engines.registry import engine
 from flexmb.scene.build import SceneBuilder, angular, linear
-from flexmb.scene.functions import Constant, Sine
+from flexmb.scene.functions import Sine
 from flexmb.scene.schema import Scene
 from tests.crosscheck.engines.random_scenes import inertia, rotation, unit
 
@@ -64,7 +64,8 @@ def spacecraft(seed: int) -> Scene:
 
 def compare(ours: Snapshot, theirs: Snapshot) -> None:
     for kind in ("position", "velocity", "acceleration"):
-        mine, other = (np.array([getattr(seen.markers[name], kind) for name in ours.markers]) for seen in (ours, theirs))
+        pair = ([getattr(seen.markers[name], kind) for name in ours.markers] for seen in (ours, theirs))
+        mine, other = map(np.array, pair)
         assert np.abs(mine - other).max() <= 1e-10 * np.abs(other).max(), kind
     for name, marker in ours.markers.items():
         assert abs(marker.quaternion @ theirs.markers[name].quaternion) == pytest.approx(1.0, abs=1e-12)
@@ -130,7 +131,7 @@ def hub() -> SceneBuilder:
         (hub().cylindrical("sleeve", "hub", "arm", axis=(0, 0, 1)), "a chain both turns and slides"),
         (hub().free("second", "ground", "arm"), '"second" hangs on nothing'),
         (
-            hub().revolute("shaft", "hub", "arm").force("tug", "arm", direction=(1, 0, 0), function=Constant(value=1.0)),
+            hub().revolute("shaft", "hub", "arm").force("tug", "arm", direction=(1, 0, 0), function=WAVE),
             'load "tug" does not act on the hub',
         ),
         (

@@ -1,4 +1,4 @@
-"""What an engine that joined a case cannot represent is not applicable; nobody else may refuse, and nobody do nothing."""
+"""What a guest among the engines cannot represent is not applicable; nobody else may refuse, and nobody do nothing."""
 
 from __future__ import annotations
 
