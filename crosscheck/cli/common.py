@@ -114,7 +114,9 @@ SchedulerAddress = Annotated[
         help="`local`, or the address of a Dask scheduler such as tcp://10.0.0.1:8786; docs/sweeps.md tells more.",
     ),
 ]
-Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
+Strict = Annotated[
+    bool, typer.Option("--strict", help="Figures worse than recorded or not recorded, references never made: errors.")
+]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 

@@ -1,8 +1,9 @@
 """Hybrid dynamics of a DART tree as an ordinary differential equation.
 
-State y = [free coordinates, free speeds, work], speeds of free joints in outboard axes. Quaternions are integrated as four numbers: qdot is linear in q, so the
-norm is an invariant of the exact flow, and everything else uses the normalised q. Driven coordinates follow their
-functions of time: DART takes their accelerations as commands, and gives the forces that they need.
+State y = [free coordinates, free speeds, work], speeds of free joints in outboard axes. Quaternions are integrated as
+four numbers: qdot is linear in q, so the norm is an invariant of the exact flow; everything else uses the normalised q.
+Driven coordinates follow their functions of time: DART takes their accelerations as commands, and gives the forces that
+they need.
 """
 
 from __future__ import annotations
