@@ -18,7 +18,6 @@ SYMBOLS: dict[str, str] = {
     "did not finish": "⧖",
     "crashed": "☠",
     "did not run": "–",
-    "not applicable": "○",
 }
 
 

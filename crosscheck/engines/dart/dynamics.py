@@ -121,7 +121,18 @@ class DartDynamics:
         found = np.empty(self.tree.skeleton.getNumDofs())
         found[self._scalar_v] = q[self._scalar_q]
         for slot in self._balls:
-            found[slot.v : slot.v + 3] = rotation_vector(q[slot.q : slot.q + 4])
+            found[slot.v : slot.v + 3] = _rotation_vector(q[slot.q : slot.q + 4])
         for slot in self._floating:
-            found[slot.v : slot.v + 6] = [*rotation_vector(q[slot.q + 3 : slot.q + 7]), *q[slot.q : slot.q + 3]]
+            found[slot.v : slot.v + 6] = [*_rotation_vector(q[slot.q + 3 : slot.q + 7]), *q[slot.q : slot.q + 3]]
         return found
+
+
+def _rotation_vector(quaternion: Real) -> Real:
+    """The rotation vector (3,) that DART can turn into the rotation: of small ones it drops the third order.
+
+    Below 1e-5 rad that is less than round-off. Up to 1e-2 rad, well beyond where its series ends, the vector is that of
+    the long way round, whose angle is not small.
+    """
+    vector = rotation_vector(quaternion)
+    angle = np.sqrt(vector @ vector)
+    return vector * (1.0 - 2.0 * np.pi / angle) if 1e-5 < angle < 1e-2 else vector
