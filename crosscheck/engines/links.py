@@ -124,6 +124,8 @@ class Attachment:
 def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
     """Why an engine of rigid trees with closures of some types cannot represent the scene; empty if it can."""
     for closure in scene.closures:
+        if not closed_by:
+            return f'closure "{closure.name}": {engine} closes no loops'
         if closure.type not in closed_by:
             known = ", ".join(closed_by)
             return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'

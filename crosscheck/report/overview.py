@@ -47,12 +47,12 @@ class Unexpected:
 
 
 def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> Matrix:
-    """What every case found with every engine; cases that are not as expected come first."""
+    """What every case found with every engine; not as expected first, nothing to judge last."""
     everything = [verdict for verdict in outcome.all if verdict.kind == "comparison"]
     engines = list(dict.fromkeys(engine for verdict in everything for _, engine in verdict.sides))
     engines += [engine for engine in outcome.never_applicable if engine not in engines]
     rows = [_row(case, outcome, engines, places[case.case.case].link()) for case in session.cases]
-    rows.sort(key=lambda row: row.look != "bad")
+    rows.sort(key=lambda row: (row.look != "bad", not row.verdicts))
     return Matrix((*engines, "Conservation", "Negative controls"), tuple(rows))
 
 
