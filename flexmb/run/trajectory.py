@@ -13,12 +13,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from flexmb.run import exports
+from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
+from flexmb.run.restart import Restart
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
+from flexmb.tables.state import State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -75,6 +78,7 @@ class Trajectory:
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    `restart`: how the run is taken up there, None if it failed.
     """
 
     scene: str
@@ -94,6 +98,7 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
+    restart: Restart | None = None
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
@@ -145,6 +150,29 @@ class Trajectory:
     @property
     def finished(self) -> bool:
         return self.status is Status.OK
+
+    @property
+    def last_state(self) -> State:
+        """The state at the last output time: `simulate(other, t_end, state=trajectory.last_state)` starts from it."""
+        return self.state_at(-1)
+
+    def state_at(self, sample: int) -> State:
+        """The state at an output time, by its number; negative ones count from the end. IndexError without it."""
+        return State(self.q[sample], self.u[sample], float(self.t[sample]))
+
+    def values_at(self, sample: int) -> dict[str, float]:
+        """The same by the names of coordinates and speeds, for a scene that shares some of them."""
+        values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
+        return {name: float(value) for (name, _), value in values}
+
+    def then(self, later: Trajectory) -> Trajectory:
+        """This run and a later one as one: output times of this one, as far as the later one does not have them.
+
+        Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
+        them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        the last time of this one.
+        """
+        return joined(self, later)
 
     @property
     def total_energy(self) -> Real:

@@ -6,7 +6,8 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from flexmb.scene.bodies import (
     ZERO,
@@ -28,6 +29,7 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -44,6 +46,7 @@ from flexmb.scene.hinges import (
     Universal,
     Weld,
 )
+from flexmb.scene.values import with_values
 
 
 class Wheel(SceneStruct, frozen=True, kw_only=True):
@@ -145,12 +148,22 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    events: tuple[SceneEvent, ...] = ()
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
+
+        Paths go by keys, items by their name, number or `*` for all: see `flexmb.scene.values.with_values`. Raises
+        PathError, a ValueError, for a path that leads to nothing, and for a value of another kind.
+        """
+        return with_values(self, values)
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
-    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "Table", "TipMass", "Universal", "Vector", "Waiver", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
+    "Cylindrical", "EndRun", "Free", "Function", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level",
+    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node",
+    "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene",
+    "SceneEvent", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector",
+    "Waiver", "Weld", "Wheel",
 ]  # fmt: skip
