@@ -18,6 +18,7 @@ from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
+from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables.state import State
@@ -110,15 +111,31 @@ class Trajectory:
         """
         return error_estimate(self, self._making("its error"))
 
+    def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
+        """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).
+
+        See `System.hinge_loads`.
+        """
+        system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
+        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
+            at = system._loads_in(float(t), y, {name: load[i] for name, load in self.loads.items()}, axes, about)
+            for name, load in at.items():
+                found[name][i] = load
+        return found
+
+    @property
+    def _states(self) -> Real:
+        """(T,nq+nu+1) [q, u, 0]."""
+        return np.column_stack([self.q, self.u, np.zeros(len(self.t))])
+
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
         See `System.section_loads`. Raises DynamicsError where a state has no accelerations.
         """
         balance = SectionBalance(self._making("a section's load").system, body, x)
-        states = np.column_stack([self.q, self.u, np.zeros(len(self.t))])
         loads = np.zeros((len(self.t), len(balance.x), 6))
-        for i, (t, y) in enumerate(zip(self.t, states, strict=True)):
+        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
             loads[i] = balance.at(float(t), y)
         return balance.loads(loads)
 

@@ -79,16 +79,20 @@ def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
 
 def hinge_frames(system: System, w: Workspace) -> dict[str, HingeFrames]:
     """Of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
-    found = {link.hinge.name: _of_hinge(system, w, k) for k, link in enumerate(system._links)}
-    for i, closure in enumerate(system.scene.closures):
-        sides = closure_sides(closure)
-        a, b = (_of_side(w, sides[j], *system._closure_ports[2 * i + j]) for j in range(2))
-        found[closure.name] = HingeFrames(a.rotation, b.rotation, b.position)
-    return found
+    found = {link.hinge.name: hinge_frames_of(system, w, k) for k, link in enumerate(system._links)}
+    closures = enumerate(system.scene.closures)
+    return found | {closure.name: closure_frames_of(system, w, i) for i, closure in closures}
 
 
-def _of_hinge(system: System, w: Workspace, k: int) -> HingeFrames:
-    """The dynamics turns both frames so that a hinge axis is z: turned back here."""
+def closure_frames_of(system: System, w: Workspace, i: int) -> HingeFrames:
+    """Frames A and B of closure i, and the origin of B."""
+    sides = closure_sides(system.scene.closures[i])
+    a, b = (_of_side(w, sides[j], *system._closure_ports[2 * i + j]) for j in range(2))
+    return HingeFrames(a.rotation, b.rotation, b.position)
+
+
+def hinge_frames_of(system: System, w: Workspace, k: int) -> HingeFrames:
+    """Of the hinge of body k. The dynamics turns both frames so that a hinge axis is z: turned back here."""
     body, back = system.constants.body[k], system._links[k].turn.T
     parent, own = link_pose(w, int(body["parent"])), link_pose(w, k)
     inward, outward = int(body["inboard_port"]), int(body["outboard_port"])

@@ -19,7 +19,7 @@ from flexmb.modal.flexible_model import SecondOrder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.quaternions import rotation_by
 from flexmb.scene.tree import node_frame
-from flexmb.system.frames import Pose, body_pose, hinge_frames, link_pose
+from flexmb.system.frames import Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
 from flexmb.system.turning_points import turning
 from flexmb.tables import arguments
 from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
@@ -100,6 +100,7 @@ class SectionBalance:
         self.x = cuts
         self._cuts, self._places = np.unique(cuts, return_inverse=True)
         self._k = system.body_names.index(body)
+        self._outboard = np.flatnonzero(system.constants.body["parent"] == self._k).tolist()
         self.sections = beam_sections(self._beam, self._cuts)
 
     def at(self, t: float, y: Real) -> Real:
@@ -145,7 +146,7 @@ class SectionBalance:
     def _outer(self, w: Workspace, pose: Pose, loads: dict[str, Real], wheels: dict[str, Real]) -> list[_Outer]:
         """All that others exert on the beam, with where along it."""
         system, k, scene = self._system, self._k, self._system.scene
-        frames, constants = hinge_frames(system, w), system.constants
+        constants = system.constants
         found: list[_Outer] = []
 
         def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
@@ -154,12 +155,12 @@ class SectionBalance:
             about = torque + np.cross(point - pose.position, force)
             found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
 
-        for j, link in enumerate(system._links):
-            load, point = loads[link.hinge.name], frames[link.hinge.name].point
-            if j == k:  # a section at the hinge itself transmits its load: the hinge is not beyond
-                add(link.outboard_end.node, load[:3], load[3:], point, at=False)
-            elif constants.body["parent"][j] == k:
-                add(link.inboard_end.node, -load[:3], -load[3:], point)
+        own = system._links[k]
+        load = loads[own.hinge.name]  # a section at the hinge itself transmits its load: the hinge is not beyond
+        add(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(system, w, k).point, at=False)
+        for j in self._outboard:
+            link, load = system._links[j], loads[system._links[j].hinge.name]
+            add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(system, w, j).point)
         carrier = link_pose(w, k)
         rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
         for wheel, row in zip((each for each in scene.wheels if each.body == self.body), rows, strict=True):
@@ -174,11 +175,11 @@ class SectionBalance:
             point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
             torque, force = (value, none) if table["type"] == TORQUE else (none, value)
             add(load_of.node, torque, force, point)
-        for closure in scene.closures:
-            load, point = loads[closure.name], frames[closure.name].point
+        for i, closure in enumerate(scene.closures):
             for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
                 if side.body == self.body:
-                    add(side.node, sign * load[:3], sign * load[3:], point)
+                    load = sign * loads[closure.name]
+                    add(side.node, load[:3], load[3:], closure_frames_of(system, w, i).point)
         return found
 
     def _in_sections(self, wrench: Real, eta: Real) -> Real:

@@ -291,6 +291,13 @@ class System(Mechanics):
             loads, w = finite_result(self._inverse(t, y, rates)[1], t), self._w
         return referred(self, w, self._by_hinge(loads), axes, about)
 
+    def _loads_in(
+        self, t: float, y: Real, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    ) -> dict[str, Real]:
+        """Loads of hinges and closures that were found at this state, World axes, in other axes about a node."""
+        self._inverse(t, y, np.zeros(self.nu))  # leaves poses as the equations of motion see them
+        return referred(self, self._w, loads, axes, about)
+
     def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
         """Axial force, shear, bending and torsion across the sections of a beam at x (X,) m, of the free motion.
 

@@ -304,7 +304,8 @@ EXEMPT = {
     "Trajectory.to_csv", "Trajectory.plot", "Trajectory.to_npz", "Trajectory.to_parquet",  # a path
     "Trajectory.to_rerun",  # a path
     "Trajectory.to_pandas", "Trajectory.to_xarray", "Trajectory.error_estimate",  # nothing
-    "Trajectory.section_loads", "ClosedSystem.section_loads",  # the system's; the closed chain here has no beam
+    "Trajectory.section_loads", "Trajectory.loads_in",  # the system's
+    "ClosedSystem.section_loads",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise", "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",

@@ -71,6 +71,18 @@ def test_a_free_axis_feels_its_spring_alone() -> None:
         assert loads["shoulder"][2] == pytest.approx(0.0, abs=1e-9 * np.linalg.norm(loads["shoulder"]))
 
 
+def test_over_a_run() -> None:
+    """The same as state by state."""
+    system = fm.compile(arm("tip"))
+    run = fm.simulate(system, 0.02, samples=4, rtol=1e-6, atol=1e-8)
+    found = run.loads_in("outboard", about=("upper", "middle"))
+    state = system.state(run.q[2], run.u[2], run.t[2])
+    for name, load in system.hinge_loads(state, axes="outboard", about=("upper", "middle")).items():
+        np.testing.assert_allclose(found[name][2], load, atol=1e-10 * np.linalg.norm(load))
+    for name, load in run.loads_in().items():
+        assert np.array_equal(load, run.loads[name])
+
+
 def test_closures_have_frames_too() -> None:
     """A four-bar that lies in a plane: its pins transmit forces in the plane, whatever their frames' names."""
     bar = {"mass": 1.0, "com": (0.5, 0.0, 0.0), "inertia": (0.01, 0.1, 0.1)}
