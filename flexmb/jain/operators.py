@@ -288,7 +288,7 @@ class SpatialOperators:
         return M_m, b_m
 
     def _external(self, now: Configuration, t: float, columns: tuple[slice, ...], M_m: Real) -> Real:
-        """Modal forces (nbar,) of gravity and of loads at nodes."""
+        """Modal forces (nbar,) of gravity, of loads at nodes and of connectors between them."""
         fall = np.zeros(len(M_m))
         for at in columns:
             fall[at][-3:] = self._dense.scene.gravity_m_s2
@@ -301,4 +301,9 @@ class SpatialOperators:
             F = np.zeros(6)
             F[slice(0, 3) if load.type == "torque" else slice(3, 6)] = profile(load.function, t).value * direction
             found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
+        for name, gripped in self._dense.grips(now.q, now.u, t).items():
+            for side, F in (("a", gripped.on_a), ("b", gripped.on_b)):
+                k, seat = self._bodies.sites[f"connector {side}:{name}"]
+                if k >= 0:
+                    found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
         return found

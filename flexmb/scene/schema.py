@@ -28,6 +28,15 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.connectors import (
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -122,6 +131,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
@@ -130,9 +140,10 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
-    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body", "Bushing",
+    "Closure", "Connector", "Constant", "Cylindrical", "Free", "Function", "Gimbal", "Hinge", "InertiaPoint", "Level",
+    "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode",
+    "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Revolute",
+    "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "SpringDamper", "Table", "TipMass",
+    "Universal", "Vector", "Weld", "Wheel",
 ]  # fmt: skip

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexmb.building.assemble import assemble
+from flexmb.building.connector_arrays import between_nodes
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
@@ -26,6 +27,7 @@ from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
+from flexmb.scene.connectors import HingeFriction, HingeSpring
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
@@ -78,7 +80,8 @@ class System(Mechanics):
     def _observation(self) -> Observation:
         hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
         closures, driven = [closure.name for closure in self.scene.closures], self._driven([*hinges, *wheels])
-        return Observation(Names(self._markers, hinges, wheels, closures, driven), self.nu)
+        connectors = [each.name for each in between_nodes(self.scene)], [*_along_hinges(self.scene)]
+        return Observation(Names(self._markers, hinges, wheels, closures, driven, *connectors), self.nu)
 
     @cached_property
     def _out(self) -> Outputs:  # type: ignore[override]
@@ -309,6 +312,12 @@ class System(Mechanics):
             return {}
         places = ((name, self.speed(name)) for name in names)
         return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
+
+
+def _along_hinges(scene: s.Scene) -> Iterator[str]:
+    """Springs along hinges, then friction, as the tables have them."""
+    for kind in (HingeSpring, HingeFriction):
+        yield from (each.name for each in scene.connectors if isinstance(each, kind))
 
 
 def _find(places: dict[str, slice], name: str) -> slice:
