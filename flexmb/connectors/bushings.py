@@ -6,10 +6,14 @@ the angular velocity w_rel = J theta' of B relative to A, J the left Jacobian of
     theta' = J^-1 w_rel        x' = R_A'(v_B - v_A) - w_A x x
 
 Generalised loads g = K xi + D xi' do the work g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x], and that of
-the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned.
+the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned. At half a turn theta jumps
+to the other side, and the energy with it: a bushing ends the run ten degrees before.
 """
 
+from math import cos, radians
+
 from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import every, kept
 from flexmb.spatial.rotation import (
     inverse_jacobian_coefficient,
     inverse_left_jacobian_times,
@@ -19,6 +23,9 @@ from flexmb.spatial.rotation import (
 )
 from flexmb.spatial.spatial_vector import dot6, scale6, store6, sum6, times6
 from flexmb.spatial.vector import cross, dot, matmul, store3, sub, times_t, transpose
+from flexmb.tables.arrays import BUSHING
+
+LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2
 
 
 @helper
@@ -34,11 +41,23 @@ def load_of_bushing(c, w, i, A, B):
     damping = _product(c.bushing[row].damping, (turning, moving))
     g = sum6(elastic, damping)
     # the transpose of the inverse left Jacobian is the inverse right one
-    load = inverse_right_jacobian_times(theta, b, g[0]), g[1]
+    upright = q[0] * q[0]
+    w.connector[i].upright = upright
+    torque = inverse_right_jacobian_times(theta, b, g[0])
+    load = (kept(upright.real > LEAST_UPRIGHT, torque[0]), torque[1], torque[2]), g[1]
     store6(w.connector[i].load, 0, scale6(-1.0, times6(R_A, load)))
     store3(w.connector[i].arm, 0, arm)
     w.connector[i].energy = 0.5 * dot6(elastic, (theta, x))
     w.connector[i].power = -dot6(damping, (turning, moving))
+
+
+@helper
+def overturned(c, w):
+    """A bushing that is turned beyond its range, -1 where there is none. Of lanes: of all; what goes on of some is NaN."""
+    for i in range(c.connector.shape[0]):
+        if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
+            return i
+    return -1
 
 
 @helper

@@ -15,8 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.dense.body_frames import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
-from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
 from flexmb.dense.connectors import Grip, grip, hold
+from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
 from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import MovingFrame

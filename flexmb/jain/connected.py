@@ -1,12 +1,16 @@
 """Connectors in the sweeps: between frames that ports are, or the ground; their loads as forces on bodies and modes."""
 
 from flexmb.connectors.between import load_between
+from flexmb.connectors.bushings import overturned
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.ports import port_velocity
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, sweep
 from flexmb.spatial.spatial_vector import ZERO6, scale6, shift_force, times6, times6_t, vec6
 from flexmb.spatial.vector import add, mat3, matmul, times, vec3
 from flexmb.tables.arrays import ON_GROUND
+from flexmb.tables.features import BUSHINGS
+from flexmb.tables.status import CONNECTOR_OVERTURNED, OK
 
 
 @sweep
@@ -21,12 +25,18 @@ def evaluate_connectors(c, w):
 
 @sweep
 def connect(c, w):
-    """Subtract the loads of all connectors from the bias forces of the bodies that they join."""
+    """Subtract the loads of all connectors from the bias forces of the bodies that they join; a status code."""
     evaluate_connectors(c, w)
+    if has(c, BUSHINGS):
+        i = overturned(c, w)
+        if i >= 0:
+            w.fault[0] = i
+            return CONNECTOR_OVERTURNED
     for i in range(c.connector.shape[0]):
         on_B = vec6(w.connector[i].load, 0)
         _add_force(c, w, i, 1, scale6(-1.0, on_B))
         _add_force(c, w, i, 0, shift_force(on_B, vec3(w.connector[i].arm, 0)))
+    return OK
 
 
 @helper

@@ -18,11 +18,15 @@ from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, plus6, shift_force, store6, vec6
 from flexmb.spatial.vector import axpy, dot, scale, vec3
 from flexmb.tables.features import CONNECTORS
+from flexmb.tables.status import OK
 
 
 @helper
 def inverse_dynamics(c, w, tau):
-    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads."""
+    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads.
+
+    Returns the status code of connectors.
+    """
     velocity_sweep(c, w, False, False)
     if c.load.shape[0] > 0 or has(c, CONNECTORS):
         pose_sweep(c, w)
@@ -32,10 +36,10 @@ def inverse_dynamics(c, w, tau):
         elastic_forces(c, w, k)
         node_loads(c, w, k)
         _inertial_force(c, w, k, tau)
-    if has(c, CONNECTORS):
-        connect(c, w)
+    status = connect(c, w) if has(c, CONNECTORS) else OK
     for k in range(c.body.shape[0] - 1, -1, -1):
         _project_force(c, w, k, tau)
+    return status
 
 
 @helper

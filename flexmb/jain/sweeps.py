@@ -61,9 +61,9 @@ def bodies(c, w):
             node_loads(c, w, k)
         if has(c, WHEELS):
             wheel_forces(c, w, k)
-    if has(c, CONNECTORS):
-        connect(c, w)
     w.displaced[0] = 0
+    if has(c, CONNECTORS):
+        return connect(c, w)
     return OK
 
 

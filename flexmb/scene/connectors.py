@@ -50,8 +50,9 @@ class Bushing(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="bus
     """Elasticity and damping of all relative motions of frame B seen from frame A, in axes of A.
 
     The displacement is [rotation vector of B; position of B], `stiffness` and `damping` are symmetric (6,6) in this
-    order: N m/rad, N/m and what couples them. Energy is that of the stiffness; below half a turn the moment is exactly
-    its derivative, and at half a turn the rotation vector jumps. The load is an output: on `body_b`, about B.
+    order: N m/rad, N/m and what couples them. Energy is that of the stiffness, and the load is exactly its derivative,
+    for any rotation below 170 degrees; a run that turns a bushing further stops. The load is an output: on `body_b`,
+    about B.
     """
 
     name: str

@@ -36,7 +36,7 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
-from flexmb.tables.status import OK
+from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -301,6 +301,12 @@ class System(Mechanics):
         """
         algorithms.chosen(algorithm).observe(self, t, y)
         self._observation.fill(row, t, _NO_CLOSURES)
+
+    def fault_name(self, status: int, fault: int) -> str:
+        """Name of the body or connector that the number of a failure stands for."""
+        if status == Status.CONNECTOR_OVERTURNED:
+            return between_nodes(self.scene)[fault].name
+        return super().fault_name(status, fault)
 
     def _wheel_names(self) -> Iterator[str]:
         yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))

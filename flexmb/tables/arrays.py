@@ -263,6 +263,7 @@ PORT_STATE = _record(
 CONNECTOR_STATE = _record(
     ("load", _F, (6,)),  # [torque; force] on B about B, World axes
     ("arm", _F, (3,)),  # from A to B, World axes
+    ("upright", _F),  # of a bushing, square of the cosine of half its rotation
     ("energy", _F),
     ("power", _F),  # of all that is not elastic
 )

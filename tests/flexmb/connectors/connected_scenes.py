@@ -20,7 +20,8 @@ def bodies(*, grounded: bool, level: s.Level = "full", spin: float = 1.0) -> Sce
     """A free hub with a flexible boom on a revolute hinge, a slider with a wheel on the hub, all of them moving."""
     section = beam_section(E=2e9, G=8e8, A=6e-4, Iy=8e-8, Iz=5e-8, rho=1500.0)
     builder = SceneBuilder("connected", gravity=(0.3, 0.1, -2.0) if grounded else (0, 0, 0))
-    builder.rigid_body("hub", mass=3.0, com=(0.02, 0.0, 0.01), inertia=(0.2, 0.25, 0.3), nodes={"corner": (0.3, 0.2, 0.1)})
+    corner = {"corner": (0.3, 0.2, 0.1)}
+    builder.rigid_body("hub", mass=3.0, com=(0.02, 0.0, 0.01), inertia=(0.2, 0.25, 0.3), nodes=corner)
     builder.beam("boom", length=1.2, elements=6, section=section, modes=3, level=level, nodes={"middle": 0.7})
     builder.rigid_body("slider", mass=0.8, com=(0.0, 0.01, 0.0), inertia=(0.02, 0.03, 0.025))
     builder.free(
@@ -49,7 +50,7 @@ def between_bodies(builder: SceneBuilder) -> SceneBuilder:
         .spring_damper("curve", "hub", "slider", free_length=0.2, table=(-0.2, 0.0, 0.05, 0.1, 0.3),
                        loads=(-3.0, -1.0, 0.5, 2.0, 9.0), position_b=(0.2, 0.1, 0.0))
         .bushing("mount", "boom", "slider", node_a="middle", position_a=(0.05, 0.02, -0.03),
-                 quaternion_a=(0.6, 0.0, 0.8, 0.0), position_b=(0.1, 0.0, 0.2), quaternion_b=(0.0, 0.6, 0.0, 0.8),
+                 quaternion_a=(0.6, 0.0, 0.8, 0.0), position_b=(0.1, 0.0, 0.2), quaternion_b=(0.48, 0.36, 0.8, 0.0),
                  stiffness=positive(1, 3.0))
     )  # fmt: skip
 
@@ -75,10 +76,11 @@ def losses(builder: SceneBuilder) -> SceneBuilder:
 def to_ground(builder: SceneBuilder) -> SceneBuilder:
     """A spring and a bushing whose first, or second, end is on the ground."""
     return builder.spring_damper(
-        "tether", "ground", "hub", position_a=(1.0, 0.5, 2.0), node_b="corner", free_length=1.0, stiffness=12.0, damping=0.7
+        "tether", "ground", "hub", position_a=(1.0, 0.5, 2.0), node_b="corner", free_length=1.0, stiffness=12.0,
+        damping=0.7,
     ).bushing(
         "foot", "slider", "ground", stiffness=positive(4, 2.0), damping=positive(5, 0.2), position_b=(0.2, 0.1, 0.0),
-        quaternion_b=(0.6, 0.64, 0.48, 0.0),
+        quaternion_b=(0.96, 0.0, 0.28, 0.0),
     )  # fmt: skip
 
 

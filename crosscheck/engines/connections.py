@@ -1,0 +1,237 @@
+"""Connectors evaluated for the peers, from the schema's definitions: loads on both ends, energy, power.
+
+Independent of the native code's compiled evaluation, so that the two check each other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import hypot, inf, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+from scipy.spatial.transform import Rotation
+
+from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Attachment, Link, attachment
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.connectors import (
+    AlongHinge,
+    BetweenNodes,
+    Bushing,
+    HingeFriction,
+    HingeSpring,
+    SpringDamper,
+    by_stem,
+)
+from flexmb.scene.schema import Marker, Scene
+from flexmb.scene.tree import GROUND, coordinate_of
+from flexmb.typing import Real
+
+Law = Callable[[float], tuple[float, float]]
+"""Of a displacement: the load that resists it, and the energy stored."""
+
+
+class Moving(NamedTuple):
+    """A frame in World: position (3,), rotation (3,3), angular velocity (3,), velocity (3,)."""
+
+    position: Real
+    rotation: Real
+    angular: Real
+    linear: Real
+
+    def carrying(self, inner: Frame) -> Moving:
+        """A frame fixed to this one."""
+        arm = self.rotation @ inner.position
+        velocity = self.linear + cross(self.angular, arm)
+        return Moving(self.position + arm, self.rotation @ inner.rotation, self.angular, velocity)
+
+
+WORLD = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+class Exerted(NamedTuple):
+    """[torque; force] (6,) on A about A and on B about B, World axes; energy (J); power of what is not elastic (W)."""
+
+    on_a: Real
+    on_b: Real
+    energy: float
+    power: float
+
+
+class Along(NamedTuple):
+    """Load along a coordinate, energy (J), power of what is not elastic (W)."""
+
+    load: float
+    energy: float
+    power: float
+
+
+class Connection:
+    """A connector between two frames on links; link -1 is the ground."""
+
+    def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes) -> None:
+        self.name = connector.name
+        self.a, self.b = (_attached(scene, chain, connector, side) for side in "ab")
+        self._exert = _line(connector) if isinstance(connector, SpringDamper) else _bushing(connector)
+
+    def exerted(self, t: float, a: Moving, b: Moving) -> Exerted:
+        """Between frames A and B that move so, at time t."""
+        on_b, energy, power = self._exert(t, a, b)
+        arm = b.position - a.position
+        on_a = -np.concatenate([on_b[:3] + cross(arm, on_b[3:]), on_b[3:]])
+        return Exerted(on_a, on_b, energy, power)
+
+
+def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
+    """Connectors between nodes."""
+    return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, BetweenNodes))
+
+
+def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float], Along]]]:
+    """(name, hinge, point mass or wheel, number of its coordinate, load by value and rate) of each along a hinge."""
+    found = []
+    for connector in scene.connectors:
+        if isinstance(connector, AlongHinge):
+            item, number = coordinate_of(scene, connector)
+            found.append((connector.name, item.name, number, _along(connector)))
+    return found
+
+
+def stiffest(scene: Scene, chain: tuple[Link, ...]) -> float:
+    """A bound (rad/s) of what connectors between nodes add to frequencies, for choosing a step.
+
+    By their stiffness at rest and the links' own masses and inertias, which other links only add to.
+    """
+    squares = 0.0
+    for each, connector in zip(connections(scene, chain), _between(scene), strict=True):
+        ends = [chain[at.link].inertia for at in (each.a, each.b) if at.link >= 0]
+        linear = sum(1.0 / end.mass for end in ends)
+        angular = sum(1.0 / max(float(np.linalg.eigvalsh(end.inertia)[0]), 1e-12) for end in ends)
+        if isinstance(connector, Bushing):
+            K = np.array(connector.stiffness)
+            turning, moving = (float(np.linalg.eigvalsh(part)[-1]) for part in (K[:3, :3], K[3:, 3:]))
+            squares = max(squares, moving * linear, turning * angular)
+        else:
+            rise = np.max(np.diff(connector.loads_N) / np.diff(connector.table_m)) if connector.table_m else 0.0
+            squares = max(squares, max(connector.stiffness_N_m, float(rise)) * linear)
+    return sqrt(squares)
+
+
+def _between(scene: Scene) -> list[BetweenNodes]:
+    return [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+
+
+def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, side: str) -> Attachment:
+    body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
+    own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
+    if body == GROUND:
+        return Attachment(-1, own)
+    at = attachment(scene, chain, Marker(name="", body=body, node=node))
+    return Attachment(at.link, at.frame @ own)
+
+
+def law_of(stems: dict[str, Any]) -> Law:
+    """The law of a spring by its keys without units."""
+    if stems["table"]:
+        spline = PchipInterpolator(stems["table"], stems["loads"])
+        slope, energy = spline.derivative(), spline.antiderivative()
+        first, last = stems["table"][0], stems["table"][-1]
+
+        def stored(x: float) -> float:
+            near = min(max(x, first), last)
+            beyond = x - near
+            return float(energy(near) + beyond * (spline(near) + 0.5 * beyond * slope(near)))
+
+        def by_table(x: float) -> tuple[float, float]:
+            near = min(max(x, first), last)
+            return float(spline(near) + slope(near) * (x - near)), stored(x) - stored(0.0)
+
+        return by_table
+    powers = np.array([stems["preload"], stems["stiffness"], *stems["stiffening"]])
+    n = np.arange(len(powers))
+
+    def by_powers(x: float) -> tuple[float, float]:
+        terms = powers * x**n
+        return float(np.sum(terms)), float(np.sum(terms * x / (n + 1)))
+
+    return by_powers
+
+
+def _line(connector: SpringDamper) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    law, push = law_of(by_stem(connector)), connector.force_N and profile(connector.force_N)
+    sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
+    slack = 0.5 * connector.preload_N**2 / connector.stiffness_N_m if sign else 0.0
+
+    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
+        arm = b.position - a.position
+        length = sqrt(arm @ arm)
+        along = arm / length
+        rate = float(along @ (b.linear - a.linear))
+        elastic, energy = law(length - connector.free_length_m)
+        tension, energy = elastic + connector.damping_Ns_m * rate, energy + slack
+        if sign and sign * elastic <= 0.0:
+            elastic, tension, energy = 0.0, 0.0, 0.0
+        elif sign:
+            tension = sign * max(0.0, sign * tension)
+        tension -= push(t).value if push else 0.0
+        return np.concatenate([np.zeros(3), -tension * along]), energy, (elastic - tension) * rate
+
+    return exert
+
+
+def _bushing(connector: Bushing) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    K, D = np.array(connector.stiffness), np.array(connector.damping)
+
+    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
+        to_a, arm = a.rotation.T, b.position - a.position
+        theta = Rotation.from_matrix(to_a @ b.rotation).as_rotvec()
+        inverse = _inverse_jacobian(theta)
+        xi = np.concatenate([theta, to_a @ arm])
+        moving = to_a @ (b.linear - a.linear - cross(a.angular, arm))
+        rate = np.concatenate([inverse @ (to_a @ (b.angular - a.angular)), moving])
+        elastic, lost = K @ xi, D @ rate
+        g = elastic + lost
+        on_b = -np.concatenate([a.rotation @ (inverse.T @ g[:3]), a.rotation @ g[3:]])
+        return on_b, 0.5 * float(elastic @ xi), -float(lost @ rate)
+
+    return exert
+
+
+def _inverse_jacobian(theta: Real) -> Real:
+    """(3,3) inverse left Jacobian of the exponential."""
+    angle, turn = float(np.linalg.norm(theta)), cross_matrix(theta)
+    if angle < 1e-4:
+        return np.asarray(np.eye(3) - 0.5 * turn + turn @ turn / 12.0)
+    b = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    return np.asarray(np.eye(3) - 0.5 * turn + b * turn @ turn)
+
+
+def _along(connector: AlongHinge) -> Callable[[float, float], Along]:
+    stems = by_stem(connector)
+    if isinstance(connector, HingeFriction):
+        return lambda q, v: _friction(stems, v)
+    assert isinstance(connector, HingeSpring)
+    law = law_of(stems)
+    lower, upper = (-inf if stems["lower"] is None else stems["lower"]), (
+        inf if stems["upper"] is None else stems["upper"]
+    )
+    k, e = stems["stop_stiffness"], stems["stop_dissipation"]
+
+    def load(q: float, v: float) -> Along:
+        elastic, energy = law(q - stems["rest"])
+        deep, side = (q - upper, 1.0) if q > upper else (lower - q, -1.0) if q < lower else (0.0, 1.0)
+        pushed = side * k * deep * max(0.0, 1.0 + e * side * v)
+        lost = stems["damping"] * v + pushed - side * k * deep
+        return Along(-(elastic + side * k * deep + lost), energy + 0.5 * k * deep**2, -lost * v)
+
+    return load
+
+
+def _friction(stems: dict[str, Any], v: float) -> Along:
+    rising = 0.0 if stems["static"] is None else stems["static"] - stems["sliding"]
+    level = stems["sliding"] + rising / (1.0 + (v / (stems["stribeck"] or 1.0)) ** 2)
+    load = -level * v / hypot(v, stems["smoothing"])
+    return Along(load, 0.0, load * v)
