@@ -5,15 +5,15 @@ Independent of the native code's compiled evaluation, so that the two check each
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable
 from math import hypot, inf, sqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
-from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame
+from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame, quaternion_of, rotation_vector
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Link, attachment
 from flexmb.scene.bodies import IDENTITY
@@ -136,28 +136,38 @@ def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, si
 def law_of(stems: dict[str, Any]) -> Law:
     """The law of a spring by its keys without units."""
     if stems["table"]:
-        spline = PchipInterpolator(stems["table"], stems["loads"])
-        slope, energy = spline.derivative(), spline.antiderivative()
-        first, last = stems["table"][0], stems["table"][-1]
-
-        def stored(x: float) -> float:
-            near = min(max(x, first), last)
-            beyond = x - near
-            return float(energy(near) + beyond * (spline(near) + 0.5 * beyond * slope(near)))
-
-        def by_table(x: float) -> tuple[float, float]:
-            near = min(max(x, first), last)
-            return float(spline(near) + slope(near) * (x - near)), stored(x) - stored(0.0)
-
-        return by_table
-    powers = np.array([stems["preload"], stems["stiffness"], *stems["stiffening"]])
-    n = np.arange(len(powers))
+        return _by_table(PchipInterpolator(stems["table"], stems["loads"]))
+    powers = [stems["preload"], stems["stiffness"], *stems["stiffening"]]
 
     def by_powers(x: float) -> tuple[float, float]:
-        terms = powers * x**n
-        return float(np.sum(terms)), float(np.sum(terms * x / (n + 1)))
+        load = sum(each * x**n for n, each in enumerate(powers))
+        return load, sum(each * x ** (n + 1) / (n + 1) for n, each in enumerate(powers))
 
     return by_powers
+
+
+def _by_table(spline: PchipInterpolator) -> Law:
+    """Between the knots its cubics, beyond them straight lines; in plain numbers, for a spline's call takes long."""
+    knots, pieces = spline.x.tolist(), spline.c.T.tolist()
+    levels, slopes = spline.antiderivative()(spline.x).tolist(), spline.derivative()(spline.x).tolist()
+    loads = spline(spline.x).tolist()
+
+    def at(x: float) -> tuple[float, float]:
+        i = bisect_right(knots, x) - 1
+        if i < 0 or i >= len(pieces):
+            i = max(i, 0)
+            d = x - knots[i]
+            return loads[i] + slopes[i] * d, levels[i] + d * (loads[i] + 0.5 * slopes[i] * d)
+        (a, b, c, e), d = pieces[i], x - knots[i]
+        return ((a * d + b) * d + c) * d + e, levels[i] + d * (e + d * (c / 2.0 + d * (b / 3.0 + d * a / 4.0)))
+
+    zero = at(0.0)[1]
+
+    def by_table(x: float) -> tuple[float, float]:
+        load, energy = at(x)
+        return load, energy - zero
+
+    return by_table
 
 
 def _line(connector: SpringDamper) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
@@ -187,7 +197,7 @@ def _bushing(connector: Bushing) -> Callable[[float, Moving, Moving], tuple[Real
 
     def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
         to_a, arm = a.rotation.T, b.position - a.position
-        theta = Rotation.from_matrix(to_a @ b.rotation).as_rotvec()
+        theta = rotation_vector(quaternion_of(to_a @ b.rotation))
         inverse = _inverse_jacobian(theta)
         xi = np.concatenate([theta, to_a @ arm])
         moving = to_a @ (b.linear - a.linear - cross(a.angular, arm))

@@ -109,8 +109,9 @@ class Trajectory:
     All this is checked before it is recorded (`crosscheck.engines.answers`); an answer that breaks it counts as
     *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
     does not offer.
-    `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
-    done so far by drives, motors, dampers and loads, where the engine integrates it. `wall_s` times only the solve.
+    `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
+    `momentum` (T,6); `work` (T,) is the work done so far by drives, motors, dampers, friction, actuators and loads,
+    where the engine integrates it. `wall_s` times only the solve.
     """
 
     status: Status

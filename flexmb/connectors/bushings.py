@@ -5,9 +5,9 @@ the angular velocity w_rel = J theta' of B relative to A, J the left Jacobian of
 
     theta' = J^-1 w_rel        x' = R_A'(v_B - v_A) - w_A x x
 
-Generalised loads g = K xi + D xi' do the work g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x], and that of
-the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned. At half a turn theta jumps
-to the other side, and the energy with it: a bushing ends the run ten degrees before.
+Generalised loads g = K xi + D xi' do the work g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x], and that
+of the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned. At half a turn theta
+jumps to the other side, and the energy with it: a bushing ends the run ten degrees before.
 """
 
 from math import cos, radians
@@ -53,7 +53,7 @@ def load_of_bushing(c, w, i, A, B):
 
 @helper
 def overturned(c, w):
-    """A bushing that is turned beyond its range, -1 where there is none. Of lanes: of all; what goes on of some is NaN."""
+    """A bushing that is turned beyond its range, or -1. Of lanes: in all of them; what goes on of single ones is NaN."""
     for i in range(c.connector.shape[0]):
         if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
             return i

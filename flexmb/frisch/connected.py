@@ -1,4 +1,4 @@
-"""Connectors in the nested-body equations: loads at nodes (80), (81), on bodies and on modes as `load_terms` has them."""
+"""Connectors in the nested-body equations: loads at nodes (80), (81), on bodies and modes as `load_terms` has them."""
 
 from flexmb.connectors.between import load_between
 from flexmb.frisch.tables import NO_LOADS_ON_MODES

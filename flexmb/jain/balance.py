@@ -33,8 +33,8 @@ KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 
-    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr, w.zf and what connectors
-    write.
+    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr, w.zf, and
+    what connectors write.
     """
     for i in range(4):
         energy[i] = 0.0
@@ -93,7 +93,7 @@ def _body(c, w, k, energy, momentum):
 
 @helper
 def power(c, w):
-    """Power of everything that is not conservative: motors, dampers, drives, node loads, modal damping, friction (W)."""
+    """Power of everything that is not conservative: motors, dampers, drives, loads, modal damping, friction (W)."""
     total = speed_power(c, w)
     for k in range(c.body.shape[0]):
         if has(c, MODAL_DAMPING):

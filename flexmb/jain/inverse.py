@@ -1,7 +1,7 @@
 """Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
-tau holds inertia, gravity, elasticity, connectors between nodes and node loads, but not hinge springs and motors: these are what it is compared
-with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
+tau holds inertia, gravity, elasticity, node loads and connectors between nodes, but not hinge springs and motors: these
+are what it is compared with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
 """
 
 from flexmb.jain.accelerations import acceleration_sweep

@@ -123,7 +123,7 @@ def store_slope(c, w, power, dy):
 
 @helper
 def hinge_forces(c, w):
-    """Springs, dampers, friction and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
+    """Springs, dampers, friction and motors of scalar coordinates, and of spherical hinges, into w.speed.applied."""
     if not (
         has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)
         or has(c, HINGE_SPRINGS) or has(c, FRICTION)

@@ -23,7 +23,8 @@ class Path(Protocol):
 
 
 class Recorded(Protocol):
-    """A trajectory, ours or another code's: loads and connectors (T,6), drives and hinge forces (T,k), energies (T,), momentum (T,6), work (T,)."""
+    """A trajectory, ours or another code's: loads and connectors (T,6), drives and hinge forces (T,k), energies (T,),
+    momentum (T,6), work (T,)."""
 
     @property
     def markers(self) -> Mapping[str, Path]: ...

@@ -61,8 +61,9 @@ class Trajectory:
     loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
-    motors, dampers, friction, actuators and loads; connectors by name (T,6) [torque; force] on body_b about frame B,
-    World axes; hinge_forces by connector (T,1) along its coordinate. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
+    if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
+    connectors along hinges, along their coordinates.
     """
 
     scene: str

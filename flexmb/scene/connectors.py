@@ -1,4 +1,4 @@
-"""Connectors of a scene: springs, dampers, actuators, bushings and friction, which exert loads and take no freedom away.
+"""Connectors of a scene: springs, dampers, actuators, bushings and friction, which exert loads and suppress nothing.
 
 Those between two nodes act on frame A, on a node of `body_a` displaced by fixed offsets in node axes, and frame B,
 likewise on `body_b`; either may be the ground, both may be on one body. Those along a hinge act on one of its scalar
@@ -116,8 +116,8 @@ class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", 
     """Dry friction along an angle of a hinge, or in the bearing of a wheel; `hinge` names either.
 
     The torque is `sliding_Nm`, near rest rising to `static_Nm` as Hess and Soom have it, and smooth through zero:
-    [sliding + (static - sliding) / (1 + (v / stribeck)²)] v / sqrt(v² + smoothing²), v the rate. What would stick creeps
-    with a rate of the order of `smoothing_rad_s`; the smaller it is, the stiffer the equations.
+    [sliding + (static - sliding) / (1 + (v / stribeck)²)] v / sqrt(v² + smoothing²), v the rate. What would stick
+    creeps with a rate of the order of `smoothing_rad_s`; the smaller it is, the stiffer the equations.
     """
 
     name: str

@@ -40,8 +40,8 @@ def in_pieces(
     """The scene with `pieces` and the `joints` between them in the place of `beam`.
 
     `places`, by node of the beam, say where its hinges, wheels, point masses, loads, markers, closures and connectors
-    go. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state: pieces start
-    undeformed.
+    go. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state: pieces
+    start undeformed.
     """
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its pieces start undeformed; leave out its modal state')

@@ -1,8 +1,8 @@
 """The arrays kernels work on: one table of names, shapes and units.
 
 N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
-W wheels; L loads; C connectors between two ports; F functions of time; m the largest number of modes, as whole strips (`flexmb.jit.strips`): what is
-beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
+W wheels; L loads; C connectors between two ports; F functions of time; m the largest number of modes, as whole strips
+(`flexmb.jit.strips`): what is beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
 body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
 frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
 ``c.body[k].parent``.

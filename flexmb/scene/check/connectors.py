@@ -69,7 +69,7 @@ def _law(place: Place, connector: SpringDamper | HingeSpring) -> Iterator[Defect
         yield Defect(str(place.key("stiffening")), what, f"give {HIGHEST} at most, or a table")
     if law["stiffness"] < 0.0 and not stiffening:
         what = f"negative stiffness: {law['stiffness']:g}"
-        yield Defect(str(place), what, "give a stiffness of at least zero, or stiffening that holds the spring together")
+        yield Defect(str(place), what, "give a stiffness of at least zero, or stiffening to hold it together")
     if not (table or loads):
         return
     if law["stiffness"] or law["preload"] or stiffening:

@@ -65,7 +65,7 @@ def losses(builder: SceneBuilder) -> SceneBuilder:
                        acts="tension")
         .bushing("soft", "hub", "boom", node_b="tip", stiffness=positive(2, 0.5), damping=positive(3, 0.3))
         .angular_spring("coil", "elbow", rest=0.1, stiffness=3.0, stiffening=(0.0, 8.0), damping=0.2, lower=-0.2,
-                        upper=0.3, stop_stiffness=400.0, stop_dissipation=0.5)
+                        upper=0.3, stop_stiffness=400.0, stop_dissipation=0.02)
         .linear_spring("rubber", "rail", table=(-0.1, 0.0, 0.2, 0.5), loads=(-4.0, 0.0, 3.0, 20.0), damping=0.5)
         .angular_friction("bearing", "wheel", sliding=0.02, smoothing=0.05)
         .angular_friction("hinge friction", "elbow", sliding=0.3, static=0.5, stribeck=0.2, smoothing=0.01)
