@@ -62,7 +62,7 @@ class Exerted(NamedTuple):
 
 
 class Along(NamedTuple):
-    """Load along a coordinate, energy (J), power of what is not elastic (W)."""
+    """Load along a coordinate, or tension of a line; energy (J), power of what is not elastic (W)."""
 
     load: float
     energy: float
@@ -70,19 +70,25 @@ class Along(NamedTuple):
 
 
 class Connection:
-    """A connector between two frames on links; link -1 is the ground."""
+    """A connector between two frames on links, -1 being the ground; `exerted(t, a, b)` is what it does."""
 
     def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes) -> None:
         self.name = connector.name
         self.a, self.b = (_attached(scene, chain, connector, side) for side in "ab")
-        self._exert = _line(connector) if isinstance(connector, SpringDamper) else _bushing(connector)
+        self.exerted = exerts(connector)
 
-    def exerted(self, t: float, a: Moving, b: Moving) -> Exerted:
-        """Between frames A and B that move so, at time t."""
-        on_b, energy, power = self._exert(t, a, b)
+
+def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted]:
+    """What a connector does at time t between frames A and B that move so."""
+    on = _line(connector) if isinstance(connector, SpringDamper) else _bushing(connector)
+
+    def exerted(t: float, a: Moving, b: Moving) -> Exerted:
+        on_b, energy, power = on(t, a, b)
         arm = b.position - a.position
         on_a = -np.concatenate([on_b[:3] + cross(arm, on_b[3:]), on_b[3:]])
         return Exerted(on_a, on_b, energy, power)
+
+    return exerted
 
 
 def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
@@ -170,24 +176,34 @@ def _by_table(spline: PchipInterpolator) -> Law:
     return by_table
 
 
-def _line(connector: SpringDamper) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+def tension_of(connector: SpringDamper) -> Callable[[float, float, float], Along]:
+    """Tension, energy and power by time, distance beyond the free length, and its rate."""
     law, push = law_of(by_stem(connector)), connector.force_N and profile(connector.force_N)
     sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
     slack = 0.5 * connector.preload_N**2 / connector.stiffness_N_m if sign else 0.0
 
-    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
-        arm = b.position - a.position
-        length = sqrt(arm @ arm)
-        along = arm / length
-        rate = float(along @ (b.linear - a.linear))
-        elastic, energy = law(length - connector.free_length_m)
+    def tension_at(t: float, x: float, rate: float) -> Along:
+        elastic, energy = law(x)
         tension, energy = elastic + connector.damping_Ns_m * rate, energy + slack
         if sign and sign * elastic <= 0.0:
             elastic, tension, energy = 0.0, 0.0, 0.0
         elif sign:
             tension = sign * max(0.0, sign * tension)
         tension -= push(t).value if push else 0.0
-        return np.concatenate([np.zeros(3), -tension * along]), energy, (elastic - tension) * rate
+        return Along(tension, energy, (elastic - tension) * rate)
+
+    return tension_at
+
+
+def _line(connector: SpringDamper) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    tension = tension_of(connector)
+
+    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
+        arm = b.position - a.position
+        length = sqrt(arm @ arm)
+        along = arm / length
+        pulled = tension(t, length - connector.free_length_m, float(along @ (b.linear - a.linear)))
+        return np.concatenate([np.zeros(3), -pulled.load * along]), pulled.energy, pulled.power
 
     return exert
 

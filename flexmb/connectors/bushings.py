@@ -53,7 +53,7 @@ def load_of_bushing(c, w, i, A, B):
 
 @helper
 def overturned(c, w):
-    """A bushing that is turned beyond its range, or -1. Of lanes: in all of them; what goes on of single ones is NaN."""
+    """A bushing that is turned beyond its range, or -1. Of lanes: of all of them; what goes on of some is NaN."""
     for i in range(c.connector.shape[0]):
         if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
             return i

@@ -38,7 +38,7 @@ class Hold(NamedTuple):
 def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> Grip:
     """Of a connector between two frames in World, at time t."""
     arm = b.position.value - a.position.value
-    on_b, energy = (_line if isinstance(connector, s.SpringDamper) else _bushing)(connector, a, b, t)
+    on_b, energy = _line(connector, a, b, t) if isinstance(connector, s.SpringDamper) else _bushing(connector, a, b)
     on_a = -np.concatenate([on_b[:3] + np.cross(arm, on_b[3:]), on_b[3:]])
     return Grip(on_a, on_b, energy)
 
@@ -102,7 +102,7 @@ def _line(connector: s.SpringDamper, a: MovingFrame, b: MovingFrame, t: float) -
     return np.concatenate([np.zeros(3), -tension * direction]), energy
 
 
-def _bushing(connector: s.Bushing, a: MovingFrame, b: MovingFrame, t: float) -> tuple[Real, float]:
+def _bushing(connector: s.Bushing, a: MovingFrame, b: MovingFrame) -> tuple[Real, float]:
     from scipy.spatial.transform import Rotation
 
     R_A = a.rotation.value

@@ -152,8 +152,8 @@ class DenseSystem:
         now, found = self._at(q, u), {}
         for connector in self.scene.connectors:
             if isinstance(connector, BetweenNodes):
-                ends = (now.seat(*self.tree.sites[f"connector {side}:{connector.name}"]) for side in "ab")
-                found[connector.name] = grip(connector, *ends, t)
+                a, b = (now.seat(*self.tree.sites[f"connector {side}:{connector.name}"]) for side in "ab")
+                found[connector.name] = grip(connector, a, b, t)
         return found
 
     def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:

@@ -123,12 +123,12 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     sites = {f"load:{x.name}": (tree.index(x.body), _seat(models[x.body], x.node)) for x in scene.loads}
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
-    for x in scene.connectors:
-        if isinstance(x, BetweenNodes):
+    for each in scene.connectors:
+        if isinstance(each, BetweenNodes):
             for side in "ab":
-                body, node = getattr(x, f"body_{side}"), getattr(x, f"node_{side}")
-                offset = getattr(x, f"position_{side}_m"), getattr(x, f"quaternion_{side}", IDENTITY)
-                sites[f"connector {side}:{x.name}"] = tree.index(body), _seat(models[body], node, *offset)
+                at, node = getattr(each, f"body_{side}"), getattr(each, f"node_{side}")
+                offset = getattr(each, f"position_{side}_m"), getattr(each, f"quaternion_{side}", IDENTITY)
+                sites[f"connector {side}:{each.name}"] = tree.index(at), _seat(models[at], node, *offset)
     return replace(tree, sites=sites)
 
 

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from flexmb.dense.dense_system import DenseSystem, Instant
 from flexmb.dense.function_jets import profile
-from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
+from flexmb.jain.elements import Configuration, phi, rate, undeformed, value, with_wheels
 from flexmb.scene import schema as s
 from flexmb.tables import arguments
 from flexmb.typing import Real
@@ -305,5 +305,6 @@ class SpatialOperators:
             for side, F in (("a", gripped.on_a), ("b", gripped.on_b)):
                 k, seat = self._bodies.sites[f"connector {side}:{name}"]
                 if k >= 0:
-                    found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
+                    node, A = now.transmission(k, seat)
+                    found[columns[k]] += value(A @ phi(now.seat(k, seat)[0] - node)) @ F
         return found

@@ -16,7 +16,7 @@ from flexmb.scene.units import split_unit
 
 Six = tuple[float, float, float, float, float, float]
 Matrix6 = tuple[Six, Six, Six, Six, Six, Six]
-NONE6: Matrix6 = ((0.0,) * 6,) * 6  # type: ignore[assignment]  # a tuple of six, written short
+NONE6: Matrix6 = ((0.0,) * 6,) * 6
 
 
 class SpringDamper(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="spring_damper"):

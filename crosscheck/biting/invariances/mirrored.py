@@ -112,8 +112,8 @@ def _reflected(item: Any) -> Any:
             force = tuple(_times(m, s) for m, s in zip(item.force_stiffness, POLAR_SIGNS, strict=False))
             return msgspec.structs.replace(item, force_stiffness=force)
         case Bushing():
-            signs = np.outer(*(2 * (AXIAL_SIGNS + POLAR_SIGNS,)))
-            matrices = (np.array(item.stiffness) * signs + 0.0, np.array(item.damping) * signs + 0.0)
+            both = np.outer(*(2 * (AXIAL_SIGNS + POLAR_SIGNS,)))
+            matrices = (np.array(item.stiffness) * both + 0.0, np.array(item.damping) * both + 0.0)
             K, D = (tuple(map(tuple, each.tolist())) for each in matrices)
             return msgspec.structs.replace(item, stiffness=K, damping=D)
         case Closure() if item.type in WITH_AXIS:  # which has no sense of rotation

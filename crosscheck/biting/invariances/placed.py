@@ -85,7 +85,7 @@ def on_ground(scene: Scene, placed: Placed) -> Scene:
         for side in "ab":
             if getattr(item, f"body_{side}", "") == GROUND:
                 frame = f"position_{side}_m", f"quaternion_{side}"
-                at = placed(*(getattr(item, key, IDENTITY) for key in frame))
+                at = placed(getattr(item, frame[0]), getattr(item, frame[1], IDENTITY))
                 known = {key: value for key, value in zip(frame, at, strict=True) if hasattr(item, key)}
                 item = msgspec.structs.replace(item, **known)
         return item

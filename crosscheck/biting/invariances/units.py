@@ -9,7 +9,7 @@ import msgspec
 from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
-from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring
+from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Load, ModalState, Scene
@@ -62,7 +62,7 @@ def _rescaled(scene: Scene) -> Counterpart:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
     for connector in scene.connectors:
-        if isinstance(connector, Bushing) or getattr(connector, "stiffening", ()):
+        if isinstance(connector, Bushing) or by_stem(connector).get("stiffening"):
             raise NotApplicable(f'connector "{connector.name}" has numbers whose keys do not tell their units')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)

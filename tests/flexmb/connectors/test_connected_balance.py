@@ -15,8 +15,8 @@ from tests.flexmb.connectors.connected_scenes import everything, free_flying, st
 END = 0.3  # s: some periods of the springs; modes and stop are faster
 EXACT = {"method": "dop853", "rtol": 1e-12, "atol": 1e-13, "samples": 21}
 BALANCED = 1e-10  # of the energies that change: the error of the integration at these tolerances
-# Where the slope of a law jumps (a slack cable, a buffer, a stop, the knots of a table) a step is of second order in what
-# is left of it; the error control finds that out, and leaves a hundred times its tolerance.
+# Where the slope of a law jumps (a slack cable, a buffer, a stop, the knots of a table) a step is of second order in
+# what is left of it; the error control finds that out, and leaves a hundred times its tolerance.
 ACROSS_KINKS = 1e-8
 KINKED = ("cable", "slack", "buffer", "curve", "brake")
 
