@@ -1,4 +1,4 @@
-"""What is wrong with a connector is said before anything runs, with its place and a remedy; files keep what they hold."""
+"""What is wrong with a connector is said before anything runs, with place and remedy; files keep what they hold."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Connectors by closed forms, and where laws end: slack cables, ends that meet, stops, creeping friction, half a turn."""
+"""Connectors by closed forms, and where laws end: slack cables, ends that meet, stops, creeping, half a turn."""
 
 from __future__ import annotations
 
@@ -53,8 +53,9 @@ def test_a_cable_holds_and_lets_go():
 
 def test_a_buffer_is_its_mirror_image():
     """Compression below a gap: the wall is touched at x = 0."""
-    scene = slider(position=0.2, rate=-1.0).spring_damper("buffer", "ground", "body", position_a=(-1.0, 0, 0),
-                                                          free_length=1.0, stiffness=18.0, acts="compression").scene()  # fmt: skip
+    scene = slider(position=0.2, rate=-1.0).spring_damper(
+        "buffer", "ground", "body", position_a=(-1.0, 0, 0), free_length=1.0, stiffness=18.0, acts="compression"
+    ).scene()  # fmt: skip
     run = fm.simulate(scene, 1.6, samples=33, **EXACT)
     assert abs(place(run)[-1] - (1.6 - 0.2 - np.pi / 3.0)) <= 1e-8
 
@@ -104,7 +105,8 @@ def test_friction_brings_a_body_to_rest():
 def test_static_friction_is_higher_near_rest():
     scene = slider().linear_friction("guide", "rail", sliding=4.0, static=7.0, stribeck=0.1, smoothing=1e-6).scene()
     system = fm.compile(scene)
-    loads = [float(system.evaluate(0.0, np.zeros(1), np.array([v])).hinge_forces["guide"][0]) for v in (1e-3, 0.1, 10.0)]
+    seen = [system.evaluate(0.0, np.zeros(1), np.array([v])) for v in (1e-3, 0.1, 10.0)]
+    loads = [float(each.hinge_forces["guide"][0]) for each in seen]
     assert np.allclose(loads, (-7.0, -5.5, -4.0), atol=1e-3)
 
 
