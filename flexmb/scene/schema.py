@@ -29,6 +29,15 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.connectors import (
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
@@ -143,6 +152,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
@@ -160,10 +170,11 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
-    "Cylindrical", "EndRun", "Free", "Function", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level",
-    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node",
-    "Planar", "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene",
-    "SceneEvent", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector",
-    "Waiver", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation",
+    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "Cylindrical", "EndRun", "Free", "Function",
+    "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction",
+    "LinearSpring", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar",
+    "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene",
+    "SceneEvent", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "SpringDamper", "Table", "TipMass",
+    "Universal", "Vector", "Waiver", "Weld", "Wheel",
 ]  # fmt: skip
