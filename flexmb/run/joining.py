@@ -13,7 +13,9 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.run.trajectory import MarkerPath, Trajectory
 
-SAME_NAMES = ("q_names", "u_names", "markers", "loads", "wheel_loads", "energy")
+SAME_NAMES = (
+    "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",
+)  # fmt: skip
 
 
 def joined(first: Trajectory, later: Trajectory) -> Trajectory:
@@ -45,7 +47,8 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
         loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
         drives=_drives(first, later, kept), energy=each(first.energy, later.energy),
-        momentum=both(first.momentum, later.momentum),
+        momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
+        hinge_forces=each(first.hinge_forces, later.hinge_forces),
     )  # fmt: skip
     return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
 

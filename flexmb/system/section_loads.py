@@ -1,9 +1,9 @@
 """Loads across the sections of a beam, by the momentum balance of the part beyond each: modes' stiffness is not asked.
 
 What acts on the part of a beam beyond x is what its points' accelerations need, less gravity, loads at nodes, wheels,
-connectors, and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this is exact with
-any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature converge slowly, if
-at all: no clamped eigenmode has a shear force at its tip.
+connectors, and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this
+is exact with any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature
+converge slowly, if at all: no clamped eigenmode has a shear force at its tip.
 """
 
 from __future__ import annotations
