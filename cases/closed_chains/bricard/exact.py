@@ -26,7 +26,7 @@ def angles(psi):
 
 
 def bars(psi):
-    """Of every bar where it begins, its rotation, and its velocities (angular, of the beginning) for unit rate of psi."""
+    """Of every bar where it begins, its rotation, and its velocities (angular, of the beginning) by psi."""
     turn, rate = angles(psi)
     R, place = Rotation.identity(len(psi)), np.zeros((len(psi), 3))
     omega, velocity = np.zeros_like(place), np.zeros_like(place)
@@ -56,7 +56,7 @@ def gravity(psi):
 
 
 def swing():
-    """The other end of the swing, and the terms of t(u) = mean u + sum b_n sin(n u), psi = middle - amplitude cos(u)."""
+    """Middle and amplitude of psi = middle - amplitude cos(u); mean, n and b_n of t(u) = mean u + sum b_n sin(n u)."""
     total = gravity(START)
     downhill = np.sign(gravity(START - 1e-3) - gravity(START + 1e-3))
     grid = START + downhill * np.linspace(1e-3, 2.0 * np.pi, 2000)
