@@ -153,7 +153,7 @@ def in_one_line() -> Iterator[None]:
     """Show each warning once, and the error that ends the command, without a traceback."""
     shown = set[str]()
 
-    def show(message: Warning | str, *_: object) -> None:
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
         if str(message) not in shown:
             shown.add(str(message))
             errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
