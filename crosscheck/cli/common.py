@@ -117,7 +117,9 @@ SchedulerAddress = Annotated[
 ]
 Strict = Annotated[
     bool,
-    typer.Option("--strict", help="Figures worse than recorded, or not recorded, and doubtful scenes are errors."),
+    typer.Option(
+        "--strict", help="Figures worse than recorded or not recorded, references never made, doubtful scenes: errors."
+    ),
 ]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]

@@ -124,6 +124,8 @@ class Attachment:
 def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
     """Why an engine of rigid trees with closures of some types cannot represent the scene; empty if it can."""
     for closure in scene.closures:
+        if not closed_by:
+            return f'closure "{closure.name}": {engine} closes no loops'
         if closure.type not in closed_by:
             known = ", ".join(closed_by)
             return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'
@@ -147,8 +149,8 @@ def links(scene: Scene) -> tuple[Link, ...]:
         if parent >= 0:
             inboard = chain[parent].body @ inboard
         fixed, moving = _point_masses(scene, body)
-        lumps = [_placed(_point(point), in_link @ _place(point, body)) for point in fixed]
-        inertia = combine([_placed(inertia_of(rigid_equivalent(body)), in_link), *lumps])
+        lumps = [placed(_point(point), in_link @ _place(point, body)) for point in fixed]
+        inertia = combine([placed(inertia_of(rigid_equivalent(body)), in_link), *lumps])
         index[body.name] = own = len(chain)
         chain.append(Link(body.name, "body", hinge.name, parent, inboard, freedoms(hinge), inertia, in_link))
         for point in moving:
@@ -272,7 +274,7 @@ def _place(item: Wheel | PointMass, body: Body) -> Frame:
     return offset_frame(body, item.node, item.offset_m)
 
 
-def _placed(inertia: Inertia, frame: Frame) -> Inertia:
+def placed(inertia: Inertia, frame: Frame) -> Inertia:
     """Inertia known in B, in A, with frame = X_AB."""
     R = frame.rotation
     return Inertia(inertia.mass, frame.position + R @ inertia.com, R @ inertia.inertia @ R.T)

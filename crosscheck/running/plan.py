@@ -15,7 +15,8 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
-from crosscheck.library.selection import alone, select
+from crosscheck.library.reference import has_reference
+from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
@@ -118,6 +119,9 @@ def plan(
         accepted=case.accepted,
         reference=held_reference(case, run),
         files=case_digests(case.folder),
+        asked=asked,
+        joined=joining(case.run, asked),
+        unreferenced=case.run.reference is not None and not has_reference(case.folder),
     )
     return record, jobs
 

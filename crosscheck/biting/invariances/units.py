@@ -9,8 +9,10 @@ import msgspec
 from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Load, ModalState, Scene
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
@@ -67,7 +69,19 @@ def _rescaled(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items()}
 
-    return Counterpart(_in_units(scene), back, clock=TIME)
+    found = _in_units(scene)
+    _refuse_what_no_material_does(found)
+    return Counterpart(found, back, clock=TIME)
+
+
+def _refuse_what_no_material_does(scene: Scene) -> None:
+    """NotApplicable where the checks, which know SI, take the other units for a slip, and nothing else for a fault."""
+    try:
+        check_scene(scene)
+    except SceneError as error:
+        if all("check the units" in problem.remedy for problem in error.problems):
+            text = f"its numbers in other units look like a slip to the checks: {error.problems[0].what}"
+            raise NotApplicable(text) from None
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:
