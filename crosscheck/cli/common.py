@@ -152,9 +152,16 @@ def check_limit(seconds: float | None) -> None:
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Show each warning, and the error that ends the command, in one line without a traceback."""
+    """Show each warning once, and the error that ends the command, without a traceback."""
+    shown = set[str]()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        if str(message) not in shown:
+            shown.add(str(message))
+            errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+        warnings.showwarning = show
         try:
             yield
         except KeyboardInterrupt:

@@ -106,8 +106,8 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
-    same = {"t_start": t, "state": state, "samples": times, "algorithm": algorithm, "stabilise": stabilise}
-    made_by = Making(system, times, chosen, partial(_again, system, t_end, **same))
+    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
