@@ -14,6 +14,7 @@ import numpy as np
 from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.restart import Restart
+from flexmb.run.situation import EventRecord
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
 from flexmb.tables.state import State
@@ -65,7 +66,7 @@ class Trajectory:
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
-    `restart`: how the run is taken up there, None if it failed.
+    `restart`: how the run is taken up there, None if it failed. `events`: what happened, in the order of time.
     """
 
     scene: str
@@ -86,6 +87,7 @@ class Trajectory:
     work: Real
     statistics: Statistics
     restart: Restart | None = None
+    events: tuple[EventRecord, ...] = ()
 
     @property
     def finished(self) -> bool:
@@ -112,6 +114,10 @@ class Trajectory:
         them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
         the last time of this one.
         """
+        if len(later.t) and later.t[0] > self.stopped_at:
+            raise ValueError(
+                f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
+            )
         return joined(self, later)
 
     @property
