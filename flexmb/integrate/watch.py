@@ -1,7 +1,7 @@
 """Places where a run pauses: where an entry of the state crosses a level, in the step or in its dense output.
 
-A run pauses at the first of several levels that a step crosses. What crosses a level and comes back within a step is not
-seen, as steps resolve the motion, unless the step starts at the level: what flies off and comes back at once is caught.
+A run pauses at the first of several levels that a step crosses. What crosses a level and comes back within a step is
+not seen, as steps resolve the motion, unless the step starts at the level: what flies off and comes back at once is.
 """
 
 from __future__ import annotations

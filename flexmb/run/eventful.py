@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import Watch, watch
 from flexmb.run.joining import joined
@@ -26,11 +28,11 @@ DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
 
 
-def refuse_events(system: System, settings: Settings) -> None:
+def refuse_events(system: System, method: Method) -> None:
     """NotImplementedError for events that a method or a closed chain does not have."""
-    if not settings.integrator.pauses and any(event.watch != "time" for event in system.scene.events):
+    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in system.scene.events):
         raise NotImplementedError(
-            f'method "{settings.method}" does not find where an event happens within a step: use "dop853", "rk4", '
+            f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
             '"radau5" or "exponential"'
         )
     for event in system.scene.events if system.scene.closures else ():

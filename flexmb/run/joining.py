@@ -49,7 +49,8 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
 def _ended(whole: Trajectory, later: Trajectory, work: Real, statistics: Any = None) -> Trajectory:
     return replace(
         whole, work=work, status=later.status, message=later.message, stopped_at=later.stopped_at,
-        restart=later.restart, events=whole.events + later.events, statistics=statistics or _sum(whole.statistics, later.statistics),
+        restart=later.restart, events=whole.events + later.events,
+        statistics=statistics or _sum(whole.statistics, later.statistics),
     )  # fmt: skip
 
 

@@ -103,7 +103,7 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
-    refuse_events(system, chosen)
+    refuse_events(system, method)
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)

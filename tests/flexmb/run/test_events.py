@@ -142,8 +142,8 @@ def test_changes_at_times_are_those_of_a_pulse():
 
 def test_a_stiffness_that_changes_does_work():
     change = fm.Change(path="rail.translation.stiffness_N_m", value=60.0)
-    event = fm.SceneEvent(name="stiffer", watch="rail.translation.rate", level=0.0, crossing="rising", actions=(change,))
-    run = fm.simulate(ball(0.5, event, stiffness=20.0), 2.0, samples=41)
+    lowest = fm.SceneEvent(name="firm", watch="rail.translation.rate", level=0.0, crossing="rising", actions=(change,))
+    run = fm.simulate(ball(0.5, lowest, stiffness=20.0), 2.0, samples=41)
     assert run.events and np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
     assert np.isclose(run.events[0].energy_change, 0.5 * 40.0 * run.events[0].before.q[0] ** 2)
 
