@@ -74,11 +74,11 @@ _LATER = {
 }
 
 __all__ = [
-    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation", "EventRecord",
-    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError", "State",
-    "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch",
-    "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "simulate_batch", "simulate_stages",
-    "steady_spin",
+    "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
+    "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
+    "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene",
+    "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "simulate_batch",
+    "simulate_stages", "steady_spin",
     *schema.__all__,
 ]  # fmt: skip
 
