@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
+    from flexmb.run.situation import EventRecord
     from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.system.batch import Batch, compile_batch
@@ -56,6 +57,7 @@ _LATER = {
     "Restart": "flexmb.run.restart",
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
+    "EventRecord": "flexmb.run.situation",
     "simulate_stages": "flexmb.run.stages",
     "RunStage": "flexmb.run.stages",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
@@ -73,9 +75,9 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError",
-    "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene",
-    "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
+    "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
+    "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
+    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate",
     "simulate_batch", "simulate_stages", "steady_spin",
     *schema.__all__,
 ]  # fmt: skip

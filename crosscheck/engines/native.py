@@ -28,6 +28,7 @@ from crosscheck.engines.contract import (
 )
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
+from flexmb.run.eventful import refuse_events
 from flexmb.run.simulate import simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
@@ -103,6 +104,7 @@ class NativeEngine:
         system.route(self._algorithm)
         if scene.closures and INTEGRATORS[self._method].linearises:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
+        refuse_events(system, self._method)
         return NativeModel(system, self._algorithm, self._method)
 
 

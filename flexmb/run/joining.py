@@ -19,7 +19,7 @@ SAME_NAMES = (
 
 
 def joined(first: Trajectory, later: Trajectory) -> Trajectory:
-    """See `Trajectory.then`."""
+    """See `Trajectory.then`; the later run may have no output where the first one ended."""
     for key in SAME_NAMES:
         strange = set(getattr(first, key)) ^ set(getattr(later, key))
         if strange:
@@ -27,10 +27,6 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
             raise ValueError(f"the runs cannot be joined: only one of them has {key}: {names}")
     if len(later.t) == 0:
         return _ended(first, later, first.work)
-    if len(first.t) and later.t[0] > first.stopped_at:
-        raise ValueError(
-            f"the runs cannot be joined: the first ended at {first.stopped_at:g} s, the other began at {later.t[0]:g} s"
-        )
     kept = int(np.searchsorted(first.t, later.t[0]))
     # a run that was taken up has counted on by itself
     counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
@@ -42,7 +38,7 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         return {name: both(a[name], b[name]) for name in b}
 
     whole = replace(
-        later,
+        first,
         t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
         loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
@@ -56,7 +52,8 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
 def _ended(whole: Trajectory, later: Trajectory, work: Real, statistics: Any = None) -> Trajectory:
     return replace(
         whole, work=work, status=later.status, message=later.message, stopped_at=later.stopped_at,
-        restart=later.restart, statistics=statistics or _sum(whole.statistics, later.statistics),
+        restart=later.restart, events=whole.events + later.events,
+        statistics=statistics or _sum(whole.statistics, later.statistics),
     )  # fmt: skip
 
 

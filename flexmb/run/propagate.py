@@ -33,8 +33,7 @@ from flexmb.typing import Real
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
-    y (nq+nu+1,): the last good state; memory: how it can be taken up there; crossed: the number of the level at which
-    the run paused, -1 for none.
+    y (nq+nu+1,): the last good state; memory: how it can be taken up there; paused: whether it stopped at a level.
     """
 
     states: Real
@@ -47,7 +46,7 @@ class Raw(NamedTuple):
     interrupted: bool
     y: Real
     memory: Memory
-    crossed: int = -1
+    paused: bool = False
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -123,8 +122,7 @@ def integrate(
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
-    crossed = int(watch.found[0]) if watch is not None and status == CROSSED else -1
     return Raw(
         out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
-        begun - start, end - begun, interrupted, begin.y, memory, crossed,
+        begun - start, end - begun, interrupted, begin.y, memory, status == CROSSED,
     )  # fmt: skip

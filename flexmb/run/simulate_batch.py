@@ -56,6 +56,8 @@ def simulate_batch(
         refuse_without_jacobian(batch.systems[0], "articulated", method)
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
+        if system.scene.events:
+            raise NotImplementedError(f'scene "{system.scene.name}" has events, which simulate alone runs')
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))

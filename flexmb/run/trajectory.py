@@ -16,6 +16,7 @@ from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
+from flexmb.run.situation import EventRecord
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
@@ -80,6 +81,7 @@ class Trajectory:
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
     connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
+    `events`: what happened, in the order of time.
     """
 
     scene: str
@@ -102,6 +104,7 @@ class Trajectory:
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
     restart: Restart | None = None
+    events: tuple[EventRecord, ...] = ()
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
@@ -175,6 +178,10 @@ class Trajectory:
         them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
         the last time of this one.
         """
+        if len(later.t) and later.t[0] > self.stopped_at:
+            raise ValueError(
+                f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
+            )
         return joined(self, later)
 
     @property

@@ -19,6 +19,7 @@ class Status(IntEnum):
     NOT_CONVERGED = 8
     INTERRUPTED = 9
     BRANCH_UNKNOWN = 10
+    CHATTERING = 11
     CONNECTOR_OVERTURNED = 16
 
     def __str__(self) -> str:
@@ -73,6 +74,10 @@ _ADVICE = {
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
         'adapts its step, "radau5"'
+    ),
+    Status.CHATTERING: (
+        "events follow each other faster and faster without end: let an `Impact` with little rebound become a `Latch`, "
+        "or take a stiff spring with a damper in place of the stop"
     ),
     Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",

@@ -49,7 +49,7 @@ METHODS = {
     "wheel": s.Wheel, "point_mass": s.PointMass, "force": s.Load, "torque": s.Load, "marker": s.Marker,
     "modal_state": s.ModalState, "spring_damper": s.SpringDamper, "bushing": s.Bushing,
     "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
-    "linear_friction": s.LinearFriction,
+    "linear_friction": s.LinearFriction, "event": s.SceneEvent,
 }  # fmt: skip
 # Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
 REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "prismatic": {"translation"},

@@ -73,7 +73,8 @@ def at_root(system: fm.System, state: fm.State, load: np.ndarray) -> tuple[np.nd
 
 VARIANTS: Mapping[str, dict[str, Any]] = {
     "full": {}, "line": {"points": "line"}, "rotary": {"points": "rotary"}, "lumped": {"mass": "lumped"},
-    "rigid": {"level": "rigid"}, "ruthless": {"level": "ruthless"}, "closed": {"closed": True}, "connected": {"connected": True},
+    "rigid": {"level": "rigid"}, "ruthless": {"level": "ruthless"}, "closed": {"closed": True},
+    "connected": {"connected": True},
     "timoshenko": {"theory": "timoshenko"},
 }  # fmt: skip
 
