@@ -21,6 +21,7 @@ from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.closures import ClosureError
+    from flexmb.control.user import user_function
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linear_model import LinearModel
@@ -64,13 +65,14 @@ _LATER = {
     "System": "flexmb.system.tree_system",
     "compile": "flexmb.system.compile",
     "Trajectory": "flexmb.run.trajectory",
+    "user_function": "flexmb.control.user",
 }
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
     "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
     "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
-    "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin",
+    "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

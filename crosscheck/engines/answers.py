@@ -14,7 +14,17 @@ from typing import Any, get_args
 
 import numpy as np
 
-from crosscheck.engines.contract import ENERGIES, OUTPUTS, Effort, MarkerPath, Model, Status, Support, Trajectory
+from crosscheck.engines.contract import (
+    ENERGIES,
+    OUTPUTS,
+    Effort,
+    Engine,
+    MarkerPath,
+    Model,
+    Status,
+    Support,
+    Trajectory,
+)
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -48,6 +58,17 @@ def checked_support(found: Any) -> Support:
     _instance(found, Support, "supports()")
     _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
+
+
+def support_of(engine: Engine, scene: Scene) -> Support:
+    """What `supports` returns; of a scene with controllers "no", unless the engine says by `feedback` that it has them.
+
+    An engine that was written before there were controllers would run the motion without them.
+    """
+    if scene.controllers and not getattr(engine, "feedback", False):
+        names = ", ".join(f'"{controller.name}"' for controller in scene.controllers)
+        return Support("no", f"the scene has feedback ({names}), and this engine runs no controllers")
+    return checked_support(engine.supports(scene))
 
 
 def checked_ladder(found: Any) -> tuple[Effort, ...]:

@@ -44,6 +44,7 @@ _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the
 class NativeEngine:
     """flexmb with one of its algorithms, at the levels the scene asks for, and one of its integrators."""
 
+    feedback = True  # controllers run in the same loop
     settings = (
         "flexmb's integrator in one compiled loop around its compiled equations of motion, on one thread. Workers take "
         "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; those made for one scene are "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -9,6 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from flexmb.control.feedback import Feedback
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
@@ -51,14 +53,20 @@ class Integration:
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
         self._integrator = integrator
+        self.feedback = Feedback(system, algorithm, route, (constants, self._workspace)) if system.scene.controllers else None
+        """Of a scene with controllers."""
+        self._linear: tuple[Any, ...] = ()
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
             exact = system.constants  # with every body eliminated explicitly, for Jacobians
             moving = tangent.tangent_workspace(exact, system.nq, system.nu)
             self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
+            self._linear = tangent.jacobian, exact, moving
+            if self.feedback is not None:
+                self.feedback.with_retraction()
         else:
             self._problem = problem(*motion)
-        batched = algorithm.observing is not None and not system.scene.closures
+        batched = algorithm.observing is not None and not system.scene.closures and self.feedback is None
         self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
         """Observes many samples at once."""
         self._enter: Any = None
@@ -72,6 +80,16 @@ class Integration:
         """For a call with these, unless that is done."""
         if self._enter is None:
             self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
+
+    def begin(
+        self, y: Real, clock: Clock, accuracy: Accuracy, counts: Index
+    ) -> tuple[Real, Clock, Accuracy]:
+        """The state, clock and accuracy of a run from y: the same, but of a scene with controllers those of the loop."""
+        if self.feedback is None:
+            return y, clock, accuracy
+        self._problem, y, clock, accuracy = self.feedback.begin(y, clock, accuracy, self._linear)
+        self.feedback.heed(counts[STOP : STOP + 1])
+        return y, clock, accuracy
 
     @property
     def fault(self) -> int:
@@ -92,6 +110,9 @@ def integration(
     try:
         found = spare.pop()
     except IndexError:
+        if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
+            system = copy.deepcopy(system)
+            route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found
     if not system.scene.closures:
@@ -102,13 +123,18 @@ def integrate(system: System, solve: Integration, times: Real, settings: Setting
     """Run over the whole time, after what has to be compiled for it."""
     initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
     ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
-    out, counts = np.empty((len(times), len(initial.y))), np.zeros(COUNTS, np.int64)
-    given = initial.y, Clock(times, ends), accuracy, out, counts
+    counts = np.zeros(COUNTS, np.int64)
+    y, clock, accuracy = solve.begin(initial.y, Clock(times, ends), accuracy, counts)
+    out = np.empty((len(times), len(y)))
+    given = y, clock, accuracy, out, counts
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
+    if solve.feedback is not None:
+        solve.feedback.raise_trouble()
+        solve.feedback.replay()
     return Raw(
         out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), begun - start, end - begun, interrupted
     )

@@ -15,8 +15,8 @@ from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIO
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.interruption import Interrupted
-from flexmb.run.observing import Sampler, observe
-from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.observing import observe
+from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_end
 from flexmb.run.trajectory import Statistics, Trajectory, gathered
@@ -97,9 +97,9 @@ def simulate(
         if start is not None and start.status != Status.OK:
             nothing = np.empty((0, system.nq + system.nu + 1))
             raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
-            return _observed(system, times, raw, algorithm, solve.batch)
+            return _observed(system, times, raw, algorithm, solve)
         raw = integrate(system, solve, times, chosen)
-        trajectory = _observed(system, times, raw, algorithm, solve.batch)
+        trajectory = _observed(system, times, raw, algorithm, solve)
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
@@ -137,10 +137,10 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
+def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
     start = perf_counter()
-    rows, trouble = observe(system, algorithm, times, raw.states, batch)
+    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
     status, stopped_at, message = raw.status, raw.t, _message(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
         status, stopped_at = _why(trouble), float(times[len(rows)])
@@ -156,11 +156,12 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch
         stopped_at=stopped_at,
         t=times[: len(rows)],
         q=states[:, : system.nq],
-        u=states[:, system.nq : -1],
+        u=states[:, system.nq : system.nq + system.nu],
         q_names=q_names,
         u_names=u_names,
         **gathered(system._observation, rows),
         work=states[:, -1],
+        signals={} if solve.feedback is None else solve.feedback.signals(times, states),
         statistics=Statistics(
             evaluations=raw.counts[EVALUATIONS],
             accepted_steps=raw.counts[ACCEPTED],

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +61,7 @@ class Trajectory:
     loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
-    motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    motors, dampers and loads; signals (T,k) by sensor and controller, of a scene that has some. `stopped_at` is the time of the last good state: the end of the run if it finished.
     """
 
     scene: str
@@ -81,6 +81,7 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
+    signals: dict[str, Real] = field(default_factory=dict)
 
     @property
     def finished(self) -> bool:
@@ -130,6 +131,9 @@ class Trajectory:
         yield "energy.total", "J", self.total_energy
         yield "work", "J", self.work
         yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+        for name, signals in self.signals.items():
+            for i in range(signals.shape[1]):
+                yield f"signal.{name}[{i}]", "", signals[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""

@@ -28,7 +28,21 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    TimeSensor,
+    UserLaw,
+)
+from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Signal, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Closure,
@@ -127,12 +141,16 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    controllers: tuple[Controller, ...] = ()
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
-    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Controller",
+    "CoordinateSensor", "Cylindrical", "Free", "Function", "GainTable", "Gimbal", "Hinge", "InertiaPoint", "Level",
+    "LinearCoordinate", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode",
+    "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion",
+    "Ramp", "Revolute", "RigidBody", "Saturation", "Scene", "Sensor", "SidBody", "Signal", "Sine", "SmoothStep",
+    "Spherical", "SpinUp", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Weld",
+    "Wheel",
 ]  # fmt: skip

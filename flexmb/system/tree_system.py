@@ -56,6 +56,8 @@ class System(Mechanics):
         self._numbering = Numbering(self._links, self._wheels)
         assembled = assemble(scene, self._links, self._numbering)
         self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
+        self.signals = assembled.signals
+        """By number among the functions of time, those that controllers drive in a run; zero outside of one."""
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
         self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)

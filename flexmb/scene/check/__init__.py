@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from math import isfinite
 
 from flexmb.scene.check.beams import beams
+from flexmb.scene.check.control import control
 from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
@@ -21,7 +22,7 @@ from flexmb.scene.schema import Scene
 
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
-PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses)
+PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses, control)
 
 
 def check_scene(scene: Scene, t_end: float | None = None) -> None:

@@ -1,0 +1,191 @@
+"""The feedback of a scene in its runs: the closed loop that integrators see, and what its signals were."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.control import loop
+from flexmb.control import tables as a
+from flexmb.control.schedule import instants, slack
+from flexmb.control.user import Called
+from flexmb.control.wiring import Wiring, widest, wired
+from flexmb.entry.observation import sense_markers
+from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.jit.direct import address, addresses
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR
+from flexmb.motion.retraction import move
+from flexmb.scene.control import LoadSensor
+from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.system.tree_system import System
+from flexmb.typing import Index, Real
+
+
+class Begun(NamedTuple):
+    """What an integrator is given for a run of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
+
+    problem: Problem | StiffProblem
+    y: Real
+    clock: Clock
+    accuracy: Accuracy
+
+
+class Feedback:
+    """Controllers around a system that is theirs alone: its functions of time are written to.
+
+    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that
+    cannot be had, NotImplementedError for what cannot be combined.
+    """
+
+    def __init__(self, plant: System, algorithm: DynamicsAlgorithm, route: Route, tables: tuple[Any, Any]) -> None:
+        self._plant, self._algorithm, self._tables = plant, algorithm, tables
+        self._wiring = wired(plant)
+        self._refuse(algorithm)
+        constants, workspace = tables
+        self._outputs = plant._observation.outputs()
+        self._tree, self._tree_workspace = plant.constants, plant.workspace()
+        where = np.zeros(a.ADDRESSES, np.int64)
+        where[a.MOTION], where[a.CONSTANTS], where[a.WORKSPACE] = addresses(
+            route.rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace
+        )
+        where[a.MANIFOLD], _ = addresses(route.project, NOTHING, REAL, VECTOR, constants)
+        where[a.OUTPUTS] = address(self._outputs)
+        if self._has_markers:
+            where[a.MARKERS], where[a.TREE], where[a.TREE_WORKSPACE], _ = addresses(
+                sense_markers, NOTHING, REAL, VECTOR, self._tree, self._tree_workspace, self._outputs
+            )
+        if algorithm.observing is not None and not plant.scene.closures:
+            where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
+        self._where, self._held = where, self._buffers()
+        self._called = self._callbacks()
+        self._run: a.Loop | None = None
+
+    def with_retraction(self) -> None:
+        """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
+        if self._wiring.x:
+            raise NotImplementedError(
+                f'scene "{self._plant.scene.name}" has continuous controllers, whose Jacobian implicit methods lack: '
+                'use "dop853" or "rk4", or give each controller a period_s'
+            )
+        self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
+
+    def begin(self, initial: Real, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+        """A run from y = [q, u, work]; `linear` is empty, or what a `StiffProblem` needs besides: (jacobian, exact,
+        tangent)."""
+        start, t_end = float(clock.times[0]), float(clock.times[-1])
+        table = instants(self._plant.scene.controllers, t_end, clock.segment_ends)
+        rows = int(np.sum(table["kind"] == a.SAMPLE))
+        held = np.zeros((max(rows, 1), widest(self._wiring.controller)))
+        for values in self._held.values():
+            values[:] = 0.0
+        self._held["state"][:] = self._wiring.initial
+        self._run = made = self._loop(table, held, t_end)
+        y = np.concatenate([initial[:-1], np.zeros(self._wiring.x), initial[-1:]])
+        loop.start(start, y, made)
+        ends = np.unique(np.concatenate([clock.segment_ends, table["time"][table["time"] > start]]))
+        kernels = loop.rhs, loop.project, made, made
+        if linear:
+            jacobian, exact, tangent = linear
+            posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
+        else:
+            posed = problem(*kernels)
+        controlled = accuracy._replace(controlled=accuracy.controlled + self._wiring.x)
+        return Begun(posed, y, Clock(clock.times, ends), controlled)
+
+    def heed(self, stop: Index) -> None:
+        """Let what a Python law raises end the run, by stop[0] = 1."""
+        for each in self._called:
+            each.stop = stop
+
+    def raise_trouble(self) -> None:
+        """What a Python law raised, unharmed."""
+        for each in self._called:
+            if each.trouble is not None:
+                trouble, each.trouble = each.trouble, None
+                raise trouble
+
+    @property
+    def loop(self) -> a.Loop:
+        """Of the last run."""
+        assert self._run is not None  # asked of a run only
+        return self._run
+
+    def replay(self) -> None:
+        """From now on the loop shows the run that is over: what sampled controllers put out is read, not found."""
+        self.loop.replaying[0] = 1
+        self.loop.now[0] = np.inf
+
+    def signals(self, times: Real, states: Real) -> dict[str, Real]:
+        """By sensor and controller (T,k), at the states (T,n) of the run that is replayed."""
+        course = np.empty((len(states), len(self.loop.signal)))
+        done = loop.retrace(times[: len(states)], states, self.loop, course)
+        self.raise_trouble()
+        course[done:] = np.nan
+        return {name: course[:, place].copy() for name, place in self._wiring.names.items()}
+
+    @property
+    def _observation(self) -> Any:
+        """As of the system: what is observed has the same names."""
+        return self._plant._observation
+
+    def _observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
+        """As of the system, with what the controllers said at t."""
+        loop.hold(t, y, self.loop)
+        self.raise_trouble()
+        self._plant._observe_row(t, self.loop.y.copy(), algorithm, row)
+
+    @property
+    def _has_markers(self) -> bool:
+        kinds = self._wiring.sensor["kind"]
+        seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
+        return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
+
+    def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
+        """NotImplementedError for loads that this algorithm does not have in compiled code."""
+        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor)]
+        if loads and (algorithm.observing is None or self._plant.scene.closures):
+            raise NotImplementedError(
+                f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
+                "measure an acceleration, or leave it out"
+            )
+
+    def _buffers(self) -> dict[str, Real]:
+        """The arrays that laws read and write, which stay where they are."""
+        w = self._wiring
+        signals = max((place.stop for place in w.names.values()), default=0)
+        return {
+            "signal": np.zeros(signals), "input": np.zeros(len(w.wire)), "state": np.zeros(len(w.initial)),
+            "output": np.zeros(int(np.sum(w.controller["outputs"]))), "change": np.zeros(len(w.initial)),
+        }  # fmt: skip
+
+    def _callbacks(self) -> list[Called]:
+        """Plain Python laws, their addresses put into the controllers' table."""
+        found, held = list[Called](), self._held
+        for i, law in self._wiring.laws.items():
+            row = self._wiring.controller[i]
+            inputs = slice(row["input"], row["input"] + row["inputs"])
+            states = slice(row["state"], row["state"] + row["states"])
+            outputs = slice(row["output"], row["output"] + row["outputs"])
+            numbers = slice(row["number"], row["number"] + row["numbers"])
+            arrays = (
+                held["input"][inputs], held["state"][states], self._wiring.number[numbers], held["output"][outputs],
+                held["change"][states],
+            )  # fmt: skip
+            found.append(Called(law, arrays))
+            row["function"] = found[-1].address
+        return found
+
+    def _loop(self, table: Any, held: Real, t_end: float) -> a.Loop:
+        w, plant, out = self._wiring, self._plant, self._outputs
+        at_once = bool(np.any(w.sensor["kind"] >= a.AT_ONCE))
+        return a.Loop(
+            address=self._where, sensor=w.sensor, controller=w.controller, wire=w.wire, number=w.number, drive=w.drive,
+            course=w.course, piece=w.piece, function=plant.constants.function, instant=table,
+            has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
+            follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
+            slack=np.array([slack(t_end)]), held=held, following=np.zeros(1, np.int64),
+            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
+            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads, **self._held,
+        )  # fmt: skip
+
