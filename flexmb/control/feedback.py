@@ -63,7 +63,7 @@ class Feedback:
 
     def with_retraction(self) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
-        if self._wiring.x:
+        if len(self._wiring.continuous):
             raise NotImplementedError(
                 f'scene "{self._plant.scene.name}" has continuous controllers, whose Jacobian implicit methods lack: '
                 'use "dop853" or "rk4", or give each controller a period_s'
@@ -81,7 +81,7 @@ class Feedback:
             values[:] = 0.0
         self._held["state"][:] = self._wiring.initial
         self._run = made = self._loop(table, held, t_end)
-        y = np.concatenate([initial[:-1], np.zeros(self._wiring.x), initial[-1:]])
+        y = np.concatenate([initial[:-1], self._wiring.continuous, initial[-1:]])
         loop.start(start, y, made)
         ends = np.unique(np.concatenate([clock.segment_ends, table["time"][table["time"] > start]]))
         kernels = loop.rhs, loop.project, made, made
@@ -90,7 +90,7 @@ class Feedback:
             posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
         else:
             posed = problem(*kernels)
-        controlled = accuracy._replace(controlled=accuracy.controlled + self._wiring.x)
+        controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         return Begun(posed, y, Clock(clock.times, ends), controlled)
 
     def heed(self, stop: Index) -> None:

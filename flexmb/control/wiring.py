@@ -40,8 +40,8 @@ _LAWS = {StateSpace: a.LINEAR, Pid: a.PID, Saturation: a.CLAMP, GainTable: a.LOO
 
 
 class Wiring(NamedTuple):
-    """What of a `Loop` is known before a run. `names`: signals by sensor and controller; x: continuous states;
-    callbacks: the plain Python laws by controller."""
+    """What of a `Loop` is known before a run. `names`: signals by sensor and controller; laws: the plain Python
+    functions by controller."""
 
     sensor: Record
     controller: Record
@@ -52,7 +52,7 @@ class Wiring(NamedTuple):
     piece: Real
     initial: Real  # of `Loop.state`
     names: dict[str, slice]
-    x: int
+    continuous: Real  # (X,) those of continuous controllers
     reads_at_once: bool
     laws: dict[int, Callable[..., None]]
 
@@ -69,7 +69,7 @@ def wired(system: System) -> Wiring:
     immediate = {n for row in sensor[at_once] for n in range(row["signal"], row["signal"] + row["width"])}
     record, wire = np.zeros(len(scene.controllers), a.CONTROLLER), list[int]()
     number, initial = list[float](), list[float]()
-    follows, x, outputs = False, 0, 0
+    follows, continuous, outputs = False, list[float](), 0
     plain: dict[int, Callable[..., None]] = {}
     for i, (row, each) in enumerate(zip(record, scene.controllers, strict=True)):
         inputs = [n for reference in each.inputs for n in _signals(names, reference)]
@@ -78,7 +78,7 @@ def wired(system: System) -> Wiring:
         names[each.name] = slice(first, first + width)
         states, numbers = _states(each), _numbers(each, len(inputs))
         row["sampled"] = each.period_s is not None
-        row["signal"], row["x"] = first, x
+        row["signal"], row["x"] = first, len(continuous)
         row["input"], row["inputs"], row["state"], row["states"] = len(wire), len(inputs), len(initial), len(states)
         row["output"], row["outputs"], row["number"], row["numbers"] = outputs, width, len(number), len(numbers)
         if isinstance(each, UserLaw):
@@ -91,7 +91,7 @@ def wired(system: System) -> Wiring:
         else:
             row["law"] = _LAWS[type(each)]
         if each.period_s is None:
-            x += len(states)
+            continuous += states
             follows |= not immediate.isdisjoint(inputs)
         wire += inputs
         number += numbers
@@ -102,7 +102,7 @@ def wired(system: System) -> Wiring:
         row["function"], row["signal"], row["gain"] = function, _signals(names, signal.source)[0], signal.gain
     return Wiring(
         sensor, record, np.array(wire, np.int64), np.array(number, float), drive, course, piece,
-        np.array(initial, float), names, x, follows, plain,
+        np.array(initial, float), names, np.array(continuous, float), follows, plain,
     )  # fmt: skip
 
 

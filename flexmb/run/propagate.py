@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
@@ -111,7 +110,7 @@ def integration(
         found = spare.pop()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
-            system = copy.deepcopy(system)
+            system = system.anew()
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found

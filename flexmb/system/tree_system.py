@@ -51,6 +51,7 @@ class System(Mechanics):
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
         super().__init__()
         self.scene = scene
+        self._asked: Elimination = elimination
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
@@ -67,6 +68,10 @@ class System(Mechanics):
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    def anew(self) -> System:
+        """The same scene turned into other arrays."""
+        return System(self.scene, self._asked)
 
     @cached_property
     def _w(self) -> Workspace:  # type: ignore[override]
