@@ -59,6 +59,7 @@ class Feedback:
             where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
         self._where, self._held = where, self._buffers()
         self._called = self._callbacks()
+        self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
     def with_retraction(self) -> None:
@@ -106,20 +107,28 @@ class Feedback:
                 raise trouble
 
     @property
-    def loop(self) -> a.Loop:
+    def running(self) -> a.Loop:
         """Of the last run."""
         assert self._run is not None  # asked of a run only
         return self._run
 
+    @property
+    def motion(self) -> tuple[Any, a.Loop, a.Loop]:
+        """The closed loop's right-hand side, with its tables."""
+        return loop.rhs, self.running, self.running
+
+    observing = loop.observe
+    """What observes where that was evaluated, by an algorithm that does so in compiled code."""
+
     def replay(self) -> None:
         """From now on the loop shows the run that is over: what sampled controllers put out is read, not found."""
-        self.loop.replaying[0] = 1
-        self.loop.now[0] = np.inf
+        self.running.replaying[0] = 1
+        self.running.now[0] = np.inf
 
     def signals(self, times: Real, states: Real) -> dict[str, Real]:
         """By sensor and controller (T,k), at the states (T,n) of the run that is replayed."""
-        course = np.empty((len(states), len(self.loop.signal)))
-        done = loop.retrace(times[: len(states)], states, self.loop, course)
+        course = np.empty((len(states), len(self.running.signal)))
+        done = loop.retrace(times[: len(states)], states, self.running, course)
         self.raise_trouble()
         course[done:] = np.nan
         return {name: course[:, place].copy() for name, place in self._wiring.names.items()}
@@ -131,9 +140,9 @@ class Feedback:
 
     def _observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
         """As of the system, with what the controllers said at t."""
-        loop.hold(t, y, self.loop)
+        loop.hold(t, y, self.running)
         self.raise_trouble()
-        self._plant._observe_row(t, self.loop.y.copy(), algorithm, row)
+        self._plant._observe_row(t, self.running.y.copy(), algorithm, row)
 
     @property
     def _has_markers(self) -> bool:
@@ -186,6 +195,7 @@ class Feedback:
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
             slack=np.array([slack(t_end)]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
-            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads, **self._held,
+            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
+            doubt=self._doubt, **self._held,
         )  # fmt: skip
 

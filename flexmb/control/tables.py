@@ -101,3 +101,4 @@ class Loop:
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
     loads: Real  # (N,6)
+    doubt: Index  # (1,) of the mechanics' workspace

@@ -18,7 +18,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
-from flexmb.run.observing import batch
+from flexmb.run.observing import Sampler, batch
 from flexmb.run.switching import timing_of
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -65,9 +65,12 @@ class Integration:
                 self.feedback.with_retraction()
         else:
             self._problem = problem(*motion)
-        batched = algorithm.observing is not None and not system.scene.closures and self.feedback is None
-        self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
+        self.batch: Sampler | None = None
         """Observes many samples at once."""
+        self._batched = algorithm.observing is not None and not system.scene.closures
+        if self._batched and self.feedback is None:
+            moving = route.rhs, constants, self._workspace
+            self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
         self._enter: Any = None
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
@@ -87,6 +90,8 @@ class Integration:
         if self.feedback is None:
             return y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(y, clock, accuracy, self._linear)
+        if self._batched:
+            self.batch = batch(self.feedback, self.feedback.motion, self.feedback.observing, len(y))
         self.feedback.heed(counts[STOP : STOP + 1])
         return y, clock, accuracy
 
