@@ -16,6 +16,7 @@ from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.check import SceneError, check_scene
 from flexmb.scene.files import load_scene, save_scene
+from flexmb.scene.open_loop import open_loop
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
 if TYPE_CHECKING:
@@ -72,7 +73,7 @@ __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
     "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
     "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
-    "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin", "user_function",
+    "load_scene", "open_loop", "save_scene", "simulate", "simulate_batch", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

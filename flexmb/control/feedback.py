@@ -107,6 +107,28 @@ class Feedback:
                 raise trouble
 
     @property
+    def reads_at_once(self) -> bool:
+        """Whether a continuous controller reads what depends on forces of the same instant."""
+        return self._wiring.reads_at_once
+
+    @property
+    def driven(self) -> list[int]:
+        """Numbers of the functions of time that controllers drive."""
+        found: list[int] = self._wiring.drive["function"].tolist()
+        return found
+
+    @property
+    def state_names(self) -> list[str]:
+        """Of the continuous controllers' states x, in their order."""
+        named = zip(self._wiring.controller, self._plant.scene.controllers, strict=True)
+        return [
+            f"{controller.name}.state[{i}]"
+            for row, controller in named
+            if not row["sampled"]
+            for i in range(int(row["states"]))
+        ]
+
+    @property
     def running(self) -> a.Loop:
         """Of the last run."""
         assert self._run is not None  # asked of a run only
