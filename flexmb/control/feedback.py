@@ -10,7 +10,7 @@ from flexmb.control import loop
 from flexmb.control import tables as a
 from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
-from flexmb.control.wiring import Wiring, widest, wired
+from flexmb.control.wiring import widest, wired
 from flexmb.entry.observation import sense_markers
 from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
 from flexmb.jit.direct import address, addresses
@@ -29,6 +29,14 @@ class Begun(NamedTuple):
     y: Real
     clock: Clock
     accuracy: Accuracy
+
+
+class LoopMemory(NamedTuple):
+    """What controllers know at the end of a run, to be taken up there: see `Loop`; held (rows,m) from t = 0 on."""
+
+    signal: Real
+    state: Real
+    held: Real
 
 
 class Feedback:
@@ -64,26 +72,32 @@ class Feedback:
 
     def with_retraction(self) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
-        if len(self._wiring.continuous):
-            raise NotImplementedError(
-                f'scene "{self._plant.scene.name}" has continuous controllers, whose Jacobian implicit methods lack: '
-                'use "dop853" or "rk4", or give each controller a period_s'
-            )
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
-    def begin(self, initial: Real, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
-        """A run from y = [q, u, work]; `linear` is empty, or what a `StiffProblem` needs besides: (jacobian, exact,
-        tangent)."""
+    def begin(
+        self, y: Real, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...], memory: LoopMemory | None = None
+    ) -> Begun:
+        """A run from y = [q, u, work], controllers starting as the scene says.
+
+        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). With the memory of a run that
+        ended at this time y = [q, u, x, work] is as it was there, and so is everything that controllers know. Instants
+        that were due before the start are gone: what they put out is remembered, or zero.
+        """
         start, t_end = float(clock.times[0]), float(clock.times[-1])
-        table = instants(self._plant.scene.controllers, t_end, clock.segment_ends)
+        table = instants(self._plant.scene.controllers, start, t_end, clock.segment_ends)
         rows = int(np.sum(table["kind"] == a.SAMPLE))
         held = np.zeros((max(rows, 1), widest(self._wiring.controller)))
         for values in self._held.values():
             values[:] = 0.0
-        self._held["state"][:] = self._wiring.initial
-        self._run = made = self._loop(table, held, t_end)
-        y = np.concatenate([initial[:-1], self._wiring.continuous, initial[-1:]])
-        loop.start(start, y, made)
+        self._run = made = self._loop(table, held, slack(start, t_end))
+        made.following[0] = np.searchsorted(table["time"], start)
+        if memory is None:
+            self._held["state"][:] = self._wiring.initial
+            y = np.concatenate([y[:-1], self._wiring.continuous, y[-1:]])
+            loop.start(start, y, made)
+        else:
+            self._held["state"][:], self._held["signal"][:] = memory.state, memory.signal
+            held[: len(memory.held)] = memory.held[: len(held)]
         ends = np.unique(np.concatenate([clock.segment_ends, table["time"][table["time"] > start]]))
         kernels = loop.rhs, loop.project, made, made
         if linear:
@@ -93,6 +107,11 @@ class Feedback:
             posed = problem(*kernels)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         return Begun(posed, y, Clock(clock.times, ends), controlled)
+
+    def remember(self) -> LoopMemory:
+        """At the end of a run, before it is replayed."""
+        s = self.running
+        return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy())
 
     def heed(self, stop: Index) -> None:
         """Let what a Python law raises end the run, by stop[0] = 1."""
@@ -207,7 +226,7 @@ class Feedback:
             row["function"] = found[-1].address
         return found
 
-    def _loop(self, table: Any, held: Real, t_end: float) -> a.Loop:
+    def _loop(self, table: Any, held: Real, apart: float) -> a.Loop:
         w, plant, out = self._wiring, self._plant, self._outputs
         at_once = bool(np.any(w.sensor["kind"] >= a.AT_ONCE))
         return a.Loop(
@@ -215,7 +234,7 @@ class Feedback:
             course=w.course, piece=w.piece, function=plant.constants.function, instant=table,
             has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
-            slack=np.array([slack(t_end)]), held=held, following=np.zeros(1, np.int64),
+            slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
             dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
             doubt=self._doubt, **self._held,

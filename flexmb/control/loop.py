@@ -53,13 +53,10 @@ def observe(s, _, out):
 
 @kernel
 def start(t, y, s):
-    """Begin a run at t and y: nothing is held yet, and PID controllers' filters stand at the first error.
+    """Begin a run at t and y, where nothing is held yet: PID controllers' filters stand at the first error.
 
     Puts the continuous controllers' states into y.
     """
-    for i in range(s.signal.shape[0]):
-        s.signal[i] = 0.0
-    s.following[0] = 0
     _take(y, s)
     measure_motion(t, s)
     for i in range(s.controller.shape[0]):

@@ -12,18 +12,18 @@ from flexmb.typing import Real, Record
 
 MOST = 10_000_000
 """Instants of a run, at most: their table takes 0.4 GB."""
-TOGETHER = 1e-12  # of the run's end: instants this close are one, for they differ by the rounding of k * period
+TOGETHER = 1e-12  # of the run's time: instants this close are one, for they differ by the rounding of k * period
 
 
-def slack(t_end: float) -> float:
+def slack(t_start: float, t_end: float) -> float:
     """Instants this close (s) are one."""
-    return TOGETHER * t_end
+    return TOGETHER * max(abs(t_start), abs(t_end))
 
 
-def instants(controllers: Sequence[Controller], t_end: float, fixed: Sequence[float]) -> Record:
+def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fixed: Sequence[float]) -> Record:
     """INSTANT records before t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
 
-    Of one time, what was waiting is applied first, then controllers act in the order of the scene. ValueError for
+    They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was waiting is applied first, then controllers act in the order of the scene. ValueError for
     more than MOST.
     """
     parts = [_of_one(i, controller, t_end) for i, controller in enumerate(controllers) if controller.period_s]
@@ -33,7 +33,7 @@ def instants(controllers: Sequence[Controller], t_end: float, fixed: Sequence[fl
     for part, start in zip(parts, first[:-1], strict=True):
         part["row"] += start
     table = np.concatenate(parts)
-    table["time"] = _together(table["time"], np.array([*fixed, t_end]), slack(t_end))
+    table["time"] = _together(table["time"], np.array([t_start, *fixed, t_end]), slack(t_start, t_end))
     table = table[table["time"] < t_end]
     return table[np.lexsort((table["controller"], table["kind"] == SAMPLE, table["time"]))]
 

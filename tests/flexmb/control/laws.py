@@ -41,6 +41,12 @@ def counting(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, cha
     outputs[0] = state[0]
 
 
+@fm.user_function
+def nonsense(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
+    """No number, from the second time on."""
+    outputs[0] = 0.0 if t == 0.0 else np.nan
+
+
 def late_failure(t: float, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
     """Raises after parameters[0] seconds."""
     outputs[0] = 0.0

@@ -162,7 +162,7 @@ def test_signals_of_sensors_are_what_is_observed() -> None:
 def test_force_at_a_node_by_a_controller() -> None:
     """A spring to World's origin, made of a sensor of position and three forces, conserves its energy."""
     k = 5.0
-    law = fm.StateSpace(name="law", inputs=("where",), D=tuple(tuple(-k * (i == j) for j in range(3)) for i in range(3)))
+    law = fm.StateSpace(name="law", inputs=("where",), D=(-k * np.eye(3)).tolist())
     builder = (
         fm.SceneBuilder("held").rigid_body("hub", mass=2.0, inertia=(0.3, 0.5, 0.7), nodes={"eye": (0.3, -0.2, 0.5)})
         .free("float", "ground", "hub", angular_velocity=(0.4, -1.0, 2.0), velocity=(1.0, 0.5, 3.0))

@@ -101,8 +101,8 @@ def _started(scene: fm.Scene, q: Any) -> fm.Scene:
 
 
 @pytest.mark.parametrize(("ask", "reason"), [
-    (fm.linearize, "is sampled"), (fm.equilibrium, "has controllers"), (lambda s: fm.advise(s, 1e-3), "has controllers"),
-    (lambda s: fm.simulate_batch([s], 1.0), "has controllers"),
+    (fm.linearize, "is sampled"), (fm.equilibrium, "has controllers"),
+    (lambda s: fm.advise(s, 1e-3), "has controllers"), (lambda s: fm.simulate_batch([s], 1.0), "has controllers"),
 ], ids=["linearize", "equilibrium", "advise", "batch"])  # fmt: skip
 def test_what_knows_of_no_controllers_says_so(ask: Any, reason: str) -> None:
     scene = rotor(fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),), period_s=0.1))

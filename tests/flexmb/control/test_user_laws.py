@@ -46,8 +46,9 @@ def test_what_a_plain_law_raises_comes_out_unharmed(period: float | None, method
 
 
 def test_a_law_that_says_nan_ends_the_run() -> None:
-    run = fm.simulate(rotor(user("proportional", parameters=(np.inf, 0.0)[:0] + (1e300, 0.0), inputs=("angle", "rate"))), 1.0)
-    assert not run.finished
+    run = fm.simulate(rotor(user("nonsense", period_s=0.25)), 1.0)
+    assert run.status is fm.Status.NONFINITE
+    assert run.stopped_at == 0.25
 
 
 @pytest.mark.parametrize(("function", "what"), [
@@ -57,7 +58,7 @@ def test_a_law_that_says_nan_ends_the_run() -> None:
 ])  # fmt: skip
 def test_a_function_that_cannot_be_had_is_refused(function: str, what: str) -> None:
     with pytest.raises(fm.SceneError, match=what) as caught:
-        fm.simulate(rotor(user("", function=function)), 1.0)
+        fm.simulate(rotor(fm.UserLaw(name="law", inputs=("angle",), function=function)), 1.0)
     assert '$.controllers[0].function (controller "law")' in str(caught.value)
 
 
@@ -73,7 +74,7 @@ def test_every_kind_of_sensor_and_controller_reads_back() -> None:
         fm.MarkerSensor(name="felt", marker="rim", quantity="specific_force", frame="marker"),
         fm.LoadSensor(name="load", hinge="pivot"),
         fm.TimeSensor(name="clock"),
-        fm.ProfileSensor(name="wanted", function=fm.SmoothStep(start_value=0.0, end_value=1.0, start_s=0.0, duration_s=2.0)),
+        fm.ProfileSensor(name="wanted", function=fm.Sine(amplitude=0.5, angular_frequency_rad_s=2.0)),
         fm.StateSpace(name="filter", inputs=("felt",), A=((-1.0,),), B=((0.0, 1.0, 0.0),), C=((1.0,),)),
         fm.GainTable(name="gain", inputs=("clock", "filter"), points=(0.0, 1.0), values=(0.0, 2.0)),
         fm.Pid(name="pid", inputs=("angle", "wanted[0]"), kp=1.0, lower=-1.0, period_s=0.1, delay_s=0.02),
