@@ -150,8 +150,8 @@ class Engine(Protocol):
 
     An engine may have a `summary`, one line that `crosscheck engines` shows; and for timing reports an `algorithm`, in
     a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
-    switched off, whose loop steps it, and what its `wall_s` contains. One that runs the controllers of a scene says so by
-    `feedback = True`; others are not asked about scenes that have some.
+    switched off, whose loop steps it, and what its `wall_s` contains. One that runs the controllers of a scene says so
+    by `feedback = True`; others are not asked about scenes that have some.
     """
 
     name: str

@@ -22,8 +22,7 @@ def measure_motion(t, s):
 
 @helper
 def measure_at_once(t, s):
-    """All others, where the equations of motion were just evaluated, s.dy and the mechanics' workspace are their result.
-    """
+    """All others, where the equations of motion were just evaluated: s.dy, and the mechanics' workspace."""
     first = s.y.shape[0] - 1 - s.rates.shape[0]
     for j in range(s.rates.shape[0]):
         s.rates[j] = s.dy[first + j]

@@ -23,8 +23,8 @@ def slack(t_start: float, t_end: float) -> float:
 def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fixed: Sequence[float]) -> Record:
     """INSTANT records before t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
 
-    They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was waiting is applied first, then controllers act in the order of the scene. ValueError for
-    more than MOST.
+    They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was
+    waiting is applied first, then controllers act in the order of the scene. ValueError for more than MOST.
     """
     parts = [_of_one(i, controller, t_end) for i, controller in enumerate(controllers) if controller.period_s]
     if not parts:

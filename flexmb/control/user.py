@@ -18,12 +18,8 @@ from functools import reduce
 from importlib import import_module
 from typing import Any
 
-from numba import njit
-from numba.core.dispatcher import Dispatcher
-from numba.core.errors import NumbaError
-
-from flexmb.jit.hooks import SEMANTICS
-from flexmb.jit.pointer import NOTHING, REAL, VECTOR, pointer
+from flexmb.jit.foreign import Uncompilable, address_of, as_python, foreign
+from flexmb.jit.pointer import NOTHING, REAL, VECTOR
 from flexmb.scene.problems import Defect, Place, SceneError
 from flexmb.tables.status import INTERRUPTED, OK
 from flexmb.typing import Index, Real
@@ -40,7 +36,7 @@ def user_function(law: Callable[..., None]) -> Any:
     `outputs` and `change`, the rates of the state, or where it has a period the next state. It uses what numba
     compiles, and returns nothing. Errors are not raised in compiled code: a number that is not finite ends the run.
     """
-    return njit(**SEMANTICS)(law)
+    return foreign(law)
 
 
 def found(address: str, scene: str, place: Place) -> Any:
@@ -52,7 +48,7 @@ def found(address: str, scene: str, place: Place) -> Any:
     except (ImportError, AttributeError) as error:
         what = f'the function "{address}" cannot be imported: {error}'
         raise SceneError(scene, [Defect(str(place), what, remedy)]) from error
-    plain = law.py_func if isinstance(law, Dispatcher) else law
+    plain = as_python(law)
     if not callable(plain) or not _takes_six(plain):
         what = f'"{address}" is no function of ({", ".join(ARGUMENTS)})'
         raise SceneError(scene, [Defect(str(place), what, "write one of these six arguments")])
@@ -67,13 +63,13 @@ def _takes_six(function: Callable[..., Any]) -> bool:
     return True
 
 
-def compiled_address(law: Dispatcher, scene: str, place: Place) -> int:
+def compiled_address(law: Any, scene: str, place: Place) -> int:
     """The address of a compiled law; SceneError with numba's message where it cannot be compiled."""
     try:
-        return pointer(law, NOTHING, REAL, *[VECTOR] * 5).__wrapper_address__()
-    except (NumbaError, TypeError) as error:
+        return address_of(law, NOTHING, REAL, *[VECTOR] * 5)
+    except Uncompilable as error:
         remedy = "take numba's advice, or leave the decorator out: a plain function runs, slower"
-        what = f'"{law.py_func.__name__}" cannot be compiled: {error}'
+        what = f'"{as_python(law).__name__}" cannot be compiled: {error}'
         raise SceneError(scene, [Defect(str(place), what, remedy)]) from error
 
 

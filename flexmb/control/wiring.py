@@ -11,6 +11,7 @@ import numpy as np
 from flexmb.control import laws
 from flexmb.control import tables as a
 from flexmb.control.user import compiled_address, found
+from flexmb.jit.foreign import is_foreign
 from flexmb.scene.check.control import named, output_width
 from flexmb.scene.control import (
     Controller,
@@ -84,7 +85,7 @@ def wired(system: System) -> Wiring:
         if isinstance(each, UserLaw):
             place = ROOT.key("controllers", i).named(label("controllers", each)).key("function")
             law = found(each.function, scene.name, place)
-            if hasattr(law, "py_func"):
+            if is_foreign(law):
                 row["law"], row["function"] = a.COMPILED, compiled_address(law, scene.name, place)
             else:
                 row["law"], plain[i] = a.CALLED, law

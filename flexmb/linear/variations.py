@@ -160,7 +160,8 @@ class Equations:
 def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
     """The two parts of a linear model: the equations of a tree or its scene, and a state of it (default: initial).
 
-    NotImplementedError for closed chains and scenes with controllers, ValueError or TypeError for a state that is not one of this system.
+    NotImplementedError for closed chains and scenes with controllers, ValueError or TypeError for a state that is not
+    one of this system.
     """
     if not isinstance(system, System | Scene):
         raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")

@@ -52,8 +52,10 @@ class Integration:
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
         self._integrator = integrator
-        self.feedback = Feedback(system, algorithm, route, (constants, self._workspace)) if system.scene.controllers else None
+        self.feedback: Feedback | None = None
         """Of a scene with controllers."""
+        if system.scene.controllers:
+            self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
         self._linear: tuple[Any, ...] = ()
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
@@ -83,10 +85,8 @@ class Integration:
         if self._enter is None:
             self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
 
-    def begin(
-        self, y: Real, clock: Clock, accuracy: Accuracy, counts: Index
-    ) -> tuple[Real, Clock, Accuracy]:
-        """The state, clock and accuracy of a run from y: the same, but of a scene with controllers those of the loop."""
+    def begin(self, y: Real, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
+        """State, clock and accuracy of a run from y: the same, but of a scene with controllers those of the loop."""
         if self.feedback is None:
             return y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(y, clock, accuracy, self._linear)

@@ -58,10 +58,11 @@ class Trajectory:
     """One run, at the T output times that were reached.
 
     t (T,) s; q (T,nq) and u (T,nu), in the order of `q_names`, `u_names`, which are (name, unit); markers by name;
-    loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
-    wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
-    by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
-    motors, dampers and loads; signals (T,k) by sensor and controller, of a scene that has some. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads
+    by wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates;
+    energy by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by
+    drives, motors, dampers and loads; signals (T,k) by sensor and controller, of a scene that has some. `stopped_at`
+    is the time of the last good state: the end of the run if it finished.
     """
 
     scene: str

@@ -117,7 +117,7 @@ def control(scene: Scene) -> Iterator[Defect]:
 def _sensors(scene: Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
     moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, BeamBody | ModalBody)]
-    known = {
+    known: dict[Any, tuple[str, str, list[str]]] = {
         CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
         MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
         LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),

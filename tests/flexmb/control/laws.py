@@ -61,4 +61,4 @@ def of_two(t: float, inputs: Any) -> None:
 @fm.user_function
 def uncompilable(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
     """Uses what numba does not know."""
-    outputs[0] = open("nothing")
+    outputs[0] = len({}.fromkeys("nothing"))
