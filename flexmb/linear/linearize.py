@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from flexmb.linear.closed_loop import closed_loop
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
@@ -30,6 +29,8 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
     if isinstance(system, System) and system.scene.controllers:
+        from flexmb.linear.closed_loop import closed_loop  # few scenes need it
+
         state = system.initial_state if state is None else state
         system.layout.entering(state)
         return closed_loop(system, state, held_model if held else linear_model)

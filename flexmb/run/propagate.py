@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexmb.control.feedback import Feedback
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
@@ -26,6 +25,9 @@ from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
+
+if TYPE_CHECKING:
+    from flexmb.control.feedback import Feedback
 
 
 class Raw(NamedTuple):
@@ -55,6 +57,8 @@ class Integration:
         self.feedback: Feedback | None = None
         """Of a scene with controllers."""
         if system.scene.controllers:
+            from flexmb.control.feedback import Feedback  # few scenes need it
+
             self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
         self._linear: tuple[Any, ...] = ()
         motion = route.rhs, route.project, constants, self._workspace
