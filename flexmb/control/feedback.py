@@ -8,6 +8,7 @@ import numpy as np
 
 from flexmb.control import loop
 from flexmb.control import tables as a
+from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
 from flexmb.control.wiring import widest, wired
@@ -166,13 +167,22 @@ class Feedback:
         self.running.replaying[0] = 1
         self.running.now[0] = np.inf
 
-    def signals(self, times: Real, states: Real) -> dict[str, Real]:
-        """By sensor and controller (T,k), at the states (T,n) of the run that is replayed."""
-        course = np.empty((len(states), len(self.running.signal)))
-        done = loop.retrace(times[: len(states)], states, self.running, course)
+    def course(self, times: Real, states: Real) -> tuple[dict[str, Real], dict[str, Real]]:
+        """Signals by sensor and controller, (T,k), and the power of controllers' outputs (W), likewise.
+
+        At the states (T,n) of the run that is replayed.
+        """
+        times, found = times[: len(states)], np.empty((len(states), len(self.running.signal)))
+        done = loop.retrace(times, states, self.running, found)
         self.raise_trouble()
-        course[done:] = np.nan
-        return {name: course[:, place].copy() for name, place in self._wiring.names.items()}
+        found[done:] = np.nan
+        power = powers(self._plant, times, states, self._wiring.drive, found)
+        named = self._wiring.names
+        controllers = [controller.name for controller in self._plant.scene.controllers]
+        return (
+            {name: found[:, place].copy() for name, place in named.items()},
+            {name: power[:, named[name]].copy() for name in controllers},
+        )
 
     @property
     def _observation(self) -> Any:

@@ -154,6 +154,7 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve
             f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
         )
     states = raw.states[: len(rows)]
+    signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
     q_names, u_names = system.state_names
     return Trajectory(
         scene=system.scene.name,
@@ -167,7 +168,8 @@ def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve
         u_names=u_names,
         **gathered(system._observation, rows),
         work=states[:, -1],
-        signals={} if solve.feedback is None else solve.feedback.signals(times, states),
+        signals=signals,
+        power=power,
         statistics=Statistics(
             evaluations=raw.counts[EVALUATIONS],
             accepted_steps=raw.counts[ACCEPTED],

@@ -61,8 +61,9 @@ class Trajectory:
     loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads
     by wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates;
     energy by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by
-    drives, motors, dampers and loads; signals (T,k) by sensor and controller, of a scene that has some. `stopped_at`
-    is the time of the last good state: the end of the run if it finished.
+    drives, motors, dampers and loads; signals (T,k) by sensor and controller and power (T,k) W that each output of a
+    controller puts into the motion, of a scene that has some. `stopped_at` is the time of the last good state: the end
+    of the run if it finished.
     """
 
     scene: str
@@ -83,6 +84,7 @@ class Trajectory:
     work: Real
     statistics: Statistics
     signals: dict[str, Real] = field(default_factory=dict)
+    power: dict[str, Real] = field(default_factory=dict)
 
     @property
     def finished(self) -> bool:
@@ -135,6 +137,9 @@ class Trajectory:
         for name, signals in self.signals.items():
             for i in range(signals.shape[1]):
                 yield f"signal.{name}[{i}]", "", signals[:, i]
+        for name, power in self.power.items():
+            for i in range(power.shape[1]):
+                yield f"power.{name}[{i}]", "W", power[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""

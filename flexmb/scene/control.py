@@ -20,7 +20,7 @@ Matrix = tuple[tuple[float, ...], ...]
 
 
 class CoordinateSensor(SceneStruct, frozen=True, kw_only=True, tag="coordinate", tag_field="kind"):
-    """Coordinates, or their speeds, of a hinge, wheel or point mass, or of "<body>.modes": `of` names it.
+    """Coordinates, or their speeds, of a hinge, wheel or point mass, or of `<body>.modes`: `of` names it.
 
     Quantity "rate" of a spherical or free hinge has its speeds: the angular velocity in outboard axes first.
     """

@@ -176,6 +176,8 @@ def test_force_at_a_node_by_a_controller() -> None:
     assert np.abs(energy - energy[0]).max() < 1e-9 * energy[0]
     assert np.abs(run.energy_drift).max() < 1e-8
     assert np.abs(run.momentum_drift[:, :3]).max() < 1e-8  # a central force
+    stored = -k * np.sum(run.markers["eye"].position * run.markers["eye"].velocity[:, 3:], axis=1)
+    assert run.power["law"].sum(axis=1) == pytest.approx(stored, abs=1e-12 * np.abs(stored).max())
 
 
 def test_a_scene_without_controllers_knows_of_none() -> None:
