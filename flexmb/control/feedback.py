@@ -242,6 +242,7 @@ class Feedback:
         return a.Loop(
             address=self._where, sensor=w.sensor, controller=w.controller, wire=w.wire, number=w.number, drive=w.drive,
             course=w.course, piece=w.piece, function=plant.constants.function, instant=table,
+            continuous=np.array([not np.all(w.controller["sampled"])], np.int64),
             has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),

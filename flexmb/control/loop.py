@@ -20,9 +20,7 @@ from flexmb.tables.status import OK
 def rhs(t, y, dy, s, _):
     """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
     _take(y, s)
-    status = _keep_time(t, s)
-    if status == OK:
-        status = _steer(t, s)
+    status = _set(t, s)
     if status == OK:
         status = _move(t, s)
     if status == OK and s.follows[0]:
@@ -87,8 +85,17 @@ def retrace(times, states, s, course):
 def hold(t, y, s):
     """Have the functions of the mechanics say what the controllers say at t, at y; returns a status code."""
     _take(y, s)
+    return _set(t, s)
+
+
+@helper
+def _set(t, s):
+    """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
     status = _keep_time(t, s)
-    return _steer(t, s) if status == OK else status
+    if status == OK and s.continuous[0]:
+        return _steer(t, s)
+    _drive(s)
+    return status
 
 
 @helper
@@ -207,9 +214,15 @@ def _steer(t, s):
     if s.follows[0]:
         _forget_at_once(s)
     status = _act_continuously(t, s)
+    _drive(s)
+    return status
+
+
+@helper
+def _drive(s):
+    """Functions of time of the mechanics, whose values are signals."""
     for i in range(s.drive.shape[0]):
         s.function[s.drive[i].function].data[0] = s.drive[i].gain * s.signal[s.drive[i].signal]
-    return status
 
 
 @helper

@@ -82,6 +82,7 @@ class Loop:
     function: Record  # FUNCTION of the mechanics, where drives write
     instant: Record  # INSTANT, in time
     has_markers: Index  # (1,) whether a sensor needs the motion of markers
+    continuous: Index  # (1,) whether there is a continuous controller
     has_at_once: Index  # (1,) whether a sensor depends on forces of the same instant ...
     follows: Index  # (1,) ... and a continuous controller reads it
     gravity: Real  # (3,)

