@@ -17,6 +17,7 @@ import numpy as np
 from crosscheck.judging.against_reference import REFERENCE, of_stored
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import Result, collect
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import RunFile, Variant
@@ -290,8 +291,7 @@ def _claimed(channel: str, target: Signal, goal: float, added: float) -> Uncerta
 
     The goal is relative to what the verdict takes for the signal's size: that of its family where the signal is zero.
     """
-    sizes = (signal_range(channel, target.values), *target.sizes)
-    size = next((size for size in sizes if size > target.uncertainty.value), 0.0)
+    size = size_of(signal_range(channel, target.values), target.sizes, target.uncertainty.value)
     allowed = goal * size * (1.0 - 1e-12) - target.uncertainty.value
     value, how = (allowed, "claimed: the case's goal") if allowed >= added else (added, INTERPOLATION)
     value = max(value, 0.0)
