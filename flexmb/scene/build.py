@@ -345,7 +345,7 @@ class SceneBuilder:
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
         )
 
-    # Feedback: what controllers put out acts through a Signal in place of a function of time
+    # Feedback: what controllers put out acts through a ControlSignal in place of a function of time
 
     def sense_coordinate(self, name: str, of: str, *, quantity: Literal["value", "rate"] = "value") -> Self:
         """Coordinates or speeds of a hinge, wheel, point mass or "<body>.modes" as a signal."""

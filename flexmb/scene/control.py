@@ -1,8 +1,8 @@
-"""Feedback in a scene: sensors, controllers that read them, and by `Signal` what the controllers' outputs drive.
+"""Feedback in a scene: sensors, controllers that read them, and by `ControlSignal` what the controllers' outputs drive.
 
 A *signal* is a number that a sensor measures or a controller puts out. Inputs of controllers name them: a sensor
 ("gyro", all its numbers) or one of them ("gyro[2]"), or a controller that is listed before ("filter", "filter[0]").
-A `flexmb.scene.functions.Signal` takes the place of a function of time wherever a torque or a force stands.
+A `flexmb.scene.functions.ControlSignal` takes the place of a function of time wherever a torque or a force stands.
 
 A controller without `period_s` is continuous: its states are integrated with the motion. With a period it acts at
 `offset_s`, `offset_s + period_s`, ...: it reads its inputs there, and `delay_s` later its outputs change, to be held

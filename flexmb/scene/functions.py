@@ -77,7 +77,7 @@ class Table(_Function, frozen=True, tag="table", kw_only=True):
     values: tuple[float, ...]
 
 
-class Signal(_Function, frozen=True, tag="signal", kw_only=True):
+class ControlSignal(_Function, frozen=True, tag="signal", kw_only=True):
     """`gain` times an output of a controller: feedback as torque of a hinge or wheel, or as force or torque of a load.
 
     `source` names the controller, or one of several outputs: "attitude[2]". In a run it is what the controller says;
@@ -88,4 +88,4 @@ class Signal(_Function, frozen=True, tag="signal", kw_only=True):
     gain: float = 1.0
 
 
-Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table | Signal
+Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table | ControlSignal

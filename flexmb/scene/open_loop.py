@@ -7,7 +7,7 @@ from typing import Any
 import msgspec
 
 from flexmb.scene.columns import struct_keys
-from flexmb.scene.functions import Constant, Signal
+from flexmb.scene.functions import Constant, ControlSignal
 from flexmb.scene.schema import Scene
 
 
@@ -18,7 +18,7 @@ def open_loop(scene: Scene) -> Scene:
 
 def _silent(item: Any) -> Any:
     """A struct, or a tuple of some, with every signal inside it zero; the same one where there is none."""
-    if isinstance(item, Signal):
+    if isinstance(item, ControlSignal):
         return Constant(value=0.0)
     if isinstance(item, tuple):
         return tuple(map(_silent, item)) if item and isinstance(item[0], msgspec.Struct) else item

@@ -42,7 +42,7 @@ from flexmb.scene.control import (
     TimeSensor,
     UserLaw,
 )
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Signal, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Closure,
@@ -146,11 +146,11 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Controller",
-    "CoordinateSensor", "Cylindrical", "Free", "Function", "GainTable", "Gimbal", "Hinge", "InertiaPoint", "Level",
-    "LinearCoordinate", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode",
-    "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion",
-    "Ramp", "Revolute", "RigidBody", "Saturation", "Scene", "Sensor", "SidBody", "Signal", "Sine", "SmoothStep",
-    "Spherical", "SpinUp", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Weld",
-    "Wheel",
+    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "ControlSignal",
+    "Controller", "CoordinateSensor", "Cylindrical", "Free", "Function", "GainTable", "Gimbal", "Hinge",
+    "InertiaPoint", "Level", "LinearCoordinate", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3",
+    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass", "Prismatic",
+    "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Revolute", "RigidBody", "Saturation", "Scene", "Sensor",
+    "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "StateSpace", "Table", "TimeSensor", "TipMass",
+    "Universal", "UserLaw", "Vector", "Weld", "Wheel",
 ]  # fmt: skip

@@ -23,7 +23,7 @@ from flexmb.scene.control import (
     StateSpace,
     UserLaw,
 )
-from flexmb.scene.functions import Signal
+from flexmb.scene.functions import ControlSignal
 from flexmb.scene.hinges import Free, Spherical
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
@@ -128,7 +128,7 @@ def _sensors(scene: Scene) -> Iterator[Defect]:
             if getattr(sensor, key) not in names:
                 remedy = closest(getattr(sensor, key), names)
                 yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
-        if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, Signal):
+        if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, ControlSignal):
             remedy = f'let the controller take "{sensor.function.source}" itself'
             yield Defect(str(place.key("function")), "a signal is no function of time", remedy)
 
@@ -257,7 +257,7 @@ def _delays(controller: Controller, column: int, width: int | None) -> bool:
 def _signals(scene: Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
     """Signals name one output of a controller, and drive loads: no motion can follow what jumps."""
     for place, key, value in suspicious(scene, _with_signals):
-        if not isinstance(value, Signal) or key == "function" and place.path.startswith("$.sensors"):
+        if not isinstance(value, ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
             continue
         yield from _reference(place.key("source"), value.source, widths, set())
         found = named(value.source)
@@ -270,5 +270,5 @@ def _signals(scene: Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
 
 
 def _with_signals(items: Any) -> set[int]:
-    return {owner for group in alike(items) if group.kind is Signal for owner in group.owners}
+    return {owner for group in alike(items) if group.kind is ControlSignal for owner in group.owners}
 

@@ -40,4 +40,4 @@ def test_implicit_methods_refuse_continuous_ones() -> None:
 
 def test_a_signal_is_no_profile() -> None:
     with pytest.raises(NotImplementedError, match="no function of time"):
-        profile(fm.Signal(source="law"))
+        profile(fm.ControlSignal(source="law"))

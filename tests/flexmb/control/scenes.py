@@ -16,7 +16,7 @@ SENSORS = (
 
 def rotor(*parts: Any, **hinge: Any) -> fm.Scene:
     """One body on one hinge without gravity: J theta'' = torque."""
-    torque = fm.Signal(source="law") if any(getattr(part, "name", "") == "law" for part in parts) else None
+    torque = fm.ControlSignal(source="law") if any(getattr(part, "name", "") == "law" for part in parts) else None
     return (
         fm.SceneBuilder("rotor")
         .rigid_body("disc", mass=1.0, com=(0.0, 0.0, 0.0), inertia=(1.0, 1.0, INERTIA))

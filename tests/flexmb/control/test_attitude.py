@@ -32,7 +32,7 @@ def craft(law: str = "flexmb.control.attitude:eigenaxis_slew") -> fm.SceneBuilde
     for i, axis in enumerate(np.eye(3)):
         builder.wheel(
             f"wheel {i}", "hub", axis=axis, mass=2.0, axial_inertia=0.1, transverse_inertia=0.06,
-            torque=fm.Signal(source=f"attitude[{i}]", gain=-1.0),
+            torque=fm.ControlSignal(source=f"attitude[{i}]", gain=-1.0),
         )  # fmt: skip
     return builder
 

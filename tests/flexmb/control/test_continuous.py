@@ -13,7 +13,7 @@ from tests.flexmb.control.scenes import DAMPING, INERTIA, STIFFNESS, pendulum, r
 
 GAINS = ((-STIFFNESS, -DAMPING),)
 LAW = {"name": "law", "inputs": ("angle", "rate")}
-TORQUE = fm.Signal(source="law")
+TORQUE = fm.ControlSignal(source="law")
 RUN: dict[str, Any] = {"t_end": 2.0, "samples": 41}
 
 
@@ -170,7 +170,8 @@ def test_force_at_a_node_by_a_controller() -> None:
         .add(fm.MarkerSensor(name="where", marker="eye", quantity="position"), law)
     )  # fmt: skip
     for i, direction in enumerate(np.eye(3)):
-        builder.force(f"pull {i}", "hub", node="eye", direction=direction, function=fm.Signal(source=f"law[{i}]"))
+        pull = fm.ControlSignal(source=f"law[{i}]")
+        builder.force(f"pull {i}", "hub", node="eye", direction=direction, function=pull)
     run = fm.simulate(builder.scene(), 3.0)
     energy = run.total_energy + 0.5 * k * np.sum(run.markers["eye"].position ** 2, axis=1)
     assert np.abs(energy - energy[0]).max() < 1e-9 * energy[0]

@@ -33,7 +33,7 @@ def test_a_small_motion_follows_the_closed_loop() -> None:
     law = fm.StateSpace(
         name="law", inputs=("angle", "rate", "one[0]"), A=((-2.0,),), B=((1.0, 0.5, -HANGING),), C=((-3.0,),)
     )
-    system = fm.compile(pendulum(ONE, law, torque=fm.Signal(source="law")).scene())
+    system = fm.compile(pendulum(ONE, law, torque=fm.ControlSignal(source="law")).scene())
     model = fm.linearize(system, system.state(np.array([HANGING, 0.0]), np.zeros(2)))
     assert model.rates == pytest.approx([0.0, 0.0], abs=1e-12)
     start = np.array([SMALL, -SMALL, 0.0, 0.0, 0.0])
@@ -49,7 +49,7 @@ def test_a_force_in_turning_axes_turns_with_its_body() -> None:
     )
     parts = fm.MarkerSensor(name="gyro", marker="tip", quantity="angular_velocity"), steady
     builder = tossed(*parts)
-    builder.force("thrust", "hub", direction=(0, 0, 1), frame="node", function=fm.Signal(source="law"))
+    builder.force("thrust", "hub", direction=(0, 0, 1), frame="node", function=fm.ControlSignal(source="law"))
     system = fm.compile(builder.scene())
     model = fm.linearize(system)
     fixed = tossed().force("thrust", "hub", direction=(0, 0, 1), frame="node", function=fm.Constant(value=2.0 * 0.4))
@@ -69,7 +69,7 @@ def test_a_sampled_loop_is_closed_on_the_model_of_the_open_one() -> None:
         name="law", inputs=("angle", "rate", "one[0]"), D=((-gains[0], -gains[1], gains[0] * HANGING),),
         period_s=period, delay_s=delay,
     )  # fmt: skip
-    scene = pendulum(ONE, law, torque=fm.Signal(source="law")).scene()
+    scene = pendulum(ONE, law, torque=fm.ControlSignal(source="law")).scene()
     plant = fm.compile(fm.open_loop(scene))
     model = fm.linearize(plant, plant.state(np.array([HANGING, 0.0]), np.zeros(2)))
     b = model.B[:, [name for name, _ in model.inputs].index("pivot.rotation")]

@@ -163,7 +163,7 @@ def test_a_wheel_turns_its_body_and_keeps_the_momentum() -> None:
     for i, axis in enumerate(np.eye(3)):
         builder.wheel(
             f"wheel {i}", "hub", axis=axis, mass=0.1, axial_inertia=0.05, transverse_inertia=0.03,
-            torque=fm.Signal(source=f"law[{i}]"),
+            torque=fm.ControlSignal(source=f"law[{i}]"),
         )  # fmt: skip
     run = fm.simulate(builder.scene(), 5.0)
     centre = run.momentum_drift[:, 3:] + np.outer(run.t, [0.0, 0.0, 9.81 * 2.3])
@@ -181,7 +181,7 @@ def test_a_sampled_controller_in_a_closed_chain() -> None:
         fm.SceneBuilder("looped")
         .rigid_body("disc", mass=1.0, inertia=(1.0, 1.0, INERTIA))
         .rigid_body("rod", mass=1e-3, com=(0.5, 0.0, 0.0), inertia=(1e-5, 1e-5, 1e-5))
-        .revolute("pivot", "ground", "disc", angle=0.3, torque=fm.Signal(source="law"))
+        .revolute("pivot", "ground", "disc", angle=0.3, torque=fm.ControlSignal(source="law"))
         .free("float", "ground", "rod", quaternion=(np.cos(0.15), 0.0, 0.0, np.sin(0.15)))
         .closure("glue", "weld", "disc", "rod")
         .add(*hung.sensors, *hung.controllers)
@@ -191,7 +191,7 @@ def test_a_sampled_controller_in_a_closed_chain() -> None:
     heavier = INERTIA + 1e-5 + 1e-3 * 0.25
     alone = (
         fm.SceneBuilder("alone").rigid_body("disc", mass=1.0, inertia=(1.0, 1.0, heavier))
-        .revolute("pivot", "ground", "disc", angle=0.3, torque=fm.Signal(source="law"))
+        .revolute("pivot", "ground", "disc", angle=0.3, torque=fm.ControlSignal(source="law"))
         .add(*hung.sensors, *hung.controllers).scene()
     )  # fmt: skip
     assert looped.q[:, 0] == pytest.approx(fm.simulate(alone, 1.0, samples=11).q[:, 0], abs=1e-9)
@@ -220,7 +220,7 @@ def test_more_instants_than_memory_are_refused() -> None:
 
 def test_a_long_run_costs_little_beyond_its_steps() -> None:
     """A hundred seconds at 10 Hz with 50 ms: two segments a period, each with one evaluation that a step has not."""
-    builder = pendulum(law(0.1, 0.05), torque=fm.Signal(source="law"))
+    builder = pendulum(law(0.1, 0.05), torque=fm.ControlSignal(source="law"))
     run = fm.simulate(builder.scene(), 20.0, samples=3)
     steps = run.statistics.accepted_steps + run.statistics.rejected_steps
     assert run.statistics.evaluations <= 11 * run.statistics.rejected_steps + 12 * steps + 3 * 8 + 400 + 2

@@ -48,7 +48,7 @@ WRONG = [
     ((fm.CoordinateSensor(name="other", of="pivvot"), law()), "$.sensors[2].of", 'did you mean "pivot"?'),
     ((fm.MarkerSensor(name="other", marker="edge", quantity="position"), law()), "$.sensors[2].marker", "rim"),
     ((fm.LoadSensor(name="other", hinge="pivott"), law()), "$.sensors[2].hinge", 'did you mean "pivot"?'),
-    ((fm.ProfileSensor(name="other", function=fm.Signal(source="law")), law()), "$.sensors[2].function", "itself"),
+    ((fm.ProfileSensor(name="other", function=fm.ControlSignal(source="law")), law()), "$.sensors[2].function", "take"),
 ]  # fmt: skip
 
 
@@ -63,10 +63,10 @@ def test_defects_are_named(parts: Any, where: str, remedy: str) -> None:
 def test_signals_name_one_output_of_a_controller() -> None:
     wide = fm.StateSpace(name="law", inputs=("speed",), D=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)))
     speed = fm.MarkerSensor(name="speed", marker="tip", quantity="velocity")
-    builder = tossed(speed, wide).force("f", "hub", direction=(1, 0, 0), function=fm.Signal(source="law"))
+    builder = tossed(speed, wide).force("f", "hub", direction=(1, 0, 0), function=fm.ControlSignal(source="law"))
     with pytest.raises(fm.SceneError, match=r'say which: "law\[0\]"'):
         builder.scene()
-    builder = tossed(speed, wide).force("f", "hub", direction=(1, 0, 0), function=fm.Signal(source="low[0]"))
+    builder = tossed(speed, wide).force("f", "hub", direction=(1, 0, 0), function=fm.ControlSignal(source="low[0]"))
     with pytest.raises(fm.SceneError, match='did you mean "law"'):
         builder.scene()
 
@@ -74,7 +74,7 @@ def test_signals_name_one_output_of_a_controller() -> None:
 def test_a_controller_prescribes_no_motion() -> None:
     builder = (
         fm.SceneBuilder("led").rigid_body("disc", mass=1.0, inertia=(1.0, 1.0, 1.0))
-        .revolute("pivot", "ground", "disc", prescribed=fm.Signal(source="law"))
+        .revolute("pivot", "ground", "disc", prescribed=fm.ControlSignal(source="law"))
         .add(fm.TimeSensor(name="angle"), law())
     )  # fmt: skip
     with pytest.raises(fm.SceneError, match="cannot prescribe a motion"):
