@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.interruption import Interrupted
+    from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
+    from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.system.batch import Batch, compile_batch
     from flexmb.system.compile import compile
@@ -53,8 +55,11 @@ _LATER = {
     "LinearModel": "flexmb.linear.linear_model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
+    "Restart": "flexmb.run.restart",
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
+    "simulate_stages": "flexmb.run.stages",
+    "RunStage": "flexmb.run.stages",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
     "Batch": "flexmb.system.batch",
     "compile_batch": "flexmb.system.batch",
@@ -71,9 +76,10 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
-    "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
-    "load_scene", "open_loop", "save_scene", "simulate", "simulate_batch", "steady_spin", "user_function",
+    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError", "State",
+    "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch",
+    "equilibrium", "linearize", "load_scene", "open_loop", "save_scene", "simulate", "simulate_batch",
+    "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

@@ -12,6 +12,7 @@ from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, conso
 from flexmb.integrate.integrator import Method
 from flexmb.output.writing import check_folder, folder, writing
 from flexmb.scene.files import load_scene
+from flexmb.scene.values import parsed
 
 METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
 
@@ -21,7 +22,7 @@ FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 
 def simulate(
     scene: SceneFile,
-    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.", show_default=False)],
+    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
     method: Annotated[
         str,
@@ -38,6 +39,17 @@ def simulate(
         float | None,
         typer.Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False),
     ] = None,
+    from_time: Annotated[
+        float | None, typer.Option("--from-time", help="Start of the run in s; 0.", show_default=False)
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A value in the scene, `rod.mass_kg=2.0`; may be repeated.", show_default=False),
+    ] = None,
+    restart: Annotated[
+        Path | None,
+        typer.Option(help="Go on from this `restart.npz` of another run, to the last bit.", show_default=False),
+    ] = None,
     samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
     algorithm: Annotated[
         str,
@@ -53,7 +65,7 @@ def simulate(
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
 ) -> None:
     """
-    Simulate a scene; write `trajectory.csv` and charts; print a summary.
+    Simulate a scene; write `trajectory.csv`, `restart.npz` and charts; print a summary.
 
     **Examples**
 
@@ -63,6 +75,8 @@ def simulate(
         flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
         flexmb simulate boom.toml --t-end 60 --also parquet --also rrd
+        flexmb simulate boom.toml --t-end 60 --set tip.mass_kg=0.2 --set hub_hinge.rotation.angle_rad=0.1
+        flexmb simulate boom.toml --t-end 120 --restart out/restart.npz --out later
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
@@ -73,6 +87,7 @@ def simulate(
     interrupted = False
     with no_traceback():
         from flexmb.run.interruption import Interrupted
+        from flexmb.run.restart import Restart
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
         from flexmb.run.summary import summary
 
@@ -81,9 +96,11 @@ def simulate(
         if strange:
             raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
+            changed = load_scene(scene).with_values(dict(map(parsed, values or ())))
+            begin = None if restart is None else Restart.load(restart)
             try:
                 trajectory = run(
-                    load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                    changed, t_end, method, t_start=from_time, state=begin,  # type: ignore[arg-type]
                     rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
                     spectral_radius=spectral_radius,
                 )  # fmt: skip
@@ -98,6 +115,9 @@ def simulate(
             for path in others:
                 getattr(trajectory, FORMATS[path.suffix[1:]])(path)
             written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
+            if trajectory.restart is not None:
+                written.append(out / "restart.npz")
+                trajectory.restart.save(written[-1])
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)

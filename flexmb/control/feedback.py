@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
 from flexmb.control import loop
 from flexmb.control import tables as a
+from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
@@ -20,6 +21,7 @@ from flexmb.motion.retraction import move
 from flexmb.scene.control import LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
+from flexmb.tables.state import State
 from flexmb.typing import Index, Real
 
 
@@ -32,12 +34,15 @@ class Begun(NamedTuple):
     accuracy: Accuracy
 
 
-class LoopMemory(NamedTuple):
-    """What controllers know at the end of a run, to be taken up there: see `Loop`; held (rows,m) from t = 0 on."""
+class Starting(Protocol):
+    """state: of the motion, with its time; y = [q, u, work], or with the memory of controllers [q, u, x, work]."""
 
-    signal: Real
-    state: Real
-    held: Real
+    @property
+    def state(self) -> State: ...
+    @property
+    def y(self) -> Real: ...
+    @property
+    def controllers(self) -> LoopMemory | None: ...
 
 
 class Feedback:
@@ -75,31 +80,29 @@ class Feedback:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
-    def begin(
-        self, y: Real, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...], memory: LoopMemory | None = None
-    ) -> Begun:
-        """A run from y = [q, u, work], controllers starting as the scene says.
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+        """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). With the memory of a run that
-        ended at this time y = [q, u, x, work] is as it was there, and so is everything that controllers know. Instants
-        that were due before the start are gone: what they put out is remembered, or zero.
+        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). Instants that were due before
+        the start are gone: what they put out is remembered, or zero.
         """
-        start, t_end = float(clock.times[0]), float(clock.times[-1])
-        table = instants(self._plant.scene.controllers, start, t_end, clock.segment_ends)
-        rows = int(np.sum(table["kind"] == a.SAMPLE))
-        held = np.zeros((max(rows, 1), widest(self._wiring.controller)))
+        start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
+        ends, apart = clock.segment_ends, slack(start, t_end)
+        table = instants(self._plant.scene.controllers, start, t_end, ends[np.isfinite(ends)])
+        due = table[table["time"] < t_end]
+        held = np.zeros((max(int(np.sum(due["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
         for values in self._held.values():
             values[:] = 0.0
-        self._run = made = self._loop(table, held, slack(start, t_end))
-        made.following[0] = np.searchsorted(table["time"], start)
-        if memory is None:
+        self._run = made = self._loop(due, held, apart)
+        if known is None:
+            made.following[0] = np.searchsorted(due["time"], start)
             self._held["state"][:] = self._wiring.initial
-            y = np.concatenate([y[:-1], self._wiring.continuous, y[-1:]])
+            y = np.concatenate([begin.y[:-1], self._wiring.continuous, begin.y[-1:]])
             loop.start(start, y, made)
         else:
-            self._held["state"][:], self._held["signal"][:] = memory.state, memory.signal
-            held[: len(memory.held)] = memory.held[: len(held)]
-        ends = np.unique(np.concatenate([clock.segment_ends, table["time"][table["time"] > start]]))
+            y, made.following[0] = begin.y, int(known.instants[0])
+            self._held["state"][:], self._held["signal"][:] = known.state, known.signal
+            held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
         if linear:
             jacobian, exact, tangent = linear
@@ -107,12 +110,13 @@ class Feedback:
         else:
             posed = problem(*kernels)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
+        ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
 
     def remember(self) -> LoopMemory:
         """At the end of a run, before it is replayed."""
         s = self.running
-        return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy())
+        return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy(), s.following.astype(float))
 
     def heed(self, stop: Index) -> None:
         """Let what a Python law raises end the run, by stop[0] = 1."""
@@ -251,3 +255,11 @@ class Feedback:
             doubt=self._doubt, **self._held,
         )  # fmt: skip
 
+
+def _with_instants(ends: Real, times: Real, t_end: float) -> Real:
+    """Ends of segments as `Clock` has them, with instants up to t_end (s) among them."""
+    equal_steps, inner = not np.isfinite(ends[-1]), times[times < t_end]
+    is_end = len(inner) < len(times) or np.sum(ends == t_end) > (0 if equal_steps else 1)
+    before = np.union1d(ends[ends < t_end], inner)
+    last = [t_end] * bool(is_end) + [np.inf] if equal_steps else [t_end] + [t_end] * bool(is_end)
+    return np.array([*before, *last])

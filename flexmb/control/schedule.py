@@ -21,7 +21,7 @@ def slack(t_start: float, t_end: float) -> float:
 
 
 def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fixed: Sequence[float]) -> Record:
-    """INSTANT records before t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
+    """INSTANT records up to t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
 
     They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was
     waiting is applied first, then controllers act in the order of the scene. ValueError for more than MOST.
@@ -34,13 +34,13 @@ def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fi
         part["row"] += start
     table = np.concatenate(parts)
     table["time"] = _together(table["time"], np.array([t_start, *fixed, t_end]), slack(t_start, t_end))
-    table = table[table["time"] < t_end]
+    table = table[table["time"] <= t_end]
     return table[np.lexsort((table["controller"], table["kind"] == SAMPLE, table["time"]))]
 
 
 def _of_one(i: int, controller: Controller, t_end: float) -> Record:
     period = controller.period_s or np.inf
-    number = max(0, int(np.ceil((t_end - controller.offset_s) / period)))
+    number = max(0, int(np.floor((t_end - controller.offset_s) / period * (1.0 + TOGETHER))) + 1)
     if number > MOST:
         raise ValueError(
             f'controller "{controller.name}" would act {number} times in {t_end:g} s, and {MOST} are allowed: run the '

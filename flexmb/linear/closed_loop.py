@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -46,7 +47,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     if feedback.reads_at_once:
         raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
     clock = Clock(np.array([state.t, state.t + 1.0]), np.array([state.t + 1.0]))
-    y = feedback.begin(np.concatenate([state.q, state.u, [0.0]]), clock, Accuracy(0.0, 0.0, 0, 0), ()).y
+    y = feedback.begin(_Start(state), clock, Accuracy(0.0, 0.0, 0, 0), ()).y
     equations = Equations(plant)
     seen = _Seen(feedback, state.t, plant.nq + plant.nu)
     derivative = np.column_stack([
@@ -68,6 +69,17 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
         B=np.vstack([of_motion.B, np.zeros((states, len(of_motion.inputs)))]),
         C=np.hstack([of_motion.C, np.zeros((len(of_motion.outputs), states))]),
     )
+
+
+class _Start(NamedTuple):
+    """A state, at which controllers begin."""
+
+    state: State
+    controllers: None = None
+
+    @property
+    def y(self) -> Real:
+        return np.concatenate([self.state.q, self.state.u, [0.0]])
 
 
 class _Seen:

@@ -12,13 +12,16 @@ import numpy as np
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.memory import Memory
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
-from flexmb.run.switching import timing_of
+from flexmb.run.origin import Beginning
+from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -28,10 +31,15 @@ from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
     from flexmb.control.feedback import Feedback
+    from flexmb.control.memory import LoopMemory
 
 
 class Raw(NamedTuple):
-    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
+    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
+
+    y (nq+nu+1,): the last good state; memory, controllers: how it can be taken up there; crossed: the number of the
+    level at which the run paused, -1 for none.
+    """
 
     states: Real
     status: Status
@@ -41,6 +49,10 @@ class Raw(NamedTuple):
     compile_s: float
     run_s: float
     interrupted: bool
+    y: Real
+    memory: Memory
+    crossed: int = -1
+    controllers: LoopMemory | None = None
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -77,27 +89,37 @@ class Integration:
         if self._batched and self.feedback is None:
             moving = route.rhs, constants, self._workspace
             self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
-        self._enter: Any = None
+        self._enter: dict[bool, Any] = {}  # by whether levels are watched
 
-    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. All arrays in C order."""
-        self.compile(y, clock, accuracy, out, counts)
-        return self._enter(self._problem, y, clock, accuracy, out, counts)
+    def __call__(self, *given: Any) -> tuple[int, float]:
+        """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
+        self.compile(*given)
+        return self._enter[given[-1] is not None](self._problem, *given)
 
-    def compile(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> None:
+    def compile(self, *given: Any) -> None:
         """For a call with these, unless that is done."""
-        if self._enter is None:
-            self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
+        watched = given[-1] is not None
+        if watched not in self._enter:
+            self._enter[watched] = undispatched(self._integrator.run, self._problem, *given)
 
-    def begin(self, y: Real, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
-        """State, clock and accuracy of a run from y: the same, but of a scene with controllers those of the loop."""
+    def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
+        """State, clock and accuracy of a run; of a scene with controllers those of the closed loop."""
         if self.feedback is None:
-            return y, clock, accuracy
-        self._problem, y, clock, accuracy = self.feedback.begin(y, clock, accuracy, self._linear)
+            return begin.y, clock, accuracy
+        self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
         if self._batched:
             self.batch = batch(self.feedback, self.feedback.motion, self.feedback.observing, len(y))
         self.feedback.heed(counts[STOP : STOP + 1])
         return y, clock, accuracy
+
+    def ended(self) -> LoopMemory | None:
+        """What controllers know at the end of a run, which is looked at from now on; raises what they raised."""
+        if self.feedback is None:
+            return None
+        self.feedback.raise_trouble()
+        known = self.feedback.remember()
+        self.feedback.replay()
+        return known
 
     @property
     def fault(self) -> int:
@@ -127,22 +149,24 @@ def integration(
         spare.append(found)
 
 
-def integrate(system: System, solve: Integration, times: Real, settings: Settings) -> Raw:
+def integrate(
+    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None
+) -> Raw:
     """Run over the whole time, after what has to be compiled for it."""
-    initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
-    ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
-    counts = np.zeros(COUNTS, np.int64)
-    y, clock, accuracy = solve.begin(initial.y, Clock(times, ends), accuracy, counts)
+    method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
+    ends, counts = segment_ends(system, begin.state.t, times[-1], method.fixed), np.zeros(COUNTS, np.int64)
+    y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
+    memory = method.memory(len(y)) if begin.memory is None else begin.memory
     out = np.empty((len(times), len(y)))
-    given = y, clock, accuracy, out, counts
+    given = y, clock, accuracy, out, counts, memory, watch
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
-    if solve.feedback is not None:
-        solve.feedback.raise_trouble()
-        solve.feedback.replay()
+    crossed = int(watch.found[0]) if watch is not None and status == CROSSED else -1
+    controllers = solve.ended()
     return Raw(
-        out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), begun - start, end - begun, interrupted
-    )
+        out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
+        begun - start, end - begun, interrupted, y, memory, crossed, controllers,
+    )  # fmt: skip

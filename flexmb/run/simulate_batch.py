@@ -16,7 +16,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
-from flexmb.run.switching import refuse_end
+from flexmb.run.switching import refuse_times
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
@@ -57,7 +57,7 @@ def simulate_batch(
         refuse_without_jacobian(batch.systems[0], "articulated", method)
     refuse_feedback(batch.systems[0].scene, "simulate_batch")
     for system in batch.systems:
-        refuse_end(system, t_end)
+        refuse_times(system, 0.0, t_end)
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))

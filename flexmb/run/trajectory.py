@@ -12,8 +12,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexmb.run import exports
+from flexmb.run.joining import joined
+from flexmb.run.restart import Restart
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.observables import ENERGIES, Observation
+from flexmb.tables.state import State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -64,6 +67,7 @@ class Trajectory:
     drives, motors, dampers and loads; signals (T,k) by sensor and controller and power (T,k) W that each output of a
     controller puts into the motion, of a scene that has some. `stopped_at` is the time of the last good state: the end
     of the run if it finished.
+    `restart`: how the run is taken up there, None if it failed.
     """
 
     scene: str
@@ -83,12 +87,36 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
+    restart: Restart | None = None
     signals: dict[str, Real] = field(default_factory=dict)
     power: dict[str, Real] = field(default_factory=dict)
 
     @property
     def finished(self) -> bool:
         return self.status is Status.OK
+
+    @property
+    def last_state(self) -> State:
+        """The state at the last output time: `simulate(other, t_end, state=trajectory.last_state)` starts from it."""
+        return self.state_at(-1)
+
+    def state_at(self, sample: int) -> State:
+        """The state at an output time, by its number; negative ones count from the end. IndexError without it."""
+        return State(self.q[sample], self.u[sample], float(self.t[sample]))
+
+    def values_at(self, sample: int) -> dict[str, float]:
+        """The same by the names of coordinates and speeds, for a scene that shares some of them."""
+        values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
+        return {name: float(value) for (name, _), value in values}
+
+    def then(self, later: Trajectory) -> Trajectory:
+        """This run and a later one as one: output times of this one, as far as the later one does not have them.
+
+        Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
+        them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        the last time of this one.
+        """
+        return joined(self, later)
 
     @property
     def total_energy(self) -> Real:

@@ -327,6 +327,17 @@ class SceneBuilder:
         """A frame whose motion is an output: a node plus `offset` (m, node axes)."""
         return self._append(s.Marker, name=name, body=body, node=node, offset=offset)
 
+    def event(
+        self, name: str, watch: str, level: float, *actions: s.Action,
+        crossing: Literal["rising", "falling", "either"] = "either",
+    ) -> Self:  # fmt: skip
+        """What happens where `watch` comes to `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in this order.
+
+        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", or a rate, "pivot.rotation.rate"
+        or "wheel.speed".
+        """
+        return self._append(s.SceneEvent, name=name, watch=watch, level=level, crossing=crossing, actions=actions)
+
     def modal_state(self, body: str, *, coordinates: ArrayLike, rates: ArrayLike = ()) -> Self:
         """Initial modal coordinates and rates (1/s) of a flexible body."""
         return self._append(s.ModalState, body=body, coordinates=coordinates, rates=rates)

@@ -18,6 +18,7 @@ KINDS = {
     "bodies": "body", "hinges": "hinge", "closures": "closure", "wheels": "wheel", "point_masses": "point mass",
     "loads": "load", "markers": "marker", "modal_states": "modal state of body", "nodes": "node",
     "sensors": "sensor", "controllers": "controller",
+    "events": "event",
 }  # fmt: skip
 
 

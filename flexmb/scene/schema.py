@@ -6,7 +6,8 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from flexmb.scene.bodies import (
     ZERO,
@@ -42,6 +43,7 @@ from flexmb.scene.control import (
     TimeSensor,
     UserLaw,
 )
+from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
 from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
@@ -58,6 +60,7 @@ from flexmb.scene.hinges import (
     Universal,
     Weld,
 )
+from flexmb.scene.values import with_values
 
 
 class Wheel(SceneStruct, frozen=True, kw_only=True):
@@ -143,14 +146,23 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     modal_states: tuple[ModalState, ...] = ()
     sensors: tuple[Sensor, ...] = ()
     controllers: tuple[Controller, ...] = ()
+    events: tuple[SceneEvent, ...] = ()
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
+
+        Paths go by keys, items by their name, number or `*` for all: see `flexmb.scene.values.with_values`. Raises
+        PathError, a ValueError, for a path that leads to nothing, and for a value of another kind.
+        """
+        return with_values(self, values)
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "ControlSignal",
-    "Controller", "CoordinateSensor", "Cylindrical", "Free", "Function", "GainTable", "Gimbal", "Hinge",
-    "InertiaPoint", "Level", "LinearCoordinate", "Load", "LoadSensor", "Marker", "MarkerSensor", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass", "Prismatic",
-    "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Revolute", "RigidBody", "Saturation", "Scene", "Sensor",
-    "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "StateSpace", "Table", "TimeSensor", "TipMass",
-    "Universal", "UserLaw", "Vector", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
+    "ControlSignal", "Controller", "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable",
+    "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "Load", "LoadSensor", "Marker",
+    "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass",
+    "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Saturation",
+    "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "StateSpace", "Table",
+    "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Weld", "Wheel",
 ]  # fmt: skip

@@ -101,3 +101,24 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
             case (AngularCoordinate() | LinearCoordinate(), *_) as several:
                 found.extend(NamedCoordinate(f"{key}[{i}]", each) for i, each in enumerate(several))
     return tuple(found)
+
+
+def scalar_paths(scene: Scene) -> dict[str, str]:
+    """Scalar coordinates as states name them, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
+
+    Paths are those of `Scene.with_values`.
+    """
+    found = {}
+    for collection in ("hinges", "point_masses"):
+        for item in getattr(scene, collection):
+            for name, _ in coordinates(item):
+                key = name.replace("[", ".").rstrip("]")
+                found[f"{item.name}.{name}"] = f"{collection}.{item.name}.{key}"
+    return found | {f"{wheel.name}.angle": f"wheels.{wheel.name}" for wheel in scene.wheels}
+
+
+def rate_name(coordinate: str, path: str) -> str:
+    """How states name the rate of a scalar coordinate, which has a path as of `scalar_paths`."""
+    if path.startswith("wheels."):
+        return f"{coordinate.removesuffix('.angle')}.speed"
+    return f"{coordinate}.rate"

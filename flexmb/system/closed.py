@@ -24,6 +24,8 @@ from flexmb.tables.state import State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
+FAR = 1e-2  # in the size of a closure: a state that is given opens it by less
+
 
 class ClosedSystem(System):
     """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone."""
@@ -50,6 +52,19 @@ class ClosedSystem(System):
             y = consistent(self.closures, 0.0, pack(super().initial_state))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
+
+    def admissible(self, t: float, y: Real) -> State:
+        """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
+        rough = super().admissible(t, y).y
+        self.closures.linearise(t, rough)
+        errors = self.closures.errors()
+        if not np.max(np.abs(errors), initial=0.0) <= FAR:
+            raise ClosureError(
+                f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
+                "it at least roughly, or leave those out that the closures determine"
+            )
+        y = consistent(self.closures, t, rough)
+        return self.layout.known(t, y)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.

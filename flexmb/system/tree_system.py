@@ -122,6 +122,21 @@ class System(Mechanics):
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         return self.layout.known(0.0, self._at_start.copy())
 
+    def admissible(self, t: float, y: Real) -> State:
+        """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
+
+        Of closed chains the nearest one that closes all closures; ClosureError where that is far.
+        """
+        y = np.r_[y[:-1], 0.0]
+        self.project(t, y, self.constants)
+        return self.layout.known(t, y)
+
+    def scene_state(self, t: float) -> Real:
+        """(nq+nu+1,) [q, u, 0] of the scene's initial values, with prescribed motions as they are at time t (s)."""
+        y: Real = self._at_start.copy()
+        self.project(t, y, self.constants)
+        return y
+
     @cached_property
     def _at_start(self) -> Real:
         """(nq+nu+1,) [q, u, 0] of the scene at t = 0."""
@@ -228,14 +243,18 @@ class System(Mechanics):
 
     @cached_property
     def start_precision(self) -> Precision | None:
-        """`precision` of the initial state, found once; None where no pivot there is so small that it may be rounding.
+        """`precision_if_doubtful` of the initial state, found once."""
+        return self.precision_if_doubtful(self.initial_state)
+
+    def precision_if_doubtful(self, state: State) -> Precision | None:
+        """`precision` of a state, None where no pivot there is so small that it may be rounding.
 
         Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
         """
-        initial, w = self.initial_state, self._recursion_w
-        t, y = self.layout.entering(initial)
+        w = self._recursion_w
+        t, y = self.layout.entering(state)
         status = self._recur(t, y, np.empty_like(y))
-        return None if status == OK and not w.doubt[0] else self.precision(initial)
+        return None if status == OK and not w.doubt[0] else self.precision(state)
 
     @cached_property
     def state_names(self) -> tuple[labels.Names, labels.Names]:

@@ -14,6 +14,7 @@ from flexmb.scene.tree import GROUND, rest_frames
 # Hinges, wheels, point masses and closures share tables of loads, drive loads and coordinates, hence one set of names.
 NAMESPACES = (
     ("bodies",), ("hinges", "wheels", "point_masses", "closures"), ("loads",), ("markers",), ("sensors", "controllers"),
+    ("events",),
 )  # fmt: skip
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 

@@ -124,3 +124,20 @@ def test_advise_writes_the_reduced_scene_and_the_command_that_runs_it(tmp_path):
     refused = invoke("advise", tmp_path / "arm.toml", "--tol", 1e-9, "--t-end", 1.2, "--out", tmp_path / "none.toml")
     assert refused.exit_code == 1 and "refused" in refused.output
     assert not (tmp_path / "none.toml").exists()
+
+
+def test_simulate_sets_values_begins_later_and_goes_on(scene_file, tmp_path):
+    """Two runs by the command line end as one does, to the last digit that is written."""
+    words = ("simulate", scene_file, "--set", "bob.mass_kg=2.5", "--from-time", 1, "--no-plots", "--samples", 3)
+    assert invoke(*words, "--t-end", 2, "--out", tmp_path / "whole").exit_code == 0
+    assert invoke(*words, "--t-end", 1.5, "--out", tmp_path / "first").exit_code == 0
+    restart = tmp_path / "first" / "restart.npz"
+    on = ("simulate", scene_file, "--set", "bob.mass_kg=2.5", "--no-plots", "--samples", 2, "--out", tmp_path / "later")
+    result = invoke(*on, "--t-end", 2, "--restart", restart)
+    assert result.exit_code == 0 and "restart.npz" in result.output, result.output
+    whole, later = ((tmp_path / name / "trajectory.csv").read_text().splitlines() for name in ("whole", "later"))
+    assert whole[-1].startswith("2,") and later[-1] == whole[-1]
+    wrong = ("--set", "bob.mass=1"), ("--restart", scene_file)
+    for more, message in zip(wrong, ('did you mean "mass_kg"', "no restart"), strict=True):
+        result = invoke(*on, "--t-end", 2, *more)
+        assert result.exit_code == 2 and message in result.output, result.output
