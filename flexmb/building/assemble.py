@@ -83,6 +83,7 @@ class Assembled:
     constants: a.Constants
     markers: dict[str, tuple[int, int]]  # by name
     closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
+    signals: dict[int, s.ControlSignal]  # by number among the functions, those that controllers drive
 
 
 def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
@@ -171,7 +172,8 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         **points,
     )
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
-    return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
+    signals = {number: each for number, each in enumerate(functions.all()) if isinstance(each, s.ControlSignal)}
+    return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides], signals)
 
 
 def _who_starts(body: a.Record) -> None:

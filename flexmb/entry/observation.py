@@ -122,6 +122,22 @@ def observe_motion(t, y, c, w, out):
     _observe_motion(c, w, out)
 
 
+@kernel
+def sense_markers(t, y, c, w, out):
+    """The rows of all markers, out.markers, at y = [q, u, work] and given accelerations, out.rates.
+
+    Positions and velocities do not depend on the latter. Bodies of level ruthless are seen as markers see them.
+    """
+    load_state(t, y, c, w)
+    for j in range(out.rates.shape[0]):
+        w.speed[j].acceleration = out.rates[j]
+    velocity_sweep(c, w, True, True)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    for i in range(out.marker_port.shape[0]):
+        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
 @helper
 def _observe_motion(c, w, out):
     """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state.

@@ -42,9 +42,10 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
         loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
-        drives=_drives(first, later, kept), energy=each(first.energy, later.energy),
+        drives=_of_some(first, later, kept, "drives"), energy=each(first.energy, later.energy),
         momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
         hinge_forces=each(first.hinge_forces, later.hinge_forces),
+        signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
     )  # fmt: skip
     return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
 
@@ -69,16 +70,16 @@ def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
     return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
 
 
-def _drives(first: Trajectory, later: Trajectory, kept: int) -> dict[str, Real]:
-    """A hinge may be driven in one of them only, or along another number of coordinates."""
-    found = {}
-    for name in {**first.drives, **later.drives}:
-        width = max(each[name].shape[1] for each in (first.drives, later.drives) if name in each)
+def _of_some(first: Trajectory, later: Trajectory, kept: int, key: str) -> dict[str, Real]:
+    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it."""
+    a, b, found = getattr(first, key), getattr(later, key), {}
+    for name in {**a, **b}:
+        width = max(each[name].shape[1] for each in (a, b) if name in each)
         parts = []
-        for drives, count in ((first.drives, kept), (later.drives, len(later.t))):
+        for values, count in ((a, kept), (b, len(later.t))):
             part = np.full((count, width), np.nan)
-            if name in drives:
-                part[:, : drives[name].shape[1]] = drives[name][:count]
+            if name in values:
+                part[:, : values[name].shape[1]] = values[name][:count]
             parts.append(part)
         found[name] = np.concatenate(parts)
     return found

@@ -113,10 +113,10 @@ def simulate(
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
-            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve.batch)
+            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
         if not system.scene.events:
             raw = integrate(system, solve, begin, times, chosen)
-            trajectory = replace(observed(system, times, raw, algorithm, solve.batch), made_by=made_by)
+            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
     if system.scene.events:
         run = EventfulRun(system, times, chosen, algorithm, stabilise)
         trajectory, raw = run(begin)
@@ -145,6 +145,12 @@ def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
+    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
+    if continuous:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which continuous controllers have none of: use {others}, or give '
+            f'"{continuous[0]}" a period_s'
+        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
@@ -181,5 +187,5 @@ def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
 def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
     """Of a run that did not fail."""
     if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
-        return Restart(method, system.scene, raw.t, raw.memory)
+        return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
     return None

@@ -80,8 +80,9 @@ class Trajectory:
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
-    connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
-    `events`: what happened, in the order of time.
+    connectors along hinges, along their coordinates. signals (T,k) by sensor and controller, power (T,k) W that each
+    output of a controller puts into the motion. `restart`: how the run is taken up there, None if it failed. `events`:
+    what happened, in the order of time.
     """
 
     scene: str
@@ -104,6 +105,8 @@ class Trajectory:
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
     restart: Restart | None = None
+    signals: dict[str, Real] = field(default_factory=dict)
+    power: dict[str, Real] = field(default_factory=dict)
     events: tuple[EventRecord, ...] = ()
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
@@ -230,6 +233,12 @@ class Trajectory:
         yield "energy.total", "J", self.total_energy
         yield "work", "J", self.work
         yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+        for name, signals in self.signals.items():
+            for i in range(signals.shape[1]):
+                yield f"signal.{name}[{i}]", "", signals[:, i]
+        for name, power in self.power.items():
+            for i in range(power.shape[1]):
+                yield f"power.{name}[{i}]", "W", power[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""

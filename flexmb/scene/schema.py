@@ -38,8 +38,22 @@ from flexmb.scene.connectors import (
     LinearSpring,
     SpringDamper,
 )
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    TimeSensor,
+    UserLaw,
+)
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Closure,
@@ -158,6 +172,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    controllers: tuple[Controller, ...] = ()
     events: tuple[SceneEvent, ...] = ()
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
@@ -171,10 +187,12 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 __all__ = [
     "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation",
-    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "Cylindrical", "EndRun", "Free", "Function",
-    "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction",
-    "LinearSpring", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar",
-    "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene",
-    "SceneEvent", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "SpringDamper", "Table", "TipMass",
-    "Universal", "Vector", "Waiver", "Weld", "Wheel",
+    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller",
+    "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
+    "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
+    "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
+    "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",
+    "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
+    "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver",
+    "Weld", "Wheel",
 ]  # fmt: skip

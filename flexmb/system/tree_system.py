@@ -56,11 +56,14 @@ class System(Mechanics):
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
         super().__init__()
         self.scene = scene
+        self._asked: Elimination = elimination
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
         assembled = assemble(scene, self._links, self._numbering)
         self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
+        self.signals = assembled.signals
+        """By number among the functions of time, those that controllers drive in a run; zero outside of one."""
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
         self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)
@@ -70,6 +73,10 @@ class System(Mechanics):
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    def anew(self) -> System:
+        """The same scene turned into other arrays."""
+        return System(self.scene, self._asked)
 
     @cached_property
     def _w(self) -> Workspace:  # type: ignore[override]
