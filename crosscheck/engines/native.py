@@ -50,6 +50,8 @@ class NativeEngine:
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
 
+    takes = ("connectors",)
+
     def __init__(
         self,
         name: str = "native",
@@ -165,6 +167,8 @@ class NativeModel:
             drives=seen.drives,
             energy=seen.energy,
             momentum=seen.momentum,
+            connectors=seen.connectors,
+            hinge_forces=seen.hinge_forces,
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:

@@ -100,14 +100,6 @@ def step_factor(error, error_before, exponent, rejected_before):
 
 
 @helper
-def begin(problem, t, y, out, counts):
-    """Put the initial state on its manifold; it is the first sample."""
-    problem.project(t, y, problem.constants)
-    copy(y, out[0])
-    counts[SAMPLES] = 1
-
-
-@helper
 def initial_step(problem, segment, y, dy, accuracy, exponent, counts):
     """First step size: Hairer, Norsett, Wanner I, II.4. `dy` = f(t, y) at the segment's start."""
     trial, slope = np.empty(y.shape[0]), np.empty(y.shape[0])

@@ -12,23 +12,30 @@ import numpy as np
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
+from flexmb.integrate.memory import Memory
+from flexmb.integrate.problem import Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import batch
-from flexmb.run.switching import timing_of
+from flexmb.run.origin import Beginning
+from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 
 class Raw(NamedTuple):
-    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
+    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
+
+    y (nq+nu+1,): the last good state; memory: how it can be taken up there; crossed: the number of the level at which
+    the run paused, -1 for none.
+    """
 
     states: Real
     status: Status
@@ -38,6 +45,9 @@ class Raw(NamedTuple):
     compile_s: float
     run_s: float
     interrupted: bool
+    y: Real
+    memory: Memory
+    crossed: int = -1
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -61,17 +71,18 @@ class Integration:
         batched = algorithm.observing is not None and not system.scene.closures
         self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
         """Observes many samples at once."""
-        self._enter: Any = None
+        self._enter: dict[bool, Any] = {}  # by whether levels are watched
 
-    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. All arrays in C order."""
-        self.compile(y, clock, accuracy, out, counts)
-        return self._enter(self._problem, y, clock, accuracy, out, counts)
+    def __call__(self, *given: Any) -> tuple[int, float]:
+        """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
+        self.compile(*given)
+        return self._enter[given[-1] is not None](self._problem, *given)
 
-    def compile(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> None:
+    def compile(self, *given: Any) -> None:
         """For a call with these, unless that is done."""
-        if self._enter is None:
-            self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
+        watched = given[-1] is not None
+        if watched not in self._enter:
+            self._enter[watched] = undispatched(self._integrator.run, self._problem, *given)
 
     @property
     def fault(self) -> int:
@@ -98,17 +109,22 @@ def integration(
         spare.append(found)
 
 
-def integrate(system: System, solve: Integration, times: Real, settings: Settings) -> Raw:
+def integrate(
+    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None
+) -> Raw:
     """Run over the whole time, after what has to be compiled for it."""
-    initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
-    ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
-    out, counts = np.empty((len(times), len(initial.y))), np.zeros(COUNTS, np.int64)
-    given = initial.y, Clock(times, ends), accuracy, out, counts
+    method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
+    memory = method.memory(len(begin.y)) if begin.memory is None else begin.memory
+    ends = segment_ends(system, begin.state.t, times[-1], method.fixed)
+    out, counts = np.empty((len(times), len(begin.y))), np.zeros(COUNTS, np.int64)
+    given = begin.y, Clock(times, ends), accuracy, out, counts, memory, watch
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
+    crossed = int(watch.found[0]) if watch is not None and status == CROSSED else -1
     return Raw(
-        out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), begun - start, end - begun, interrupted
-    )
+        out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
+        begun - start, end - begun, interrupted, begin.y, memory, crossed,
+    )  # fmt: skip

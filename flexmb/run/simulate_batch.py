@@ -16,7 +16,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
-from flexmb.run.switching import refuse_end
+from flexmb.run.switching import refuse_times
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
 from flexmb.system.tree_system import System
@@ -55,7 +55,7 @@ def simulate_batch(
     if chosen.integrator.linearises:
         refuse_without_jacobian(batch.systems[0], "articulated", method)
     for system in batch.systems:
-        refuse_end(system, t_end)
+        refuse_times(system, 0.0, t_end)
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))
