@@ -20,6 +20,7 @@ from crosscheck.engines.conventions import (
     outboard_frame,
 )
 from flexmb.scene.bodies import ZERO
+from flexmb.scene.connectors import Connector
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
     AngularCoordinate,
@@ -121,14 +122,19 @@ class Attachment:
     frame: Frame
 
 
-def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
-    """Why an engine of rigid trees with closures of some types cannot represent the scene; empty if it can."""
+def obstacle(
+    scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = ()
+) -> str:
+    """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or ""."""
     for closure in scene.closures:
         if not closed_by:
             return f'closure "{closure.name}": {engine} closes no loops'
         if closure.type not in closed_by:
             known = ", ".join(closed_by)
             return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'
+    for connector in scene.connectors:
+        if not isinstance(connector, connected_by):
+            return f'connector "{connector.name}": the adapter of {engine} has none of its kind'
     for body in scene.bodies:
         if isinstance(body, SidBody):
             return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'

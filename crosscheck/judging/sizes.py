@@ -46,7 +46,8 @@ class Sizes:
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""
-        extent, speed, turning = (self._magnitude_of(f".{part}") for part in ("position", "velocity", "angular_velocity"))
+        motion = (".position", ".velocity", ".angular_velocity")
+        extent, speed, turning = (self._magnitude_of(ending) for ending in motion)
         action = 2.0 * self._magnitude_of("energy.kinetic")
         match family(channel).rpartition(".")[2]:
             case "torque":

@@ -18,6 +18,7 @@ from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.search import search
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.check import check_and_warn
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 
@@ -98,6 +99,7 @@ def advise(
     the advice is the same wherever it is asked for. Raises SceneError for a scene that is wrong, ValueError for a
     quantity that is not there; where no model is adequate, the advice says so in `refusal`.
     """
+    refuse_feedback(scene, "advise")
     asked = prepare(scene, tolerance, quantity, t_end)
     advice = Advice(scene.name, t_end, tolerance, asked.bench.wanted, notes=asked.notes)
     try:

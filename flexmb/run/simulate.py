@@ -6,24 +6,24 @@ import warnings
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import partial
-from time import perf_counter
 from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
+from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.eventful import EventfulRun, refuse_events
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
-from flexmb.run.observing import Sampler, observe
 from flexmb.run.origin import Beginning, Values, origin, start_time
+from flexmb.run.outputs import observed
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
+from flexmb.run.trajectory import Trajectory
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
@@ -32,7 +32,7 @@ from flexmb.system.compile import assembled
 from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.state import DynamicsError, NotFiniteError, PrecisionWarning, State
+from flexmb.tables.state import PrecisionWarning, State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -106,15 +106,21 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    refuse_events(system, method)
     same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
     made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
-            return observed(made_by, _not_begun(begin, start, chosen), algorithm, solve.batch)
-        raw = integrate(system, solve, begin, times, chosen)
-        trajectory = observed(made_by, raw, algorithm, solve.batch)
+            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
+        if not system.scene.events:
+            raw = integrate(system, solve, begin, times, chosen)
+            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
+    if system.scene.events:
+        run = EventfulRun(system, times, chosen, algorithm, stabilise)
+        trajectory, raw = run(begin)
+        system = run.system
     trajectory = replace(trajectory, restart=_restart(system, raw, method))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
@@ -139,6 +145,12 @@ def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
+    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
+    if continuous:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which continuous controllers have none of: use {others}, or give '
+            f'"{continuous[0]}" a period_s'
+        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
@@ -175,58 +187,5 @@ def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
 def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
     """Of a run that did not fail."""
     if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
-        return Restart(method, system.scene, raw.t, raw.memory)
+        return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
     return None
-
-
-def observed(made_by: Making, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
-    """Evaluate everything observable at the samples reached."""
-    start, system, times = perf_counter(), made_by.system, made_by.times
-    rows, trouble = observe(system, algorithm, times, raw.states, batch)
-    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
-    if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
-        status, stopped_at = _why(trouble), float(times[len(rows)])
-        message = f"stopped at t = {stopped_at:g} s" + (
-            f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
-        )
-    states = raw.states[: len(rows)]
-    q_names, u_names = system.state_names
-    return Trajectory(
-        scene=system.scene.name,
-        status=status,
-        message=message,
-        stopped_at=stopped_at,
-        t=times[: len(rows)],
-        q=states[:, : system.nq],
-        u=states[:, system.nq : -1],
-        q_names=q_names,
-        u_names=u_names,
-        **gathered(system._observation, rows),
-        work=states[:, -1],
-        statistics=Statistics(
-            evaluations=raw.counts[EVALUATIONS],
-            accepted_steps=raw.counts[ACCEPTED],
-            rejected_steps=raw.counts[REJECTED],
-            jacobians=raw.counts[JACOBIANS],
-            factorisations=raw.counts[FACTORISATIONS],
-            compile_s=raw.compile_s,
-            run_s=raw.run_s,
-            output_s=perf_counter() - start,
-        ),
-        made_by=made_by,
-    )
-
-
-def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
-    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
-    the place where the dynamics ends."""
-    if isinstance(trouble, KeyboardInterrupt):
-        return Status.INTERRUPTED
-    return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
-
-
-def _message(system: System, raw: Raw) -> str:
-    if raw.status is Status.OK:
-        return f"finished at t = {raw.t:g} s"
-    place = system.fault_name(raw.status, raw.fault)
-    return f"stopped at t = {raw.t:g} s: " + raw.status.advice.format(body=f'"{place}"')

@@ -42,8 +42,9 @@ def simulate_stages(
     """Simulate stages in sequence; one trajectory, whose status is that of the first stage that fails.
 
     Time goes on from stage to stage, also for functions of time. Each stage starts with the coordinates and speeds that
-    the last one ended with: scenes must have the same ones, and the same markers and hinges. A motion that is
-    prescribed in a stage begins where the coordinate is; where it does not, in value or rate, ValueError says so.
+    the last one ended with: scenes must have the same ones, and the same markers and hinges. Controllers begin anew.
+    A motion that is prescribed in a stage begins where the coordinate is; where it does not, in value or rate,
+    ValueError says so.
     method, t_start, state and settings: see `simulate`. Raises what `simulate` does, before anything runs where a
     scene is wrong, and ValueError for stages that do not fit each other.
     """
@@ -74,6 +75,10 @@ def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
     for i, stage in enumerate(stages):
         if arguments.number(f"stages[{i}].duration_s", stage.duration_s) <= 0.0:
             raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
+        if found and found[-1].scene.events:
+            raise NotImplementedError(
+                f"stages[{i - 1}] has events, which change its scene: let events on time do what stages would"
+            )
         scene = (stage.scene or scene).with_values(stage.values)
         found.append(found[-1] if found and found[-1].scene == scene else compile(scene))
         for what, names in (("coordinates", 0), ("speeds", 1)):

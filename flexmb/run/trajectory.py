@@ -16,6 +16,7 @@ from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
+from flexmb.run.situation import EventRecord
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
@@ -77,8 +78,11 @@ class Trajectory:
     loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
-    motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
-    `restart`: how the run is taken up there, None if it failed.
+    motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
+    if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
+    connectors along hinges, along their coordinates. signals (T,k) by sensor and controller, power (T,k) W that each
+    output of a controller puts into the motion. `restart`: how the run is taken up there, None if it failed. `events`:
+    what happened, in the order of time.
     """
 
     scene: str
@@ -98,7 +102,12 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
+    connectors: dict[str, Real] = field(default_factory=dict)
+    hinge_forces: dict[str, Real] = field(default_factory=dict)
     restart: Restart | None = None
+    signals: dict[str, Real] = field(default_factory=dict)
+    power: dict[str, Real] = field(default_factory=dict)
+    events: tuple[EventRecord, ...] = ()
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
@@ -172,6 +181,10 @@ class Trajectory:
         them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
         the last time of this one.
         """
+        if len(later.t) and later.t[0] > self.stopped_at:
+            raise ValueError(
+                f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
+            )
         return joined(self, later)
 
     @property
@@ -208,16 +221,24 @@ class Trajectory:
                 yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
             yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
             yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
-        for name, load in (self.loads | self.wheel_loads).items():
+        for name, load in (self.loads | self.wheel_loads | self.connectors).items():
             yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
         for name, drive in self.drives.items():
             for i in range(drive.shape[1]):
                 yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
+        for name, force in self.hinge_forces.items():
+            yield f"{name}.hinge_force", "N or N m", force[:, 0]
         for kind, energy in self.energy.items():
             yield f"energy.{kind}", "J", energy
         yield "energy.total", "J", self.total_energy
         yield "work", "J", self.work
         yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+        for name, signals in self.signals.items():
+            for i in range(signals.shape[1]):
+                yield f"signal.{name}[{i}]", "", signals[:, i]
+        for name, power in self.power.items():
+            for i in range(power.shape[1]):
+                yield f"power.{name}[{i}]", "W", power[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
@@ -271,6 +292,8 @@ def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
         "drives": {name: found["drives"][:, places] for name, places in names.driven.items()},
         "energy": _by_name(ENERGIES, found["energy"]),
         "momentum": found["momentum"].copy(),
+        "connectors": _by_name(names.connectors, found["connectors"]),
+        "hinge_forces": _by_name(names.hinge_forces, found["hinge_forces"][:, :, None]),
     }
 
 

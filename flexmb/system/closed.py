@@ -38,6 +38,10 @@ class ClosedSystem(System):
         self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
         self._start: State | None = None
 
+    def anew(self) -> ClosedSystem:
+        """The same scene turned into other arrays."""
+        return ClosedSystem(self.scene)
+
     @property
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.

@@ -1,9 +1,9 @@
 """Loads across the sections of a beam, by the momentum balance of the part beyond each: modes' stiffness is not asked.
 
 What acts on the part of a beam beyond x is what its points' accelerations need, less gravity, loads at nodes, wheels,
-and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this is exact with
-any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature converge slowly, if
-at all: no clamped eigenmode has a shear force at its tip.
+connectors, and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this
+is exact with any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature
+converge slowly, if at all: no clamped eigenmode has a shear force at its tip.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
+from flexmb.building.connector_arrays import between_nodes
 from flexmb.building.links import closure_sides
 from flexmb.modal.beam_sections import beam_sections
 from flexmb.modal.flexible_model import SecondOrder
@@ -26,6 +27,7 @@ from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
+    from flexmb.system.observables import Evaluation
     from flexmb.system.tree_system import System
 
 
@@ -106,13 +108,13 @@ class SectionBalance:
     def at(self, t: float, y: Real) -> Real:
         """Loads (X,6) as `SectionLoads` has them at y = [q, u, work]."""
         system, k = self._system, self._k
-        loads, wheels = system._all_loads(t, y)
+        found = system._all_loads(t, y)
         w = system._w
         pose = body_pose(system, w, k)
         m = system._links[k].mode_count
         eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
         needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
-        for outer in self._outer(w, pose, loads, wheels):
+        for outer in self._outer(w, pose, found):
             needed[: outer.beyond] -= outer.wrench
         return self._in_sections(needed, eta)[self._places]
 
@@ -143,9 +145,10 @@ class SectionBalance:
         np.add.at(between, s.beyond, each)
         return np.cumsum(between[::-1], axis=0)[::-1][1:]
 
-    def _outer(self, w: Workspace, pose: Pose, loads: dict[str, Real], wheels: dict[str, Real]) -> list[_Outer]:
+    def _outer(self, w: Workspace, pose: Pose, exerted: Evaluation) -> list[_Outer]:
         """All that others exert on the beam, with where along it."""
         system, k, scene = self._system, self._k, self._system.scene
+        loads, wheels = exerted.loads, exerted.wheel_loads
         constants = system.constants
         found: list[_Outer] = []
 
@@ -175,6 +178,15 @@ class SectionBalance:
             point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
             torque, force = (value, none) if table["type"] == TORQUE else (none, value)
             add(load_of.node, torque, force, point)
+        for i, connector in enumerate(between_nodes(scene)):
+            load, (body_b, port_b) = exerted.connectors[connector.name], constants.end[i][["body", "port"]][1]
+            on = link_pose(w, int(body_b))
+            point = constants.end[i]["position"][1] if body_b < 0 else on.position + on.rotation @ w.port["r"][port_b]
+            for node, body, sign in (
+                (connector.node_a, connector.body_a, -1.0), (connector.node_b, connector.body_b, 1.0),
+            ):  # fmt: skip
+                if body == self.body:
+                    add(node, sign * load[:3], sign * load[3:], point)
         for i, closure in enumerate(scene.closures):
             for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
                 if side.body == self.body:

@@ -46,6 +46,8 @@ def _hinge_axis(scene: Scene, target: str) -> Scene:
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
     """Without anything that has a sign of its own, the sign of a coordinate is a name."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
+    if any(getattr(each, "hinge", "") == target for each in scene.connectors):
+        return ""
     for _, coordinate in coordinates(hinge):
         functions = (getattr(coordinate, motor_key(coordinate)), getattr(coordinate, key_of(coordinate, "prescribed")))
         values = [getattr(coordinate, key_of(coordinate, k)) for k in ("rate", "rest")]

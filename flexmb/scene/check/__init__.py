@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from math import isfinite
 
 from flexmb.scene.check.beams import beams
+from flexmb.scene.check.connectors import connectors
+from flexmb.scene.check.control import control
 from flexmb.scene.check.events import events
 from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
@@ -23,7 +25,10 @@ from flexmb.scene.schema import Scene
 
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
-PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses, events)
+PHYSICS = (
+    rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses, connectors, control,
+    events,
+)  # fmt: skip
 
 
 def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:

@@ -20,8 +20,8 @@ LENGTH, E, RHO, AREA, IZ = 2.0, 7e10, 2700.0, 2e-4, 3e-9
 SECTION = beam_section(E=E, G=2.7e10, A=AREA, Iy=2e-9, Iz=IZ, rho=RHO)
 
 
-def everything(closed: bool = False, node: str = "origin", **beam: Any) -> fm.Scene:
-    """A beam with all that can act on one: tip mass, outboard body, wheel, slosh mass, loads, a closure."""
+def everything(closed: bool = False, connected: bool = False, node: str = "origin", **beam: Any) -> fm.Scene:
+    """A beam with all that can act on one: tip mass, outboard body, wheel, slosh mass, loads, a closure, connectors."""
     lump = fm.TipMass(x_m=1.3, mass_kg=0.4, com_m=(0.0, 0.05, 0.02),
                       inertia_kg_m2=((2e-3, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1.5e-3)))  # fmt: skip
     modes = beam.pop("modes", fm.Modes(count=5, static=True))
@@ -45,6 +45,11 @@ def everything(closed: bool = False, node: str = "origin", **beam: Any) -> fm.Sc
         builder.rigid_body("strut", mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
         builder.spherical("ball", "hub", "strut", parent_position=(0.0, 1.0, 0.0))
         builder.closure("end", "spherical", "strut", "beam", node_b="middle", position_a=(0.9, 0.0, 0.0))
+    if connected:
+        stiff = tuple(tuple(30.0 * (i == j) for j in range(6)) for i in range(6))
+        builder.spring_damper("cable", "beam", "hub", node_a="middle", position_a=(0.1, 0.2, 0.0), stiffness=50.0,
+                              damping=3.0, free_length=0.3)  # fmt: skip
+        builder.bushing("mount", "ground", "beam", node_b="tip", position_b=(0.0, 0.1, 0.0), stiffness=stiff)
     return builder.scene()
 
 
@@ -69,6 +74,7 @@ def at_root(system: fm.System, state: fm.State, load: np.ndarray) -> tuple[np.nd
 VARIANTS: Mapping[str, dict[str, Any]] = {
     "full": {}, "line": {"points": "line"}, "rotary": {"points": "rotary"}, "lumped": {"mass": "lumped"},
     "rigid": {"level": "rigid"}, "ruthless": {"level": "ruthless"}, "closed": {"closed": True},
+    "connected": {"connected": True},
     "timoshenko": {"theory": "timoshenko"},
 }  # fmt: skip
 
