@@ -63,7 +63,7 @@ def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
     return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
-def _message(system: System, raw: Raw) -> str:
+def ending(system: System, raw: Raw) -> str:
     if raw.status is Status.OK:
         return f"finished at t = {raw.t:g} s"
     place = system.fault_name(raw.status, raw.fault)
