@@ -18,6 +18,7 @@ from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
 from flexmb.run.situation import EventRecord
 from flexmb.scene.angles import Angles, angles_of
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
@@ -140,9 +141,12 @@ class Trajectory:
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
-        See `System.section_loads`. Raises DynamicsError where a state has no accelerations.
+        See `System.section_loads`. Raises DynamicsError where a state has no accelerations, NotImplementedError for a
+        scene with controllers, of whose loads a state by itself knows nothing.
         """
-        balance = SectionBalance(self._making("a section's load").system, body, x)
+        system = self._making("a section's load").system
+        refuse_feedback(system.scene, "section_loads")
+        balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
             loads[i] = balance.at(float(t), y)
