@@ -67,13 +67,13 @@ def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
 
 
 def _drives(first: Trajectory, later: Trajectory, kept: int) -> dict[str, Real]:
-    """A hinge may be driven in one of them only, or along another number of coordinates."""
+    """A hinge may be driven in one of them only, or along another number of coordinates; what is not driven is free."""
     found = {}
     for name in {**first.drives, **later.drives}:
         width = max(each[name].shape[1] for each in (first.drives, later.drives) if name in each)
         parts = []
         for drives, count in ((first.drives, kept), (later.drives, len(later.t))):
-            part = np.full((count, width), np.nan)
+            part = np.zeros((count, width))
             if name in drives:
                 part[:, : drives[name].shape[1]] = drives[name][:count]
             parts.append(part)
