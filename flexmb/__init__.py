@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.check import SceneError, SceneWarning, check_scene
 from flexmb.scene.files import load_scene, save_scene
+from flexmb.scene.open_loop import open_loop
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.closures import ClosureError
+    from flexmb.control.user import user_function
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linear_model import LinearModel
@@ -71,14 +73,15 @@ _LATER = {
     "System": "flexmb.system.tree_system",
     "compile": "flexmb.system.compile",
     "Trajectory": "flexmb.run.trajectory",
+    "user_function": "flexmb.control.user",
 }
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
     "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
-    "SceneError", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene",
-    "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "save_scene", "simulate", "simulate_batch",
-    "simulate_stages", "steady_spin",
+    "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
+    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene",
+    "simulate", "simulate_batch", "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

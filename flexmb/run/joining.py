@@ -13,7 +13,9 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.run.trajectory import MarkerPath, Trajectory
 
-SAME_NAMES = ("q_names", "u_names", "markers", "loads", "wheel_loads", "energy")
+SAME_NAMES = (
+    "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",
+)  # fmt: skip
 
 
 def joined(first: Trajectory, later: Trajectory) -> Trajectory:
@@ -40,8 +42,10 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
         loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
-        drives=_drives(first, later, kept), energy=each(first.energy, later.energy),
-        momentum=both(first.momentum, later.momentum),
+        drives=_of_some(first, later, kept, "drives"), energy=each(first.energy, later.energy),
+        momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
+        hinge_forces=each(first.hinge_forces, later.hinge_forces),
+        signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
     )  # fmt: skip
     return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
 
@@ -66,16 +70,20 @@ def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
     return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
 
 
-def _drives(first: Trajectory, later: Trajectory, kept: int) -> dict[str, Real]:
-    """A hinge may be driven in one of them only, or along another number of coordinates; what is not driven is free."""
-    found = {}
-    for name in {**first.drives, **later.drives}:
-        width = max(each[name].shape[1] for each in (first.drives, later.drives) if name in each)
+def _of_some(first: Trajectory, later: Trajectory, kept: int, key: str) -> dict[str, Real]:
+    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it.
+
+    What is not driven takes no load and no power, and is zero then; a signal that there is not is NaN.
+    """
+    missing = np.nan if key == "signals" else 0.0
+    a, b, found = getattr(first, key), getattr(later, key), {}
+    for name in {**a, **b}:
+        width = max(each[name].shape[1] for each in (a, b) if name in each)
         parts = []
-        for drives, count in ((first.drives, kept), (later.drives, len(later.t))):
-            part = np.zeros((count, width))
-            if name in drives:
-                part[:, : drives[name].shape[1]] = drives[name][:count]
+        for values, count in ((a, kept), (b, len(later.t))):
+            part = np.full((count, width), missing)
+            if name in values:
+                part[:, : values[name].shape[1]] = values[name][:count]
             parts.append(part)
         found[name] = np.concatenate(parts)
     return found

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.control.memory import LoopMemory
 from flexmb.integrate.memory import Memory
 from flexmb.run.restart import Restart
 from flexmb.scene.problems import closest
@@ -21,11 +22,13 @@ SAME = 1e-9  # relative difference of a value that is given and one that a presc
 
 
 class Beginning(NamedTuple):
-    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; memory: of one taken up."""
+    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; of one taken up its memory,
+    that of its controllers, and their states before the work in y."""
 
     state: State
     y: Real
     memory: Memory | None
+    controllers: LoopMemory | None = None
 
 
 def start_time(t_start: float | None, state: Given) -> float:
@@ -68,8 +71,11 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
         raise ValueError(f'the run that is taken up was by method "{restart.method}": give the same{remedy}')
     if restart.scene != system.scene:
         raise ValueError(f'the run that is taken up was of scene "{restart.scene.name}" with other contents{remedy}')
-    t, y = system.layout.whole(restart.since, restart.memory.y.copy())
-    return Beginning(system.layout.known(t, np.r_[y[:-1], 0.0]), y, restart.taken_up())
+    y = restart.memory.y.copy()
+    t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
+    return Beginning(
+        system.layout.known(t, np.r_[motion[:-1], 0.0]), y, restart.taken_up(), restart.controllers
+    )
 
 
 def _named(system: System, t: float, values: Values) -> State:

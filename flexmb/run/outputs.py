@@ -5,8 +5,8 @@ from __future__ import annotations
 from time import perf_counter
 
 from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
-from flexmb.run.observing import Sampler, observe
-from flexmb.run.propagate import Raw
+from flexmb.run.observing import observe
+from flexmb.run.propagate import Integration, Raw
 from flexmb.run.trajectory import Statistics, Trajectory, gathered
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
@@ -15,17 +15,18 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 
-def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
+def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
     """Evaluate everything observable at the samples reached."""
     start = perf_counter()
-    rows, trouble = observe(system, algorithm, times, raw.states, batch)
-    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
+    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
+    status, stopped_at, message = raw.status, raw.t, ending(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
         status, stopped_at = _why(trouble), float(times[len(rows)])
         message = f"stopped at t = {stopped_at:g} s" + (
             f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
         )
     states = raw.states[: len(rows)]
+    signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
     q_names, u_names = system.state_names
     return Trajectory(
         scene=system.scene.name,
@@ -34,11 +35,13 @@ def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch:
         stopped_at=stopped_at,
         t=times[: len(rows)],
         q=states[:, : system.nq],
-        u=states[:, system.nq : -1],
+        u=states[:, system.nq : system.nq + system.nu],
         q_names=q_names,
         u_names=u_names,
         **gathered(system._observation, rows),
         work=states[:, -1],
+        signals=signals,
+        power=power,
         statistics=Statistics(
             evaluations=raw.counts[EVALUATIONS],
             accepted_steps=raw.counts[ACCEPTED],

@@ -5,7 +5,8 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import TypedDict, Unpack
+from functools import partial
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.run.eventful import EventfulRun, refuse_events
 from flexmb.run.interruption import Interrupted
+from flexmb.run.making import Making
 from flexmb.run.origin import Beginning, Values, origin, start_time
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import Raw, integrate, integration
@@ -22,7 +24,7 @@ from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
@@ -83,9 +85,10 @@ def simulate(
     all its speeds; closed chains take the nearest state that closes their closures. Or a `Restart`, by which a run of
     the same scene and method is taken up to the last bit.
 
-    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion, or the state that is given is far from it. A run that fails raises
+    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
+    sense, ClosureError where no initial state closes the closures or they leave no motion, or the state that is given
+    is far from it. A run that fails raises
     nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
     ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
     to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
@@ -95,7 +98,7 @@ def simulate(
     if isinstance(scene, System):
         refuse_times(scene, t, t_end)
     else:
-        check_scene(scene, t_end, t)
+        check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     stabilise = arguments.number("stabilise", stabilise)
     times = sample_times(samples, t_end, t)
@@ -104,14 +107,16 @@ def simulate(
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
     refuse_events(system, method)
+    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
-            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve.batch)
+            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
         if not system.scene.events:
             raw = integrate(system, solve, begin, times, chosen)
-            trajectory = observed(system, times, raw, algorithm, solve.batch)
+            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
     if system.scene.events:
         run = EventfulRun(system, times, chosen, algorithm, stabilise)
         trajectory, raw = run(begin)
@@ -125,11 +130,27 @@ def simulate(
     return trajectory
 
 
+def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
+    """The same run with other settings; ValueError for one that was taken up, whose beginning is another run's."""
+    if isinstance(same["state"], Restart):
+        raise ValueError("this run took up another, and only that one's beginning is exact: ask a run of both for this")
+    return simulate(
+        system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
+        max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
+    )  # fmt: skip
+
+
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError where a method that linearises finds no Jacobian."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
+    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
+    if continuous:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which continuous controllers have none of: use {others}, or give '
+            f'"{continuous[0]}" a period_s'
+        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
@@ -166,5 +187,5 @@ def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
 def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
     """Of a run that did not fail."""
     if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
-        return Restart(method, system.scene, raw.t, raw.memory)
+        return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
     return None

@@ -17,6 +17,7 @@ from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
 from flexmb.system.tree_system import System
@@ -54,6 +55,7 @@ def simulate_batch(
     chosen = Settings(method, **settings).checked(t_end)
     if chosen.integrator.linearises:
         refuse_without_jacobian(batch.systems[0], "articulated", method)
+    refuse_feedback(batch.systems[0].scene, "simulate_batch")
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
         if system.scene.events:

@@ -42,8 +42,9 @@ def simulate_stages(
     """Simulate stages in sequence; one trajectory, whose status is that of the first stage that fails.
 
     Time goes on from stage to stage, also for functions of time. Each stage starts with the coordinates and speeds that
-    the last one ended with: scenes must have the same ones, and the same markers and hinges. A motion that is
-    prescribed in a stage begins where the coordinate is; where it does not, in value or rate, ValueError says so.
+    the last one ended with: scenes must have the same ones, and the same markers and hinges. Controllers begin anew.
+    A motion that is prescribed in a stage begins where the coordinate is; where it does not, in value or rate,
+    ValueError says so.
     method, t_start, state and settings: see `simulate`. Raises what `simulate` does, before anything runs where a
     scene is wrong, and ValueError for stages that do not fit each other.
     """

@@ -29,8 +29,31 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.connectors import (
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    TimeSensor,
+    UserLaw,
+)
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Closure,
@@ -116,20 +139,41 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
     rates: tuple[float, ...] = ()
 
 
+Waiver = Literal[
+    "wave_speed",
+    "thick_section",
+    "shear_stiffness",
+    "modal_frequency",
+    "negative_stiffness",
+    "negative_damping",
+]
+
+
 class Scene(SceneStruct, frozen=True, kw_only=True):
-    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
+
+    Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
+    meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
+    above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
+    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
+    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    """
 
     name: str
     description: str = ""
+    allow: tuple[Waiver, ...] = ()
     gravity_m_s2: Vector = ZERO
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    controllers: tuple[Controller, ...] = ()
     events: tuple[SceneEvent, ...] = ()
 
     def with_values(self, values: Mapping[str, Any]) -> Scene:
@@ -142,9 +186,13 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
-    "Cylindrical", "EndRun", "Free", "Function", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level",
-    "LinearCoordinate", "Load", "Marker", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar",
-    "PointMass", "Prismatic", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Scene", "SceneEvent",
-    "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation",
+    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller",
+    "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
+    "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
+    "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
+    "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",
+    "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
+    "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver",
+    "Weld", "Wheel",
 ]  # fmt: skip
