@@ -63,7 +63,8 @@ def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
     return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
-def _message(system: System, raw: Raw) -> str:
+def ending(system: System, raw: Raw) -> str:
+    """How a run ended, in words."""
     if raw.status is Status.OK:
         return f"finished at t = {raw.t:g} s"
     place = system.fault_name(raw.status, raw.fault)

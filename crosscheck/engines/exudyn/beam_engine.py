@@ -57,7 +57,6 @@ def _refusals(scene: Scene) -> Iterator[str]:
     if len(scene.bodies) != 1 or not isinstance(scene.bodies[0], BeamBody):
         yield "it takes scenes with one beam and nothing else"
         return
-    if scene.events:
     beam, hinge = scene.bodies[0], scene.hinges[0]
     if scene.wheels or scene.point_masses or scene.closures or scene.connectors or beam.tip_masses:
         yield "it takes a bare beam: no wheels, point masses, tip masses, closures or connectors"

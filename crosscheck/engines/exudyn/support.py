@@ -27,7 +27,6 @@ def supports(scene: Scene) -> Support:
 
 
 def _refusals(scene: Scene) -> Iterator[str]:
-    if scene.events:
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
