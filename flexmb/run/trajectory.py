@@ -182,7 +182,7 @@ class Trajectory:
         """This run and a later one as one: output times of this one, as far as the later one does not have them.
 
         Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
-        them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        them lacks are zero there. ValueError where coordinates, markers or hinges differ, or the later one begins after
         the last time of this one.
         """
         if len(later.t) and later.t[0] > self.stopped_at:

@@ -6,7 +6,14 @@ from typing import Any, NamedTuple, get_args
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
+from crosscheck.biting.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    NotApplicable,
+    is_prescribed,
+    without_events,
+)
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
@@ -58,6 +65,7 @@ OF_CHANNEL = {
 
 
 def _rescaled(scene: Scene) -> Counterpart:
+    without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
