@@ -25,7 +25,7 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
 
 RUNGS = 3
@@ -63,12 +63,20 @@ def checked_support(found: Any) -> Support:
 def support_of(engine: Engine, scene: Scene) -> Support:
     """What `supports` returns; of a scene with controllers "no", unless the engine says by `feedback` that it has them.
 
-    An engine that was written before there were controllers would run the motion without them.
+    An engine that was written before there were controllers would run the motion without them. Laws that are not in
+    this distribution are refused to all: what they do may change, and records would not know.
     """
+    foreign = [each.function for each in scene.controllers if isinstance(each, UserLaw) and not _is_ours(each)]
+    if foreign:
+        return Support("no", f'the function "{foreign[0]}" is not part of flexmb: a record would not know its changes')
     if scene.controllers and not getattr(engine, "feedback", False):
         names = ", ".join(f'"{controller.name}"' for controller in scene.controllers)
         return Support("no", f"the scene has feedback ({names}), and this engine runs no controllers")
     return checked_support(engine.supports(scene))
+
+
+def _is_ours(law: UserLaw) -> bool:
+    return law.function.startswith("flexmb.")
 
 
 def checked_ladder(found: Any) -> tuple[Effort, ...]:
