@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.check import SceneError, SceneWarning, check_scene
 from flexmb.scene.files import load_scene, save_scene
 from flexmb.scene.open_loop import open_loop
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
+    from flexmb.run.situation import EventRecord
     from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.system.batch import Batch, compile_batch
@@ -58,6 +59,7 @@ _LATER = {
     "Restart": "flexmb.run.restart",
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
+    "EventRecord": "flexmb.run.situation",
     "simulate_stages": "flexmb.run.stages",
     "RunStage": "flexmb.run.stages",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
@@ -76,10 +78,10 @@ _LATER = {
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder", "SceneError", "State",
-    "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch",
-    "equilibrium", "linearize", "load_scene", "open_loop", "save_scene", "simulate", "simulate_batch",
-    "simulate_stages", "steady_spin", "user_function",
+    "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
+    "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
+    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene", "simulate",
+    "simulate_batch", "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

@@ -25,10 +25,13 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
 
 RUNGS = 3
+LATER = ("connectors", "controllers")
+"""Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -53,30 +56,27 @@ def checked_version(found: Any) -> str:
     return text
 
 
+def support_of(engine: Engine, scene: Scene) -> Support:
+    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out.
+
+    Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
+    would not know.
+    """
+    for collection in LATER:
+        items, known = getattr(scene, collection), getattr(engine, "takes", ())
+        if items and collection not in known:
+            return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
+    for law in scene.controllers:
+        if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
+            return Support("no", f'the function "{law.function}" is not of flexmb: a record would not know its changes')
+    return checked_support(engine.supports(scene))
+
+
 def checked_support(found: Any) -> Support:
     """What `supports` returned."""
     _instance(found, Support, "supports()")
     _one_of(found.kind, ("exact", "surrogate", "no"), "the kind of supports()")
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
-
-
-def support_of(engine: Engine, scene: Scene) -> Support:
-    """What `supports` returns; of a scene with controllers "no", unless the engine says by `feedback` that it has them.
-
-    An engine that was written before there were controllers would run the motion without them. Laws that are not in
-    this distribution are refused to all: what they do may change, and records would not know.
-    """
-    foreign = [each.function for each in scene.controllers if isinstance(each, UserLaw) and not _is_ours(each)]
-    if foreign:
-        return Support("no", f'the function "{foreign[0]}" is not part of flexmb: a record would not know its changes')
-    if scene.controllers and not getattr(engine, "feedback", False):
-        names = ", ".join(f'"{controller.name}"' for controller in scene.controllers)
-        return Support("no", f"the scene has feedback ({names}), and this engine runs no controllers")
-    return checked_support(engine.supports(scene))
-
-
-def _is_ours(law: UserLaw) -> bool:
-    return law.function.startswith("flexmb.")
 
 
 def checked_ladder(found: Any) -> tuple[Effort, ...]:
@@ -163,6 +163,8 @@ def _known(scene: Scene) -> dict[str, set[str]]:
         "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
         "wheel_loads": wheels,
         "drives": hinges | wheels,
+        "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),
+        "hinge_forces": _names(each for each in scene.connectors if not isinstance(each, BetweenNodes)),
         "energy": set(ENERGIES),
     }
 

@@ -75,7 +75,7 @@ def scene_functions(scene: Scene) -> list[Function]:
             for each in item:
                 visit(each)
 
-    for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads):
+    for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads, scene.connectors):
         visit(part)
     return found
 

@@ -28,6 +28,7 @@ from crosscheck.engines.contract import (
 )
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
+from flexmb.run.eventful import refuse_events
 from flexmb.run.simulate import refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
@@ -44,12 +45,13 @@ _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the
 class NativeEngine:
     """flexmb with one of its algorithms, at the levels the scene asks for, and one of its integrators."""
 
-    feedback = True  # controllers run in the same loop
     settings = (
         "flexmb's integrator in one compiled loop around its compiled equations of motion, on one thread. Workers take "
         "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; those made for one scene are "
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
+
+    takes = ("connectors", "controllers")
 
     def __init__(
         self,
@@ -104,6 +106,7 @@ class NativeEngine:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)
+        refuse_events(system, self._method)
         return NativeModel(system, self._algorithm, self._method)
 
 
@@ -168,6 +171,8 @@ class NativeModel:
             drives=seen.drives,
             energy=seen.energy,
             momentum=seen.momentum,
+            connectors=seen.connectors,
+            hinge_forces=seen.hinge_forces,
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
@@ -28,7 +29,8 @@ def size_of(own: float, further: Sequence[float], doubt: float) -> float:
 
 @dataclass
 class Sizes:
-    """The sizes of the channels (T, k) of one result. Each is found once: every pair of engines asks for it."""
+    """The sizes of the channels (T, k) of one result. Each is found once: every pair of engines, and every channel of a
+    family, asks for it."""
 
     channels: Iterable[str]
     values: Callable[[str], Real]
@@ -36,22 +38,22 @@ class Sizes:
 
     def of(self, channel: str) -> tuple[float, ...]:
         """The largest range (SI) in the channel's family, and what the rest of the scene says where that is nothing."""
-        kin = max((self._size(signal_range, name) for name in self._relatives(channel)), default=0.0)
-        return kin, self._of_scene(channel)
+        return self._largest(signal_range, family(channel)), self._of_scene(channel)
 
     def magnitude(self, channel: str) -> float:
         """The largest magnitude (SI) in the channel's family."""
-        return max((self._size(magnitude, name) for name in self._relatives(channel)), default=0.0)
+        return self._largest(magnitude, family(channel))
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""
-        extent, speed, turning = (self._largest(f".{part}") for part in ("position", "velocity", "angular_velocity"))
-        action = 2.0 * self._largest("energy.kinetic")
+        motion = (".position", ".velocity", ".angular_velocity")
+        extent, speed, turning = (self._magnitude_of(ending) for ending in motion)
+        action = 2.0 * self._magnitude_of("energy.kinetic")
         match family(channel).rpartition(".")[2]:
             case "torque":
-                return self._largest(".force") * extent
+                return self._magnitude_of(".force") * extent
             case "force":
-                return _ratio(self._largest(".torque"), extent)
+                return _ratio(self._magnitude_of(".torque"), extent)
             case "position":
                 return extent
             case "velocity":
@@ -66,18 +68,25 @@ class Sizes:
                 return _ratio(action, max(turning, _ratio(speed, extent)))
         return 0.0
 
-    def _largest(self, ending: str) -> float:
+    @cached_property
+    def _families(self) -> dict[str, list[str]]:
+        found: dict[str, list[str]] = {}
+        for name in self.channels:
+            found.setdefault(family(name), []).append(name)
+        return found
+
+    def _largest(self, measure: Measure, kin: str) -> float:
+        """The largest size in a family; 0 if it has no channel."""
+        return self._once(measure, kin, self._families.get(kin, []))
+
+    def _magnitude_of(self, ending: str) -> float:
         """Largest magnitude (SI) among the channels with that ending; 0 if there is none."""
-        return max((self._size(magnitude, name) for name in self.channels if name.endswith(ending)), default=0.0)
+        return self._once(magnitude, ending, (name for name in self.channels if name.endswith(ending)))
 
-    def _relatives(self, channel: str) -> list[str]:
-        kin = family(channel)
-        return [name for name in self.channels if family(name) == kin]
-
-    def _size(self, measure: Measure, channel: str) -> float:
-        key = (measure, channel)
+    def _once(self, measure: Measure, what: str, names: Iterable[str]) -> float:
+        key = (measure, what)
         if key not in self._found:
-            self._found[key] = measure(channel, self.values(channel))
+            self._found[key] = max((measure(name, self.values(name)) for name in names), default=0.0)
         return self._found[key]
 
 

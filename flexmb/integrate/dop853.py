@@ -31,7 +31,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -153,7 +153,7 @@ def store_samples(problem, step, y, s, times, out, counts):
 
 
 @helper
-def fraction_at(y, f, entry, level, direction):
+def fraction_at(y, f, entry, level, side):
     """The fraction of the step at which the interpolant has come to a level that it crosses, to rounding."""
     low, high = 0.0, 1.0
     while True:
@@ -163,7 +163,7 @@ def fraction_at(y, f, entry, level, direction):
         value = 0.0
         for row in range(6, -1, -1):
             value = (value + f[row, entry]) * (x if row % 2 == 0 else 1.0 - x)
-        if crosses(y[entry] - level, y[entry] + value - level, direction):
+        if crosses(side, (y[entry] - level) + value, 0):
             high = x
         else:
             low = x
@@ -179,12 +179,12 @@ def end_at_crossing(problem, step, y, s, times, out, counts, watch):
     status = interpolant(problem, step, y, s, trial, counts)
     if status != OK:
         return status, step.start
-    x = 2.0
+    x, first = 2.0, 0
     for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, y, s.y_new):
-            found = fraction_at(y, s.f, watch.entry[i], watch.level[i], watch.direction[i])
+        if crosses_one(watch, i, s.y_new):
+            found = fraction_at(y, s.f, watch.entry[i], watch.level[i], watch.side[i])
             if found < x:
-                x, watch.found[0] = found, i
+                x, first = found, i
     t = min(step.start + x * h, step.end)
     while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
         sample = counts[SAMPLES]
@@ -193,6 +193,7 @@ def end_at_crossing(problem, step, y, s, times, out, counts, watch):
         counts[SAMPLES] = sample + 1
     interpolate(y, s.f, x, trial)
     problem.project(t, trial, problem.constants)
+    note(watch, first, trial)
     copy(trial, y)
     counts[ACCEPTED] += 1
     return CROSSED, t
@@ -244,7 +245,7 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
             trouble = reason(status)
             accepted = status == OK and error < 1.0
             if accepted:
-                if watch is not None and is_crossed(watch, y, s.y_new):
+                if watch is not None and is_crossed(watch, s.y_new):
                     return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:

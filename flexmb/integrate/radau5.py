@@ -34,7 +34,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -247,27 +247,28 @@ def store_samples(problem, step, y, s, times, out, counts):
 @helper
 def end_at_crossing(problem, step, y, s, times, out, counts, watch):
     """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
-    trial, t = np.empty(y.shape[0]), step.end
+    trial, t, first = np.empty(y.shape[0]), step.end, 0
     for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, y, s.y_new):
+        if crosses_one(watch, i, s.y_new):
             entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
             while low < 0.5 * (low + high) < high:
                 middle = 0.5 * (low + high)
                 state_at(problem, step, y, s, middle, trial)
-                if crosses(y[entry] - level, trial[entry] - level, watch.direction[i]):
+                if crosses(watch.side[i], trial[entry] - level, 0):
                     high = middle
                 else:
                     low = middle
             if high <= t:
-                t, watch.found[0] = high, i
+                t, first = high, i
     while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
         state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
         counts[SAMPLES] += 1
     if t < step.end:
         state_at(problem, step, y, s, t, trial)
-        copy(trial, y)
     else:
-        copy(s.y_new, y)
+        copy(s.y_new, trial)
+    note(watch, first, trial)
+    copy(trial, y)
     counts[ACCEPTED] += 1
     return CROSSED, t
 
@@ -373,7 +374,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                if watch is not None and is_crossed(watch, y, s.y_new):
+                if watch is not None and is_crossed(watch, s.y_new):
                     return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 store_samples(problem, step, y, s, times, out, counts)
                 renew = iterations > 2 and rate > _SLOW

@@ -9,7 +9,7 @@ import numpy as np
 from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, all_finite, copy, derivative, permitted, stretch
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -43,39 +43,42 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
 def end_at_crossing(problem, step, y, k, trial, counts, watch):
     """y at the first level that a step crosses, by shorter steps from the same start.
 
-    The regula falsi of Illinois for each level; a shorter step is as accurate as the whole one. Returns (status, the
-    time): CROSSED, or the status of a stage that fails.
+    The regula falsi of Illinois for each level, halving where the step starts at it; a shorter step is as accurate as
+    the whole one. Returns (status, the time): CROSSED, or the status of a stage that fails.
     """
     t, last, h = step.start, step.last, step.end - step.start
-    whole, shortest = trial.copy(), h
+    whole, shortest, first = trial.copy(), h, 0
     for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, y, whole):
+        if crosses_one(watch, i, whole):
             entry, level = watch.entry[i], watch.level[i]
             low, high = 0.0, h
             below, above = y[entry] - level, whole[entry] - level
-            side = 0
+            last_side = 0
             while above != 0.0 and high - low > 4.0 * (np.nextafter(t + high, math.inf) - (t + high)):
-                middle = low + (high - low) * below / (below - above)
-                middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
+                middle = 0.5 * (low + high)
+                if crosses(watch.side[i], above, 0) and not crosses(watch.side[i], below, 0):
+                    middle = low + (high - low) * below / (below - above)
+                    middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
                 status = rk4_step(problem, t, last, y, middle, k, trial, counts)
                 if status != OK:
                     return status, t
                 value = trial[entry] - level
-                if crosses(below, value, 0):
+                if crosses(watch.side[i], value, 0):
                     high, above = middle, value
-                    below = 0.5 * below if side > 0 else below
-                    side = 1
+                    below = 0.5 * below if last_side > 0 else below
+                    last_side = 1
                 else:
                     low, below = middle, value
-                    above = 0.5 * above if side < 0 else above
-                    side = -1
+                    above = 0.5 * above if last_side < 0 else above
+                    last_side = -1
             if high <= shortest:
-                shortest, watch.found[0] = high, i
+                shortest, first = high, i
     status = rk4_step(problem, t, last, y, shortest, k, trial, counts)
     if status != OK:
         return status, t
+    problem.project(t + shortest, trial, problem.constants)
+    note(watch, first, trial)
     copy(trial, y)
-    problem.project(t + shortest, y, problem.constants)
     counts[ACCEPTED] += 1
     return CROSSED, t + shortest
 
@@ -102,7 +105,7 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
                 if status != OK:
                     return status, t
-                if watch is not None and is_crossed(watch, y, trial):
+                if watch is not None and is_crossed(watch, trial):
                     return end_at_crossing(problem, Interval(t, t + h, last), y, k, trial, counts, watch)
                 t = end if j == steps - 1 else start + (j + 1) * h
                 copy(trial, y)

@@ -13,11 +13,13 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.run.trajectory import MarkerPath, Trajectory
 
-SAME_NAMES = ("q_names", "u_names", "markers", "loads", "wheel_loads", "energy")
+SAME_NAMES = (
+    "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",
+)  # fmt: skip
 
 
 def joined(first: Trajectory, later: Trajectory) -> Trajectory:
-    """See `Trajectory.then`."""
+    """See `Trajectory.then`; the later run may have no output where the first one ended."""
     for key in SAME_NAMES:
         strange = set(getattr(first, key)) ^ set(getattr(later, key))
         if strange:
@@ -25,10 +27,6 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
             raise ValueError(f"the runs cannot be joined: only one of them has {key}: {names}")
     if len(later.t) == 0:
         return _ended(first, later, first.work)
-    if len(first.t) and later.t[0] > first.stopped_at:
-        raise ValueError(
-            f"the runs cannot be joined: the first ended at {first.stopped_at:g} s, the other began at {later.t[0]:g} s"
-        )
     kept = int(np.searchsorted(first.t, later.t[0]))
     # a run that was taken up has counted on by itself
     counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
@@ -40,12 +38,13 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         return {name: both(a[name], b[name]) for name in b}
 
     whole = replace(
-        later,
+        first,
         t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
         markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
         loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
         drives=_of_some(first, later, kept, "drives"), energy=each(first.energy, later.energy),
-        momentum=both(first.momentum, later.momentum),
+        momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
+        hinge_forces=each(first.hinge_forces, later.hinge_forces),
         signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
     )  # fmt: skip
     return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
@@ -54,7 +53,8 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
 def _ended(whole: Trajectory, later: Trajectory, work: Real, statistics: Any = None) -> Trajectory:
     return replace(
         whole, work=work, status=later.status, message=later.message, stopped_at=later.stopped_at,
-        restart=later.restart, statistics=statistics or _sum(whole.statistics, later.statistics),
+        restart=later.restart, events=whole.events + later.events,
+        statistics=statistics or _sum(whole.statistics, later.statistics),
     )  # fmt: skip
 
 

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
-    y (nq+nu+1,): the last good state; memory, controllers: how it can be taken up there; crossed: the number of the
-    level at which the run paused, -1 for none.
+    y (nq+nu+1,): the last good state; memory, controllers: how it can be taken up there; paused: whether it stopped at
+    a level.
     """
 
     states: Real
@@ -51,7 +51,7 @@ class Raw(NamedTuple):
     interrupted: bool
     y: Real
     memory: Memory
-    crossed: int = -1
+    paused: bool = False
     controllers: LoopMemory | None = None
 
 
@@ -164,9 +164,8 @@ def integrate(
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
-    crossed = int(watch.found[0]) if watch is not None and status == CROSSED else -1
     controllers = solve.ended()
     return Raw(
         out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
-        begun - start, end - begun, interrupted, y, memory, crossed, controllers,
+        begun - start, end - begun, interrupted, y, memory, status == CROSSED, controllers,
     )  # fmt: skip

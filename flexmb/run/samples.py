@@ -47,6 +47,7 @@ def refuse_too_many(samples: int, system: System) -> None:
 def sample_bytes(system: System) -> int:
     """Memory that one output time of a run takes, at most."""
     scene = system.scene
-    places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
+    loaded = (scene.hinges, scene.wheels, scene.closures, scene.point_masses, scene.connectors)
+    places = sum(map(len, loaded))
     numbers = system.nq + 3 * system.nu + 24 * len(scene.markers) + 6 * places + 11
     return _NUMBER_BYTES * numbers + _SAMPLE_BYTES

@@ -5,24 +5,26 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from time import perf_counter
-from typing import TypedDict, Unpack
+from functools import partial
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
+from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.eventful import EventfulRun, refuse_events
 from flexmb.run.interruption import Interrupted
-from flexmb.run.observing import observe
+from flexmb.run.making import Making
 from flexmb.run.origin import Beginning, Values, origin, start_time
-from flexmb.run.propagate import Integration, Raw, integrate, integration
+from flexmb.run.outputs import observed
+from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.check import check_scene
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
@@ -30,7 +32,7 @@ from flexmb.system.compile import assembled
 from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.state import DynamicsError, NotFiniteError, PrecisionWarning, State
+from flexmb.tables.state import PrecisionWarning, State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -83,9 +85,10 @@ def simulate(
     all its speeds; closed chains take the nearest state that closes their closures. Or a `Restart`, by which a run of
     the same scene and method is taken up to the last bit.
 
-    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion, or the state that is given is far from it. A run that fails raises
+    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
+    sense, ClosureError where no initial state closes the closures or they leave no motion, or the state that is given
+    is far from it. A run that fails raises
     nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
     ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
     to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
@@ -95,7 +98,7 @@ def simulate(
     if isinstance(scene, System):
         refuse_times(scene, t, t_end)
     else:
-        check_scene(scene, t_end, t)
+        check_and_warn(scene, t_end, t)
     chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     stabilise = arguments.number("stabilise", stabilise)
     times = sample_times(samples, t_end, t)
@@ -103,13 +106,21 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    refuse_events(system, method)
+    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
         begin = origin(system, t, state, method)
         start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
             return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
-        raw = integrate(system, solve, begin, times, chosen)
-        trajectory = observed(system, times, raw, algorithm, solve)
+        if not system.scene.events:
+            raw = integrate(system, solve, begin, times, chosen)
+            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
+    if system.scene.events:
+        run = EventfulRun(system, times, chosen, algorithm, stabilise)
+        trajectory, raw = run(begin)
+        system = run.system
     trajectory = replace(trajectory, restart=_restart(system, raw, method))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
@@ -117,6 +128,16 @@ def simulate(
     if raw.interrupted or trajectory.status is Status.INTERRUPTED:
         raise Interrupted(trajectory)
     return trajectory
+
+
+def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
+    """The same run with other settings; ValueError for one that was taken up, whose beginning is another run's."""
+    if isinstance(same["state"], Restart):
+        raise ValueError("this run took up another, and only that one's beginning is exact: ask a run of both for this")
+    return simulate(
+        system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
+        max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
+    )  # fmt: skip
 
 
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
@@ -168,58 +189,3 @@ def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
     if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
         return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
     return None
-
-
-def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
-    """Evaluate everything observable at the samples reached."""
-    start = perf_counter()
-    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
-    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
-    if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
-        status, stopped_at = _why(trouble), float(times[len(rows)])
-        message = f"stopped at t = {stopped_at:g} s" + (
-            f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
-        )
-    states = raw.states[: len(rows)]
-    signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
-    q_names, u_names = system.state_names
-    return Trajectory(
-        scene=system.scene.name,
-        status=status,
-        message=message,
-        stopped_at=stopped_at,
-        t=times[: len(rows)],
-        q=states[:, : system.nq],
-        u=states[:, system.nq : system.nq + system.nu],
-        q_names=q_names,
-        u_names=u_names,
-        **gathered(system._observation, rows),
-        work=states[:, -1],
-        signals=signals,
-        power=power,
-        statistics=Statistics(
-            evaluations=raw.counts[EVALUATIONS],
-            accepted_steps=raw.counts[ACCEPTED],
-            rejected_steps=raw.counts[REJECTED],
-            jacobians=raw.counts[JACOBIANS],
-            factorisations=raw.counts[FACTORISATIONS],
-            compile_s=raw.compile_s,
-            run_s=raw.run_s,
-            output_s=perf_counter() - start,
-        ),
-    )
-
-
-def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
-    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
-    the place where the dynamics ends."""
-    if isinstance(trouble, KeyboardInterrupt):
-        return Status.INTERRUPTED
-    return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
-
-
-def _message(system: System, raw: Raw) -> str:
-    if raw.status is Status.OK:
-        return f"finished at t = {raw.t:g} s"
-    place = system.fault_name(raw.status, raw.fault)
-    return f"stopped at t = {raw.t:g} s: " + raw.status.advice.format(body=f'"{place}"')

@@ -58,6 +58,8 @@ def simulate_batch(
     refuse_feedback(batch.systems[0].scene, "simulate_batch")
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
+        if system.scene.events:
+            raise NotImplementedError(f'scene "{system.scene.name}" has events, which simulate alone runs')
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))

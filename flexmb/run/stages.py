@@ -75,6 +75,10 @@ def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
     for i, stage in enumerate(stages):
         if arguments.number(f"stages[{i}].duration_s", stage.duration_s) <= 0.0:
             raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
+        if found and found[-1].scene.events:
+            raise NotImplementedError(
+                f"stages[{i - 1}] has events, which change its scene: let events on time do what stages would"
+            )
         scene = (stage.scene or scene).with_values(stage.values)
         found.append(found[-1] if found and found[-1].scene == scene else compile(scene))
         for what, names in (("coordinates", 0), ("speeds", 1)):

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from flexmb.run.channels import channels_of, signal_range, unit
 from flexmb.run.trajectory import Trajectory
+from flexmb.typing import Real
 
 
 def summary(trajectory: Trajectory) -> Table:
@@ -16,6 +20,22 @@ def summary(trajectory: Trajectory) -> Table:
     table.add_column()
     for name, value in _rows(trajectory):
         table.add_row(name, value)
+    return table
+
+
+def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Table:
+    """The largest estimated error of each channel, in its unit and relative to its range."""
+    table = Table(
+        title="\nErrors by a tighter run", title_justify="left", box=None, padding=(0, 2, 0, 0),
+        caption="Relative: to the channel's range; for positions and orientations how far they get from the start.",
+        caption_justify="left",
+    )  # fmt: skip
+    for name, justify in (("channel", "left"), ("largest error", "right"), ("relative", "right")):
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for name, values in channels_of(trajectory).items():
+        largest, scale = float(np.max(errors[name], initial=0.0)), signal_range(name, values)
+        relative = f"{largest / scale:.1e}" if scale > 0.0 else ""
+        table.add_row(name, f"{largest:.1e} {'rad' if name.endswith('.orientation') else unit(name)}", relative)
     return table
 
 

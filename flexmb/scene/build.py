@@ -23,6 +23,8 @@ from flexmb.scene.options import (
     BeamOptions,
     ClosureFrames,
     Displacement,
+    FrictionOptions,
+    HingeSpringOptions,
     LinearLaw,
     ModalMatrices,
     OwnLaw,
@@ -30,6 +32,7 @@ from flexmb.scene.options import (
     Placement,
     Sampling,
     SlidingHinge,
+    SpringOptions,
     TurningHinge,
     WheelMotion,
     refuse_others,
@@ -92,9 +95,13 @@ class SceneBuilder:
     ... )
     """
 
-    def __init__(self, name: str, *, gravity: ArrayLike = ZERO, description: str = "") -> None:
-        """`gravity`: uniform acceleration (m/s²) in World axes."""
-        self._head: dict[str, Any] = {"name": name, "description": description, "gravity_m_s2": plain(gravity)}
+    def __init__(
+        self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
+    ) -> None:
+        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are meant, see `Scene`."""
+        self._head: dict[str, Any] = {
+            "name": name, "description": description, "allow": list(allow), "gravity_m_s2": plain(gravity)
+        }  # fmt: skip
         self._lists: dict[str, list[msgspec.Struct]] = {key: [] for key in COLLECTIONS.values()}
 
     def add(self, *structs: msgspec.Struct) -> Self:
@@ -107,7 +114,10 @@ class SceneBuilder:
         return self
 
     def scene(self, *, t_end: float | None = None) -> s.Scene:
-        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs."""
+        """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs.
+
+        What is doubtful is for `check_scene` to return, and for runs to warn of.
+        """
         with collector_paused():
             data = self._head | {key: plain(items) for key, items in self._lists.items()}
             scene = to_struct(data, s.Scene)
@@ -355,6 +365,48 @@ class SceneBuilder:
         return self._append(
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
         )
+
+    # Connectors
+
+    def spring_damper(self, name: str, body_a: str, body_b: str, **options: Unpack[SpringOptions]) -> Self:
+        """A spring, damper and actuator along the line between nodes of two bodies ("ground" too).
+
+        Ends: `node_a`, `position_a` (m, node axes) and the same of b. Law: `free_length` (m), `preload` (N),
+        `stiffness` (N/m), `stiffening`, or `table` (m) and `loads` (N); `damping` (N s/m), `acts`, actuator `force`.
+        """
+        refuse_others("a SpringDamper", options, SpringOptions)
+        return self._append(s.SpringDamper, name=name, body_a=body_a, body_b=body_b, **options)
+
+    def bushing(
+        self, name: str, body_a: str, body_b: str, *, stiffness: ArrayLike, damping: ArrayLike | None = None,
+        **frames: Unpack[ClosureFrames],
+    ) -> Self:  # fmt: skip
+        """Stiffness and damping of all relative motions of two frames, symmetric (6,6): [rotation; translation] of B
+        in axes of A. `frames`: as of a closure."""
+        values = frames if damping is None else frames | {"damping": damping}
+        return self._append(s.Bushing, name=name, body_a=body_a, body_b=body_b, stiffness=stiffness, **values)
+
+    def angular_spring(self, name: str, hinge: str, **options: Unpack[HingeSpringOptions]) -> Self:
+        """A nonlinear spring (N m/rad) along an angle of a hinge, with stops; see AngularSpring."""
+        refuse_others("an AngularSpring", options, HingeSpringOptions)
+        return self._append(s.AngularSpring, name=name, hinge=hinge, **options)
+
+    def linear_spring(self, name: str, hinge: str, **options: Unpack[HingeSpringOptions]) -> Self:
+        """A nonlinear spring (N/m) along a displacement of a hinge or point mass, with stops; see LinearSpring."""
+        refuse_others("a LinearSpring", options, HingeSpringOptions)
+        return self._append(s.LinearSpring, name=name, hinge=hinge, **options)
+
+    def angular_friction(
+        self, name: str, hinge: str, *, sliding: float, smoothing: float, **options: Unpack[FrictionOptions]
+    ) -> Self:
+        """Dry friction (N m) along an angle of a hinge or in a wheel's bearing, smooth below the rate `smoothing`."""
+        return self._append(s.AngularFriction, name=name, hinge=hinge, sliding=sliding, smoothing=smoothing, **options)
+
+    def linear_friction(
+        self, name: str, hinge: str, *, sliding: float, smoothing: float, **options: Unpack[FrictionOptions]
+    ) -> Self:
+        """Dry friction (N) along a displacement of a hinge or point mass, smooth below the speed `smoothing`."""
+        return self._append(s.LinearFriction, name=name, hinge=hinge, sliding=sliding, smoothing=smoothing, **options)
 
     # Feedback: what controllers put out acts through a ControlSignal in place of a function of time
 

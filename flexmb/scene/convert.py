@@ -15,10 +15,9 @@ Struct = TypeVar("Struct")
 
 ROOT = Place()
 KINDS = {
-    "bodies": "body", "hinges": "hinge", "closures": "closure", "wheels": "wheel", "point_masses": "point mass",
-    "loads": "load", "markers": "marker", "modal_states": "modal state of body", "nodes": "node",
-    "sensors": "sensor", "controllers": "controller",
-    "events": "event",
+    "bodies": "body", "hinges": "hinge", "closures": "closure", "connectors": "connector", "wheels": "wheel",
+    "point_masses": "point mass", "loads": "load", "markers": "marker", "modal_states": "modal state of body",
+    "nodes": "node", "events": "event", "sensors": "sensor", "controllers": "controller",
 }  # fmt: skip
 
 

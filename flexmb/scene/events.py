@@ -19,7 +19,7 @@ class Latch(SceneStruct, frozen=True, kw_only=True, tag="latch", tag_field="kind
 
 
 class Release(SceneStruct, frozen=True, kw_only=True, tag="release", tag_field="kind"):
-    """A coordinate that is latched, or prescribed, is free: with the spring, damper and motor that the scene gives it."""
+    """A coordinate that is latched or prescribed is free, with the spring, damper and motor that the scene gives it."""
 
     coordinate: str
 

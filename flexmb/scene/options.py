@@ -149,6 +149,54 @@ class OwnLaw(Sampling, total=False):
     outputs: int
     initial: ArrayLike
     parameters: ArrayLike
+class SpringEnds(TypedDict, total=False):
+    """Where a spring's ends are: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
+
+    node_a: str
+    node_b: str
+    position_a: ArrayLike
+    position_b: ArrayLike
+
+
+class LoadLaw(TypedDict, total=False):
+    """How a spring resists a displacement x: `preload` + `stiffness` x + `stiffening`[0] x² ..., or `loads` over
+    `table`; and `damping`."""
+
+    preload: float
+    stiffness: float
+    stiffening: Sequence[float]
+    table: ArrayLike
+    loads: ArrayLike
+    damping: float
+
+
+class SpringOptions(SpringEnds, LoadLaw, total=False):
+    """Ends and law, the `free_length` (m) from which x counts, whether it `acts` in "tension" or "compression" only,
+    and an actuator's `force` (N) as a function of time: positive pushes the ends apart."""
+
+    free_length: float
+    acts: Literal["both", "tension", "compression"]
+    force: s.Function | None
+
+
+class HingeSpringOptions(LoadLaw, total=False):
+    """Which `coordinate` of the hinge, the law about `rest`, and stops at `lower` and `upper` (rad or m) with their
+    `stop_stiffness` and `stop_dissipation` (s/rad or s/m)."""
+
+    coordinate: str
+    rest: float
+    lower: float | None
+    upper: float | None
+    stop_stiffness: float
+    stop_dissipation: float
+
+
+class FrictionOptions(TypedDict, total=False):
+    """Which `coordinate` of the hinge, and static friction `static` (N m or N) with its `stribeck` speed."""
+
+    coordinate: str
+    static: float | None
+    stribeck: float | None
 
 
 class SectionShape(TypedDict, total=False):

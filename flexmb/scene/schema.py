@@ -29,6 +29,15 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
+from flexmb.scene.connectors import (
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
@@ -130,15 +139,34 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
     rates: tuple[float, ...] = ()
 
 
+Waiver = Literal[
+    "wave_speed",
+    "thick_section",
+    "shear_stiffness",
+    "modal_frequency",
+    "negative_stiffness",
+    "negative_damping",
+]
+
+
 class Scene(SceneStruct, frozen=True, kw_only=True):
-    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
+
+    Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
+    meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
+    above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
+    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
+    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    """
 
     name: str
     description: str = ""
+    allow: tuple[Waiver, ...] = ()
     gravity_m_s2: Vector = ZERO
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
@@ -158,11 +186,12 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "Action", "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Change", "Closure", "Constant",
-    "ControlSignal", "Controller", "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable",
-    "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "Load", "LoadSensor", "Marker",
-    "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass",
-    "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Saturation",
-    "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "StateSpace", "Table",
-    "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body",
+    "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller", "CoordinateSensor",
+    "Cylindrical", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact", "InertiaPoint", "Latch",
+    "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor", "Marker", "MarkerSensor",
+    "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar", "PointMass", "Prismatic",
+    "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody", "Saturation", "Scene",
+    "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp", "SpringDamper", "StateSpace",
+    "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

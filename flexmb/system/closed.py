@@ -17,6 +17,7 @@ from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
+from flexmb.system.load_axes import Axes, referred
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -86,14 +87,25 @@ class ClosedSystem(System):
         self._trust(t, y, self.closures)
         return found
 
-    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
-        """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""
+    def hinge_loads(
+        self,
+        state: State,
+        accelerations: Real | None = None,
+        *,
+        axes: Axes = "world",
+        about: tuple[str, str] | None = None,
+    ) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b).
+
+        `axes` and `about` as of a tree; frames "inboard" and "outboard" of a closure are A and B.
+        """
         if accelerations is not None:
             raise NotImplementedError(
                 f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
                 "leave accelerations out, or prescribe coordinates"
             )
-        return self._evaluate(*self.layout.entering(state), "articulated").loads
+        loads = self._evaluate(*self.layout.entering(state), "articulated").loads
+        return referred(self, self._w, loads, axes, about)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""

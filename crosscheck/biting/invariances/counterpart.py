@@ -50,7 +50,7 @@ def by_kind(
     """Channels with their vectors and quaternions mapped, each after its kind; numbers as they are."""
 
     def mapped(name: str, values: Real) -> Real:
-        if name.startswith("drive:"):  # whatever it is called
+        if name.startswith(("drive:", "hinge_force:")):  # whatever it is called
             return values
         if name.endswith(".orientation"):
             return orientation(values)

@@ -9,8 +9,11 @@ import msgspec
 from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.check import check_scene
+from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.problems import SceneError
 from flexmb.scene.schema import Load, ModalState, Scene
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
@@ -42,7 +45,7 @@ OF_UNIT = {
     "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
-    "N m s/rad": Dimension(2, 1, -1),
+    "N m s/rad": Dimension(2, 1, -1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
 # Of raw modal bodies, whose modal coordinates are numbers without unit.
 OF_MODES = {
@@ -60,6 +63,9 @@ def _rescaled(scene: Scene) -> Counterpart:
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
+    for connector in scene.connectors:
+        if isinstance(connector, Bushing) or by_stem(connector).get("stiffening"):
+            raise NotApplicable(f'connector "{connector.name}" has numbers whose keys do not tell their units')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)
     drives = _drives(scene)
@@ -67,11 +73,23 @@ def _rescaled(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items()}
 
-    return Counterpart(_in_units(scene), back, clock=TIME)
+    found = _in_units(scene)
+    _refuse_what_no_material_does(found)
+    return Counterpart(found, back, clock=TIME)
+
+
+def _refuse_what_no_material_does(scene: Scene) -> None:
+    """NotApplicable where the checks, which know SI, take the other units for a slip, and nothing else for a fault."""
+    try:
+        check_scene(scene)
+    except SceneError as error:
+        if all("check the units" in problem.remedy for problem in error.problems):
+            text = f"its numbers in other units look like a slip to the checks: {error.problems[0].what}"
+            raise NotApplicable(text) from None
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:
-    if channel.startswith("drive:"):
+    if channel.startswith(("drive:", "hinge_force:")):
         return drives[channel.partition(":")[2]]
     if channel.startswith(("energy.", "work")):
         return ENERGY.factor
@@ -79,7 +97,7 @@ def _factor(channel: str, drives: dict[str, float]) -> float:
 
 
 def _drives(scene: Scene) -> dict[str, Any]:
-    """Of each hinge and wheel with prescribed motion, the factors of its drive loads."""
+    """Of each hinge and wheel with prescribed motion, the factors of its drive loads; of connectors, of their loads."""
     found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for hinge in scene.hinges:
         prescribed = [each for _, each in coordinates(hinge) if is_prescribed(each)]
@@ -87,6 +105,9 @@ def _drives(scene: Scene) -> dict[str, Any]:
             found[hinge.name] = [
                 (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
             ]
+    for connector in scene.connectors:
+        linear = isinstance(connector, LinearSpring | LinearFriction)
+        found[connector.name] = (FORCE if linear else ENERGY).factor
     return found
 
 

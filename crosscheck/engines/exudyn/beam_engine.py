@@ -12,6 +12,7 @@ from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
+from crosscheck.engines.links import eventful
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
@@ -26,6 +27,13 @@ class ExudynBeamEngine:
 
     name = "exudyn-beam"
     summary = "one planar beam of finite deflection, by beam elements"
+    algorithm = "beam elements in redundant coordinates"
+    settings = (
+        "As many planar cable elements (shear-flexible ones where the scene's beam is) as the scene's beam has, in "
+        "Exudyn's own C++ loop by generalised alpha, with a sensor in Python that takes the state at every sample. "
+        "Fixed steps follow the bending; the method damps the axial vibrations that they step over. It is another and "
+        "richer model than modes, so its error contains the distance of the models."
+    )
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing where it is not installed."""
@@ -50,9 +58,11 @@ def _refusals(scene: Scene) -> Iterator[str]:
     if len(scene.bodies) != 1 or not isinstance(scene.bodies[0], BeamBody):
         yield "it takes scenes with one beam and nothing else"
         return
+    if scene.events:
+        yield eventful(scene, "Exudyn")
     beam, hinge = scene.bodies[0], scene.hinges[0]
-    if scene.wheels or scene.point_masses or scene.closures or beam.tip_masses:
-        yield "it takes a bare beam: no wheels, point masses, tip masses or closures"
+    if scene.wheels or scene.point_masses or scene.closures or scene.connectors or beam.tip_masses:
+        yield "it takes a bare beam: no wheels, point masses, tip masses, closures or connectors"
     for load in scene.loads:
         if load.frame != "world":
             yield f'load "{load.name}" turns with its node: it takes loads in World axes'

@@ -27,7 +27,7 @@ class Willing:
 def test_an_engine_without_controllers_refuses_them() -> None:
     refused = support_of(Willing(), rotor(LAW))  # type: ignore[arg-type]
     assert refused.kind == "no"
-    assert '"law"' in refused.reason
+    assert '"law": the adapter of engine willing knows no controllers' in refused.reason
     assert support_of(Willing(), rotor()).kind == "exact"  # type: ignore[arg-type]
 
 

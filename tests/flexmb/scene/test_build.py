@@ -51,6 +51,9 @@ METHODS = {
     "sense_load": s.LoadSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
     "state_space": s.StateSpace, "pid": s.Pid, "saturation": s.Saturation, "gain_table": s.GainTable,
     "user_law": s.UserLaw,
+    "spring_damper": s.SpringDamper, "bushing": s.Bushing,
+    "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
+    "linear_friction": s.LinearFriction, "event": s.SceneEvent,
 }  # fmt: skip
 # Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
 REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "prismatic": {"translation"},
