@@ -80,8 +80,8 @@ __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
     "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
     "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
-    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene", "simulate",
-    "simulate_batch", "simulate_stages", "steady_spin", "user_function",
+    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene",
+    "simulate", "simulate_batch", "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 
