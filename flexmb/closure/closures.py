@@ -76,9 +76,9 @@ class Closures:
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
-        own = workspace(cc, c)
-        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
+        own = workspace(cc, c, len(w.q))
+        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
     def _route(self, algorithm: str) -> Recursion | Response | Matrices:

@@ -57,7 +57,7 @@ class Integration:
             moving = tangent.tangent_workspace(exact, system.nq, system.nu)
             self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
         else:
-            self._problem = problem(*motion)
+            self._problem = problem(*motion, route.leaping)
         batched = algorithm.observing is not None and not system.scene.closures
         self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
         """Observes many samples at once."""

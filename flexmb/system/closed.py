@@ -12,7 +12,9 @@ from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
+from flexmb.closure.leap import back, leap
 from flexmb.closure.tables import Closed
+from flexmb.integrate.problem import Leaping
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
@@ -121,7 +123,7 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project)
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap))
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
