@@ -20,10 +20,10 @@ from flexmb.closure.factor import entry
 from flexmb.jit.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
-TO_LEAP = 2.0**-13
+TO_LEAP = 2.0**-12
 AT_CROSSING = 2.0**-20
 ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
-SEEN_FALLING = 2.0**-10  # of a pivot, what it must fall by in a step for its fall to be more than that
+SEEN_FALLING = 2.0**-30  # of a pivot, more than which only motion takes off it in a step
 
 
 @helper
@@ -39,22 +39,35 @@ def is_further(t, cw):
 
 
 @helper
+def passing_time(cc, cw, g):
+    """The least time (s) in which a closure of group g moves as far as it is large; inf at rest.
+
+    Speeds are the larger ones of those now and of those where the step started: where a port turns back, it has none.
+    """
+    least = inf
+    for r in range(cc.group[g].row_start, cc.group[g].row_stop):
+        closure = cw.closure[cc.row[r].closure]
+        speed = max(closure.speed, closure.former_speed)
+        if speed > 0.0:
+            least = min(least, closure.size / speed)
+    return least
+
+
+@helper
 def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
-    At the rate at which it has fallen since the step started, a pivot vanishes after some time. This time is short
-    beside that in which the ports move as far as the mechanism is large. Their speed is the larger of those now and
-    where the step started: where they come to rest, they have none, and pivots change by what rounding moves.
+    At the rate at which it has fallen since the step started, a pivot vanishes after some time, which is compared with
+    that in which its mechanism moves as far as it is large. What is at rest changes by what rounding moves.
     """
     near = AT_CROSSING if cw.closer[0] != 0 else TO_LEAP
     for g in range(cc.group.shape[0]):
+        moment = near * passing_time(cc, cw, g)
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
-            i, left = cc.row[cw.chosen[place]].closure, cw.factor[entry(cc, g, a, a)]
+            left = cw.factor[entry(cc, g, a, a)]
             fallen = cw.former_pivot[place] - (1.0 + ROUND_OFF) * left
-            speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
-            vanishes = left * (t - cw.time[0]) * speed < near * fallen * cw.closure[i].size
-            if vanishes and fallen > SEEN_FALLING * left:
+            if fallen > SEEN_FALLING * left and left * (t - cw.time[0]) < moment * fallen:
                 return cw.chosen[place]
     return -1
 

@@ -5,14 +5,14 @@ the branch whose direction it has: loads are bounded, so its speeds cannot jump 
 side accelerations are smooth; only at the position itself, and for what strays from the branch near it, no stage of an
 integrator can be evaluated. So a run comes close by ordinary steps and then takes one step by the trapezoidal rule,
 which evaluates the equations of motion at both its ends only. It goes from a distance between `NEAREST` and `LEAP`
-sizes of the mechanism: the rule's error is the cube of twice that over twelve, 1e-10 of the speed or less, and rounding
+sizes of the mechanism: the rule's error is the cube of twice that over twelve, below 2^-30 of the speed, and rounding
 does not blur the branches. What comes before the position and what comes after it are on one branch where
 
 - every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
   over, while all other rows are where they were; and
 - the accelerations that the closures demand along these rows go on smoothly. A mechanism that only passes near a
   singular position turns there, within the leap, and its accelerations before and after are opposite. On branches that
-  are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so that a c of 2^-39 or more is noticed.
+  are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so that a c of 2^-40 or more is noticed.
 
 Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or the
 run ends with the status it had.
@@ -20,7 +20,7 @@ run ends with the status it had.
 
 from math import inf
 
-from flexmb.closure.branch import TO_LEAP, TURNED, recall, remember
+from flexmb.closure.branch import TO_LEAP, TURNED, passing_time, recall, remember
 from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
@@ -31,10 +31,11 @@ from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.motion.coordinates import project as project_tree
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
-LEAP = 2.0**-11  # sizes of the mechanism to a singular position from where a leap goes
+LEAP = 2.0**-10  # sizes of the mechanism to a singular position from where a leap goes
 NEAREST = TO_LEAP / 2.0
 TIGHT = 2.0**-50  # gap of closures at both ends of a leap: rounding
 PROBE = 2.0**-14  # sizes of the mechanism that are tried to see how pivots fall
+APART = 3.0  # times the distance of a singular position, that of the next one that is not leapt over too
 BEYOND = 0.25  # of the distance before it, the least beyond the position
 SMOOTH = 2.0**-4  # change of accelerations in a leap, as part of them and of speed squared over size
 APPROACHES = 3  # by which the implicit rule converges: Euler's, then its own twice
@@ -110,36 +111,54 @@ def _length(t, end, y, dy, trial, s):
     if _slope(t, y, dy, s) != OK:
         return 0.0
     probe = inf
-    for i in range(cw.closure.shape[0]):
-        if cw.closure[i].speed > 0.0:
-            probe = min(probe, PROBE * cw.closure[i].size / cw.closure[i].speed)
-    if not probe < inf:
-        return 0.0
     for g in range(cc.group.shape[0]):
+        probe = min(probe, PROBE * passing_time(cc, cw, g))
         for a in range(cw.rank[g]):
             cw.demand[cc.group[g].row_start + a] = _demand(cc, cw, g, a)
+    if not probe < inf:
+        return 0.0
     for i in range(y.shape[0]):
         trial[i] = y[i] + probe * dy[i]
     project_tree(t, trial, s.c)
     if _tree(t, trial, s) != OK:
         return 0.0
-    cw.closer[0] = 0
+    last, blurred = _vanish(probe, cc, cw)
+    cw.closer[0] = 1 if last > 0.0 else 0
+    h = min(2.0 * last, end - t)
+    return 0.0 if blurred or h < (1.0 + BEYOND) * last else h
+
+
+@helper
+def _vanish(probe, cc, cw):
+    """When each chosen row vanishes that does so soon: the last of these times (s), 0 for none; whether one is too soon.
+
+    Rows that vanish not much later are among them: a leap must not end near another singular position.
+    """
     last, blurred = 0.0, False
     for g in range(cc.group.shape[0]):
+        moment = passing_time(cc, cw, g)
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
-            i = cc.row[cw.chosen[place]].closure
             before, after = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
             if _along(cc, cw, g, a) < 0.0:
                 after = -after
             ahead = before * probe / (before - after) if before > after else inf
-            cw.vanishing[place] = ahead if ahead * cw.closure[i].speed < LEAP * cw.closure[i].size else inf
-            if cw.vanishing[place] < inf:
+            cw.vanishing[place] = ahead
+            if ahead < LEAP * moment:
                 last = max(last, ahead)
-                cw.closer[0] = 1  # unless there is a leap
-                blurred = blurred or ahead * cw.closure[i].speed < NEAREST * cw.closure[i].size
-    h = min(2.0 * last, end - t)
-    return 0.0 if blurred or h < (1.0 + BEYOND) * last else h
+                blurred = blurred or ahead < NEAREST * moment
+    before = 0.0
+    while before < last:
+        before = last
+        for g in range(cc.group.shape[0]):
+            for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
+                if cw.vanishing[place] < APART * before:
+                    last = max(last, cw.vanishing[place])
+    for g in range(cc.group.shape[0]):
+        for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
+            if cw.vanishing[place] > last:
+                cw.vanishing[place] = inf
+    return last, blurred
 
 
 @helper
