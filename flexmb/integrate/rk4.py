@@ -55,12 +55,13 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
 def _detour(problem, trouble, target, last, y, k, trial, times, out, accuracy, counts):
     """From the last good state to `target` or further, by shorter steps and leaps, where a step there met `trouble`.
 
-    Returns a status code and the time of y, which is again the last good state.
+    Returns a status code and the time of y, which is again the last good state. Without a leap it is still `trouble`:
+    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be.
     """
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
-    h, failed = RETREAT * (target - t), True
+    h, failed, outcome = RETREAT * (target - t), True, trouble
     while t < target:
         status = permitted(accuracy.max_steps, counts)
         if status != OK:
@@ -68,7 +69,7 @@ def _detour(problem, trouble, target, last, y, k, trial, times, out, accuracy, c
         far = leap(problem, last, y, k[0], trial, k[1], counts) if failed else 0.0
         if far > 0.0:
             store_leapt(Interval(t, t + far, last), y, k[0], trial, k[1], times, out, counts)
-            t, h = t + far, far
+            t, h, outcome = t + far, far, OK
         else:
             status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
             if status != OK:
@@ -88,7 +89,7 @@ def _detour(problem, trouble, target, last, y, k, trial, times, out, accuracy, c
         copy(trial, y)
         counts[ACCEPTED] += 1
         failed = False
-    return OK, t
+    return outcome, t
 
 
 @kernel
