@@ -23,7 +23,7 @@ TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
 TO_LEAP = 2.0**-12
 AT_CROSSING = 2.0**-20
 ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
-SEEN_FALLING = 2.0**-30  # of a pivot, more than which only motion takes off it in a step
+FASTEST = 2.0**10  # fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large
 
 
 @helper
@@ -58,17 +58,20 @@ def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
     At the rate at which it has fallen since the step started, a pivot vanishes after some time, which is compared with
-    that in which its mechanism moves as far as it is large. What is at rest changes by what rounding moves.
+    that in which its mechanism moves as far as it is large. What falls faster than ports move has been put right by the
+    projection: of a mechanism that comes to rest that is all.
     """
     near = AT_CROSSING if cw.closer[0] != 0 else TO_LEAP
     for g in range(cc.group.shape[0]):
-        moment = near * passing_time(cc, cw, g)
+        moment, passed = passing_time(cc, cw, g), t - cw.time[0]
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
+            r = cw.chosen[place]
             left = cw.factor[entry(cc, g, a, a)]
             fallen = cw.former_pivot[place] - (1.0 + ROUND_OFF) * left
-            if fallen > SEEN_FALLING * left and left * (t - cw.time[0]) < moment * fallen:
-                return cw.chosen[place]
+            moved = moment * cc.weight[r] * fallen < FASTEST * passed * cw.size[r]
+            if moved and left * passed < near * moment * fallen:
+                return r
     return -1
 
 
