@@ -14,8 +14,8 @@ does not blur the branches. What comes before the position and what comes after 
   singular position turns there, within the leap, and its accelerations before and after are opposite. On branches that
   are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so that a c of 2^-40 or more is noticed.
 
-Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or the
-run ends with the status it had.
+Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or
+the run ends with the status it had.
 """
 
 from math import inf
@@ -130,7 +130,7 @@ def _length(t, end, y, dy, trial, s):
 
 @helper
 def _vanish(probe, cc, cw):
-    """When each chosen row vanishes that does so soon: the last of these times (s), 0 for none; whether one is too soon.
+    """When each chosen row vanishes that does so soon: last of these times (s), 0 for none; whether one is too near.
 
     Rows that vanish not much later are among them: a leap must not end near another singular position.
     """

@@ -55,8 +55,8 @@ _ADVICE = {
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
     Status.BRANCH_UNKNOWN: (
-        "closure {body} went close to a singular position in too long a step: branches of the motion nearly meet there, "
-        'and which one the mechanism takes is not known; use a shorter step, or "dop853"'
+        "closure {body} went close to a singular position in too long a step: branches of the motion nearly meet "
+        'there, and which one the mechanism takes is not known; use a shorter step, or "dop853"'
     ),
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "

@@ -1,7 +1,7 @@
 """Five windows: all uprights turn as one pendulum, theta'' = -w^2 cos(theta), by the energy integral."""
 
 import numpy as np
-from scipy.special import ellipj, ellipk, ellipkinc
+from scipy.special import ellipj, ellipk
 
 COUNT, SPEED, GRAVITY = 5, 1.0, 9.81
 INERTIA = (COUNT + 1) / 3.0 + COUNT  # kg m^2: bars of 1 m and 1 kg, uprights turn and upper bars move in circles
