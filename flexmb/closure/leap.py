@@ -119,8 +119,8 @@ def _length(t, end, y, dy, trial, s):
         return 0.0
     for i in range(y.shape[0]):
         trial[i] = y[i] + probe * dy[i]
-    project_tree(t, trial, s.c)
-    if _tree(t, trial, s) != OK:
+    project_tree(t + probe, trial, s.c)
+    if _tree(t + probe, trial, s) != OK:
         return 0.0
     last, blurred = _vanish(probe, cc, cw)
     cw.closer[0] = 1 if last > 0.0 else 0

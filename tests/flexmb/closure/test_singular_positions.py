@@ -12,6 +12,7 @@ import flexmb
 from flexmb.closure.branch import turned_over
 from flexmb.closure.tables import GROUP
 from flexmb.scene import build
+from flexmb.scene import schema as s
 from flexmb.tables.status import Status
 from tests.flexmb.closure import mechanisms as m
 
@@ -53,6 +54,28 @@ def _stays_parallel(count: int, speed: float, t_end: float, settings: dict, tole
     expected = m.windows_turn(count, speed, run.t)
     for i in range(count + 1):
         assert np.max(np.abs(run.q[:, system.coordinate(f"foot {i}").start] - expected)) < tolerance
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_a_driven_parallelogram_stays_one(settings):
+    """The crank turns evenly, whatever the closure loads: only the rocker's speed says where to go."""
+    bars = m.FourBar(0.4, 1.0, 0.4, 1.0)
+    scene = m.four_bar(bars, crank=1.0, prescribed=s.Ramp(value=1.0, rate=2.0))
+    run = flexmb.simulate(scene, 6.0, samples=61, **SETTINGS[settings])
+    assert run.finished, run.message
+    assert np.max(np.abs(np.sin(0.5 * (run.q[:, 0] - run.q[:, 2])))) < 1e-9
+
+
+def test_what_is_nearly_a_parallelogram_folds():
+    """With a ground ever less longer than the coupler its motion has a limit, which is not that of a parallelogram."""
+    found = []
+    for longer in (1e-4, 1e-6, 1e-8):
+        bars = m.FourBar(0.4, 1.0, 0.4, 1.0 + longer)
+        run = flexmb.simulate(m.four_bar(bars, crank=1.0, rate=6.0, gravity=0.0), 2.0, samples=5)
+        assert run.finished and np.max(np.abs(run.energy_drift)) < 1e-7
+        found.append(run.q[-1, [0, 2]])
+    assert found[-1][1] - found[-1][0] > 1.0  # of a parallelogram both are the same
+    assert np.linalg.norm(found[2] - found[1]) < 0.2 * np.linalg.norm(found[1] - found[0])
 
 
 @pytest.mark.parametrize("settings", SETTINGS)
