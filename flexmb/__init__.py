@@ -14,13 +14,15 @@ from typing import TYPE_CHECKING, Any
 
 from flexmb.scene import schema
 from flexmb.scene.build import SceneBuilder
-from flexmb.scene.check import SceneError, check_scene
+from flexmb.scene.check import SceneError, SceneWarning, check_scene
 from flexmb.scene.files import load_scene, save_scene
+from flexmb.scene.open_loop import open_loop
 from flexmb.scene.schema import *  # noqa: F403  (the schema's names are part of this API)
 
 if TYPE_CHECKING:
     from flexmb.advisor.advice import Advice, advise
     from flexmb.closure.closures import ClosureError
+    from flexmb.control.user import user_function
     from flexmb.linear.campbell import Campbell, campbell
     from flexmb.linear.equilibrium import EquilibriumError, equilibrium
     from flexmb.linear.linear_model import LinearModel
@@ -28,8 +30,11 @@ if TYPE_CHECKING:
     from flexmb.linear.spin import SteadySpin, steady_spin
     from flexmb.run.batch_trajectory import BatchTrajectory
     from flexmb.run.interruption import Interrupted
+    from flexmb.run.restart import Restart
     from flexmb.run.simulate import simulate
     from flexmb.run.simulate_batch import simulate_batch
+    from flexmb.run.situation import EventRecord
+    from flexmb.run.stages import RunStage, simulate_stages
     from flexmb.run.trajectory import Trajectory
     from flexmb.system.batch import Batch, compile_batch
     from flexmb.system.compile import compile
@@ -51,8 +56,12 @@ _LATER = {
     "LinearModel": "flexmb.linear.linear_model",
     "steady_spin": "flexmb.linear.spin",
     "SteadySpin": "flexmb.linear.spin",
+    "Restart": "flexmb.run.restart",
     "simulate": "flexmb.run.simulate",
     "simulate_batch": "flexmb.run.simulate_batch",
+    "EventRecord": "flexmb.run.situation",
+    "simulate_stages": "flexmb.run.stages",
+    "RunStage": "flexmb.run.stages",
     "BatchTrajectory": "flexmb.run.batch_trajectory",
     "Batch": "flexmb.system.batch",
     "compile_batch": "flexmb.system.batch",
@@ -64,13 +73,15 @@ _LATER = {
     "System": "flexmb.system.tree_system",
     "compile": "flexmb.system.compile",
     "Trajectory": "flexmb.run.trajectory",
+    "user_function": "flexmb.control.user",
 }
 
 __all__ = [
     "Advice", "Batch", "BatchTrajectory", "Campbell", "ClosureError", "DynamicsError", "EquilibriumError", "Evaluation",
-    "Interrupted", "LinearModel", "PrecisionWarning", "SceneBuilder", "SceneError", "State", "Status", "SteadySpin",
-    "System", "Trajectory", "advise", "campbell", "check_scene", "compile", "compile_batch", "equilibrium", "linearize",
-    "load_scene", "save_scene", "simulate", "simulate_batch", "steady_spin",
+    "EventRecord", "Interrupted", "LinearModel", "PrecisionWarning", "Restart", "RunStage", "SceneBuilder",
+    "SceneError", "SceneWarning", "State", "Status", "SteadySpin", "System", "Trajectory", "advise", "campbell",
+    "check_scene", "compile", "compile_batch", "equilibrium", "linearize", "load_scene", "open_loop", "save_scene",
+    "simulate", "simulate_batch", "simulate_stages", "steady_spin", "user_function",
     *schema.__all__,
 ]  # fmt: skip
 

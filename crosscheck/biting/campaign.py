@@ -14,6 +14,7 @@ import msgspec
 import numpy as np
 
 from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
+from crosscheck.biting.by_reference import ByReference, by_reference
 from crosscheck.biting.mutants import Litter, PassedOver, litter
 from crosscheck.biting.score import CaseBite, Mutant, ShownIn, bite, outcome
 from crosscheck.biting.subject import JudgedVariant, subject
@@ -21,6 +22,7 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import roundoff_floor
 from crosscheck.judging.verdict import Signal, Verdict, compare
+from crosscheck.library.case import Control
 from crosscheck.library.find import Case
 from crosscheck.library.patterns import most_specific
 from crosscheck.records.archive import read
@@ -91,43 +93,52 @@ def scored(what: JudgedVariant, mutants: Litter, results: CaseResults) -> CaseBi
         verdicts[verdict.comparison].append(verdict)
     true = results.get(what.variant.name, what.engine)
     patient = true.status == "finished" and PATIENCE * true.finest.wall_s <= MUTANT_LIMIT_S
-    of_scene = [
-        _mutant(control.mutation, control.target, verdicts[name], patient) for name, control in mutants.mutants.items()
-    ]
-    of_answer, not_asked = _answers(what, true)
+    found = by_reference(what, true)
+    stored, no_reference = (None, found) if isinstance(found, str) else (found, "")
+    of_scene = []
+    for name, control in mutants.mutants.items():
+        faulty = results.get(what.variant.name, what.engine, f"control:{name}")
+        reference = stored.of_scene(faulty) if stored is not None else {}
+        of_scene.append(_mutant(control, verdicts[name], reference, patient))
+    of_answer, not_asked = _answers(what, true, stored)
     return bite(
         what.case.name,
         what.variant.name,
         what.engine,
         [*of_scene, *of_answer],
         [*mutants.passed_over, *not_asked],
+        no_reference,
     )
 
 
-def _mutant(mutation: str, target: str, verdicts: Sequence[Verdict], patient: bool) -> Mutant:
+def _mutant(control: Control, verdicts: Sequence[Verdict], reference: dict[str, ShownIn], patient: bool) -> Mutant:
     channels = {each.channel: ShownIn(status=each.status, E=each.E, U=each.U, goal=each.goal) for each in verdicts}
     reason = max(verdicts, key=lambda each: each.E or 0.0).reason if verdicts else "no verdict"
     what, beyond = outcome(channels, patient)
     return Mutant(
-        mutation=mutation,
-        target=target,
+        mutation=control.mutation,
+        target=control.target,
         of="scene",
         outcome=what,
         beyond_goal=beyond,
         reason=reason,
         channels=channels,
+        by_reference=outcome(reference, patient)[0] if reference else None,
+        reference=reference,
     )
 
 
-def _answers(what: JudgedVariant, true: Result) -> tuple[list[Mutant], list[PassedOver]]:
+def _answers(what: JudgedVariant, true: Result, stored: ByReference | None) -> tuple[list[Mutant], list[PassedOver]]:
     """Faults planted in the true run; passed over are those that change nothing, or nothing that the case judges."""
     found: list[Mutant] = []
     passed: list[PassedOver] = []
     if true.status != "finished":
         return found, [PassedOver(mutation="answers", target="", reason=f"no true run: {true.message}")]
     scene = variant_scene(what.case.scene(what.variant), what.variant)
+    rounding = _rounding(true)
     for fault in FAULTS:
-        channels, changed = _falsified(what, true, scene, fault)
+        wrong = _falsified(true, scene, fault, rounding)
+        changed, channels = list(wrong), _judged(what, true, wrong)
         if not changed:
             passed.append(PassedOver(mutation=fault.name, target="", reason="it changes nothing in this run"))
         elif not channels:
@@ -135,6 +146,7 @@ def _answers(what: JudgedVariant, true: Result) -> tuple[list[Mutant], list[Pass
             passed.append(PassedOver(mutation=fault.name, target="", reason=reason))
         else:
             verdict, beyond = outcome(channels)
+            reference = stored.of_answer(wrong) if stored is not None else {}
             worst = max(channels, key=lambda name: channels[name].E or 0.0)
             found.append(
                 Mutant(
@@ -145,33 +157,44 @@ def _answers(what: JudgedVariant, true: Result) -> tuple[list[Mutant], list[Pass
                     beyond_goal=beyond,
                     reason=f"{fault.what}: {worst}",
                     channels=channels,
+                    by_reference=outcome(reference)[0] if reference else None,
+                    reference=reference,
                 )
             )
     return found, passed
 
 
-def _is_other(name: str, values: Real, right: dict[str, Real], evaluations: int) -> bool:
-    """Whether a channel differs by more than the rounding of its family: an axis may be the same in body and World."""
-    size = max(magnitude(each, rows) for each, rows in right.items() if family(each) == family(name))
-    floor = roundoff_floor(size, max(evaluations, len(values)))
-    return bool(np.max(distance(name, values, right[name])) > floor)
+def _rounding(true: Result) -> dict[str, float]:
+    """The rounding (SI) of each family of channels: an axis may be the same in body and World but for that."""
+    sizes: dict[str, float] = {}
+    for name in true.channels:
+        values = true.values(name)
+        sizes[family(name)] = max(sizes.get(family(name), 0.0), magnitude(name, values))
+    sums = max(true.finest.evaluations, len(true.times))
+    return {group: roundoff_floor(size, sums) for group, size in sizes.items()}
 
 
-def _falsified(
-    what: JudgedVariant, true: Result, scene: Scene, fault: AnswerFault
-) -> tuple[dict[str, ShownIn], list[str]]:
-    """What the judged channels say of a falsified answer, and the names of all channels that the fault changes."""
+def _falsified(true: Result, scene: Scene, fault: AnswerFault, rounding: dict[str, float]) -> dict[str, Real]:
+    """The channels (T, k) that the fault changes by more than their rounding, as it leaves them."""
     right = {name: true.values(name) for name in true.channels}
     wrong = channels_of(fault.falsify(run_of(true.times, right), scene))
-    changed = [name for name, values in wrong.items() if _is_other(name, values, right, true.finest.evaluations)]
+    return {
+        name: values
+        for name, values in wrong.items()
+        if np.max(distance(name, values, right[name])) > rounding[family(name)]
+    }
+
+
+def _judged(what: JudgedVariant, true: Result, wrong: dict[str, Real]) -> dict[str, ShownIn]:
+    """What the falsified channels that the case judges say, held against the true ones."""
     channels: dict[str, ShownIn] = {}
-    for name in changed:
+    for name, values in wrong.items():
         pattern = most_specific(what.goals, name)
         if pattern is None:
             continue
         signal = true.signal(name, across=False)
-        false = Signal(wrong[name], signal.uncertainty, signal.sizes)
+        false = Signal(values, signal.uncertainty, signal.sizes)
         scale = most_specific(what.scales, name)
         finding = compare(name, false, signal, what.goals[pattern], None if scale is None else what.scales[scale])
         channels[name] = ShownIn(status=finding.status, E=finding.E, U=finding.U, goal=what.goals[pattern])
-    return channels, changed
+    return channels

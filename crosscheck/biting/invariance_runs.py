@@ -112,6 +112,9 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
         if true.scene is None:
             without[invariance.name] = f"the case's own scene cannot be made: {true.error}"
             continue
+        if true.scene.controllers:
+            without[invariance.name] = "the scene has controllers, which would have to be told in the other frame too"
+            continue
         try:
             counterpart = invariance.of(true.scene)
         except NotApplicable as error:
@@ -186,7 +189,7 @@ def _findings(what: JudgedVariant, true: Result, other: Result, counterpart: Cou
         scale = most_specific(what.scales, name)
         finding = compare(
             name,
-            _with_rounding(name, told, other),
+            _with_rounding(name, told, other, len(counterpart.scene.bodies)),
             true.signal(name, across=False),
             ANY if pattern is None else min(BOTH * what.goals[pattern], ANY),
             None if scale is None else what.scales[scale],
@@ -215,14 +218,22 @@ def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
     )
 
 
-def _with_rounding(name: str, told: Result, other: Result) -> Signal:
-    """A channel told back, with the rounding of what was added to it or taken from it."""
+def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signal:
+    """A channel told back, with the rounding of what was added to it or taken from it, and of what it is the sum of.
+
+    A load that vanishes is a sum that vanishes: of forces at distances, and of gyroscopic torques, which are of the
+    size of the kinetic energy. In other axes and units this sum rounds otherwise, as do places along a chain of bodies.
+    """
     signal = told.signal(name, across=False)
+    sizes = signal.sizes
+    if name.endswith(".torque") and "energy.kinetic" in told.channels:
+        sizes = (*sizes, magnitude("energy.kinetic", told.values("energy.kinetic")))
     moved = magnitude(name, other.values(name) - told.values(name))
-    floor = roundoff_floor(moved, max(told.finest.evaluations, len(told.times)))
+    terms = max(sizes) if name.endswith(".torque") else 0.0
+    floor = roundoff_floor(max(moved, terms), max(told.finest.evaluations, len(told.times)) + bodies)
     doubt = signal.uncertainty
     raised = Uncertainty(doubt.envelope + floor, doubt.value + floor, doubt.how, doubt.order)
-    return Signal(signal.values, raised, signal.sizes)
+    return Signal(signal.values, raised, sizes)
 
 
 def _verdict(head: InvarianceVerdict, findings: dict[str, Finding]) -> InvarianceVerdict:

@@ -9,10 +9,11 @@ from typing import Any
 import msgspec
 
 from crosscheck.biting.subject import JudgedVariant, reduced
-from crosscheck.library.case import ComparisonSide, Control, MutationKind
+from crosscheck.library.case import TAKES_APART, ComparisonSide, Control, MutationKind
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from crosscheck.running.plan import at_level, variant_scene
+from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
 
@@ -67,13 +68,23 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
     """Why the mutated scene is none that could be run and told from the true one; "" if it is."""
     variant = msgspec.structs.replace(what.variant, level=None)
     try:
-        mutant = variant_scene(mutate(scene, kind, target), variant)
+        faulty = mutate(scene, kind, target)
+        if _takes_apart(what, scene, faulty, target):
+            return f'variant "{variant.name}" takes the body apart: it has no modes of the whole'
+        mutant = variant_scene(faulty, variant)
         check_scene(mutant, t_end=variant.duration_s or what.case.run.duration_s)
     except (ValueError, NotImplementedError, OSError) as error:
         return f"it makes no scene: {' '.join(str(error).split())}"
     if same_to_rounding(mutant, true):
         return f'variant "{variant.name}" does not model what it changes'
     return ""
+
+
+def _takes_apart(what: JudgedVariant, scene: Scene, faulty: Scene, target: str) -> bool:
+    """Whether a fault of a beam's modes would stand for the whole beam where the variant has it in parts."""
+    in_parts = what.variant.transform in TAKES_APART and what.variant.split_body in (None, target)
+    pairs = zip(scene.bodies, faulty.bodies, strict=True)
+    return in_parts and any(isinstance(a, BeamBody) and isinstance(b, ModalBody) for a, b in pairs)
 
 
 def same_to_rounding(one: Any, other: Any) -> bool:

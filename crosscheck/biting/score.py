@@ -30,6 +30,9 @@ class Mutant(msgspec.Struct, frozen=True, kw_only=True):
     ran, and nothing differs. "no mutant": the engine refuses or cannot run the faulty scene. "not judged": it crashed,
     was stopped too soon to tell, or did not run. `beyond_goal` says whether it would be noticed also in a code that
     just meets the goals: a channel differs by more than its goal.
+
+    `by_reference` is the outcome where all there is to judge by is the case's stored reference, in the channels
+    `reference`; None where it has no channel that the fault is in, or there is no reference to judge by.
     """
 
     mutation: str
@@ -39,6 +42,8 @@ class Mutant(msgspec.Struct, frozen=True, kw_only=True):
     beyond_goal: bool
     reason: str
     channels: dict[str, ShownIn]
+    by_reference: Outcome | None = None
+    reference: dict[str, ShownIn] = {}
 
 
 class ChannelScore(msgspec.Struct, frozen=True, kw_only=True):
@@ -50,13 +55,16 @@ class ChannelScore(msgspec.Struct, frozen=True, kw_only=True):
 
 class CaseBite(msgspec.Struct, frozen=True, kw_only=True):
     """How a case bites: `score` is the share of mutants noticed, None where there is none; `score_at_goals` of those
-    noticed beyond a goal."""
+    noticed beyond a goal; `score_by_reference` of what the stored reference judges, None with the reason in
+    `no_reference` where it judges nothing."""
 
     case: str
     variant: str
     engine: str
     score: float | None
     score_at_goals: float | None
+    score_by_reference: float | None = None
+    no_reference: str = ""
     channels: dict[str, ChannelScore]
     mutants: tuple[Mutant, ...]
     passed_over: tuple[PassedOver, ...]
@@ -96,7 +104,12 @@ def outcome(channels: dict[str, ShownIn], patient: bool = False) -> tuple[Outcom
 
 
 def bite(
-    case: str, variant: str, engine: str, mutants: Sequence[Mutant], passed_over: Iterable[PassedOver]
+    case: str,
+    variant: str,
+    engine: str,
+    mutants: Sequence[Mutant],
+    passed_over: Iterable[PassedOver],
+    no_reference: str = "",
 ) -> CaseBite:
     """The scores of a case from what came of its mutants."""
     counted = [each for each in mutants if each.outcome in ("noticed", "missed")]
@@ -112,16 +125,23 @@ def bite(
         engine=engine,
         score=_share([each.outcome == "noticed" for each in counted]),
         score_at_goals=_share([each.beyond_goal for each in counted]),
+        score_by_reference=_share([each.by_reference == "noticed" for each in counted if _referred(each)]),
+        no_reference=no_reference,
         channels=dict(sorted(channels.items())),
         mutants=tuple(mutants),
         passed_over=tuple(passed_over),
     )
 
 
-def mean_score(bites: Iterable[CaseBite]) -> float | None:
+def mean(scores: Iterable[float | None]) -> float | None:
     """Mean of the cases' scores, each case counting the same; None without any."""
-    scores = [each.score for each in bites if each.score is not None]
-    return sum(scores) / len(scores) if scores else None
+    known = [score for score in scores if score is not None]
+    return sum(known) / len(known) if known else None
+
+
+def _referred(mutant: Mutant) -> bool:
+    """Whether the stored reference has said anything of a mutant."""
+    return mutant.by_reference in ("noticed", "missed")
 
 
 def _share(hits: Sequence[bool]) -> float | None:

@@ -8,6 +8,8 @@ import msgspec
 
 from crosscheck.library.case import CaseError, Comparison, Variant
 from crosscheck.library.find import Case
+from crosscheck.library.reference import has_reference
+from crosscheck.library.selection import held
 
 
 @dataclass(frozen=True)
@@ -15,7 +17,8 @@ class JudgedVariant:
     """A case reduced to one variant and one engine.
 
     `goals` and `scales` are those of the engine's comparisons of the variant that must agree (of others, where it has
-    none); of two goals for one pattern the stricter counts.
+    none), and those by which it is held against the stored reference, if that is of the variant; of two goals for one
+    pattern the stricter counts.
     """
 
     case: Case
@@ -32,8 +35,9 @@ def subject(case: Case, engine: str) -> JudgedVariant:
     """
     judged = [_variants(each) for each in _agreeing(case)]
     names = [name for group in judged for name in group]
-    if case.run.reference is not None and case.run.reference.variant in names:
-        names.insert(0, case.run.reference.variant)
+    recipe = case.run.reference
+    if recipe is not None and recipe.variant in names:
+        names.insert(0, recipe.variant)
     named = {each for variant in case.run.variants for each in (*variant.engines, *variant.also)}
     for name in dict.fromkeys(names):
         variant = case.run.variant(name)
@@ -77,7 +81,10 @@ def _engines(case: Case, comparison: Comparison) -> tuple[str, ...]:
 
 
 def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
-    """Goals and scales of a variant's comparisons: of those with the engine that must agree, where there are such."""
+    """Goals and scales of a variant's comparisons: of those with the engine that must agree, where there are such.
+
+    What the stored reference asks of the engine adds to them.
+    """
     goals: dict[str, float] = {}
     scales: dict[str, float] = {}
     about = [each for each in case.run.comparisons if variant in _variants(each)]
@@ -86,4 +93,14 @@ def _asked(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dic
         for pattern, goal in comparison.goals.items():
             goals[pattern] = min(goal, goals.get(pattern, goal))
         scales |= comparison.scales
-    return goals, scales
+    further, sizes = _held(case, variant, engine)
+    goals |= {pattern: min(goal, goals.get(pattern, goal)) for pattern, goal in further.items()}
+    return goals, sizes | scales
+
+
+def _held(case: Case, variant: str, engine: str) -> tuple[dict[str, float], dict[str, float]]:
+    """Goals and scales by which the engine is held against the stored reference of a variant, none if it is not."""
+    recipe = case.run.reference
+    if recipe is None or recipe.variant != variant or not has_reference(case.folder):
+        return {}, {}
+    return held(case.run, (engine,)).get(engine, ({}, {}))

@@ -22,6 +22,7 @@ from crosscheck.terminal.text import words
 from crosscheck.terminal.verbosity import Verbosity
 from crosscheck.terminal.versions import versions_text
 from flexmb.output.writing import in_words
+from flexmb.scene.problems import SceneWarning
 
 EXIT_USAGE = 2
 EXIT_INTERRUPTED = 130  # as shells have it
@@ -114,7 +115,12 @@ SchedulerAddress = Annotated[
         help="`local`, or the address of a Dask scheduler such as tcp://10.0.0.1:8786; docs/sweeps.md tells more.",
     ),
 ]
-Strict = Annotated[bool, typer.Option("--strict", help="Figures worse than recorded, or not recorded, are errors.")]
+Strict = Annotated[
+    bool,
+    typer.Option(
+        "--strict", help="Figures worse than recorded or not recorded, references never made, doubtful scenes: errors."
+    ),
+]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]
 Open = Annotated[bool, typer.Option("--open", help="Open the report in the browser when done.")]
 
@@ -128,9 +134,14 @@ def found(words: tuple[str, ...]) -> tuple[find.Case, ...]:
 
 
 @contextmanager
-def sole_writer(out: Path) -> Iterator[None]:
-    """Lock the folder while something is written there; an error that the user can put right is shown in one line."""
+def sole_writer(out: Path, strict: bool = False) -> Iterator[None]:
+    """Lock the folder while something is written there; an error that the user can put right is shown in one line.
+
+    `strict`: a doubtful scene is an error.
+    """
     with in_one_line(), locked(out):
+        if strict:
+            warnings.simplefilter("error", SceneWarning)
         yield
 
 
@@ -141,9 +152,16 @@ def check_limit(seconds: float | None) -> None:
 
 @contextmanager
 def in_one_line() -> Iterator[None]:
-    """Show each warning, and the error that ends the command, in one line without a traceback."""
+    """Show each warning once, and the error that ends the command, without a traceback."""
+    shown = set[str]()
+
+    def show(message: Warning | str, *_: Any, **__: Any) -> None:
+        if str(message) not in shown:
+            shown.add(str(message))
+            errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+
     with warnings.catch_warnings():
-        warnings.showwarning = lambda message, *_: errors.print(words(f"warning: {message}", "yellow"), soft_wrap=True)
+        warnings.showwarning = show
         try:
             yield
         except KeyboardInterrupt:

@@ -6,9 +6,10 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import Jobs, TimeLimit, app, check_limit, console, found, in_one_line
+from crosscheck.cli.common import Jobs, SchedulerAddress, TimeLimit, app, check_limit, console, found, in_one_line
 from crosscheck.library.case import CaseError
 from crosscheck.running.scheduler import Limits
+from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import marked, words
 
@@ -19,6 +20,7 @@ def regenerate(
     check: Annotated[bool, typer.Option("--check", help="Compare with what is stored, write nothing.")] = False,
     jobs: Jobs = None,
     time_limit: TimeLimit = None,
+    scheduler: SchedulerAddress = LOCAL,
 ) -> None:
     """
     Make the stored reference of cases again, by the routes of their table `[reference]`.
@@ -43,11 +45,12 @@ def regenerate(
     check_limit(time_limit)
     good = True
     with in_one_line():
+        runs_on = scheduler_at(scheduler)
         for case in found(tuple(cases)):
             try:
                 with LiveProgress(console) as live:
                     limits = Limits(jobs, time_limit)
-                    done = make_again(case, check=check, limits=limits, listener=live.hear)
+                    done = make_again(case, check=check, limits=limits, scheduler=runs_on, listener=live.hear)
             except CaseError as error:
                 console.print(marked("✕", "red", str(error)), soft_wrap=True)
                 good = False

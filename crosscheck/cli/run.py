@@ -89,8 +89,9 @@ def run(
     accepted figures. Nothing is accepted while anything is not as expected.
 
     **Exit code**: 0 every verdict is the one the case expects and everything asked for gave its result;
-    1 something is not as expected, failed or did not run, or `--accept` wrote nothing; 2 the request itself makes no
-    sense. With `--strict` also 1 where figures are worse than recorded or missing. `docs/verdicts.md` has the rules.
+    1 something is not as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept`
+    wrote nothing; 2 the request itself makes no sense. With `--strict` also 1 where figures are worse than recorded or
+    missing, a reference was never made, or a scene is doubtful. `docs/verdicts.md` has the rules.
 
     **Examples**: `crosscheck run canonical` · `crosscheck run free_flying/flexible_beam -e native` ·
     `crosscheck run all -e mycode --alone --out results` · `crosscheck run ./my_case --accept` ·
@@ -104,7 +105,7 @@ def run(
     idle = without_part((case.run for case in chosen), tuple(engine or ()))
     if idle:
         refuse(idle)
-    with sole_writer(out):
+    with sole_writer(out, strict):
         runs_on = scheduler_at(scheduler)
         with LiveProgress(console, shown) as live:
             sweep(

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from crosscheck.cli.common import CaseWord, Json, app, console, found, in_one_line, refuse
+from crosscheck.cli.common import CaseWord, Json, SchedulerAddress, app, console, found, in_one_line, refuse
+from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome
@@ -29,6 +30,7 @@ def verify(
         str | None, typer.Option(help="Run this engine and hold against it, instead of the stored reference.")
     ] = None,
     template: Annotated[bool, typer.Option("--template", help="Write CSV as a template with the times.")] = False,
+    scheduler: SchedulerAddress = LOCAL,
     as_json: Json = False,
 ) -> None:
     """
@@ -63,7 +65,8 @@ def verify(
             csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
-        outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine)
+        runs_on = scheduler_at(scheduler)
+        outcome = verify_csv(chosen, csv, coarse=coarse, variant=variant, engine=engine, scheduler=runs_on)
     console.print(channels_table(outcome))
     console.print(words(f"Held against {outcome.against}."), soft_wrap=True)
     if outcome.interpolated:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, checked_support
+from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, support_of
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -79,7 +79,7 @@ def within(what: str, error: float, bound: float) -> None:
 
 def offered(engine: Engine, scene: Scene) -> Model:
     """The compiled scene; NotOffered with the engine's reason where it does not represent the scene exactly."""
-    support = checked_support(engine.supports(scene))
+    support = support_of(engine, scene)
     if support.kind != "exact":
         raise NotOffered(support.reason)
     return checked_model(engine.compile(scene))

@@ -7,7 +7,7 @@ import numpy as np
 
 from crosscheck.conformance.clause import Chapter, equal, ladder, offered, require, simulated, snapshot
 from crosscheck.conformance.scenes import MASS, pendulum
-from crosscheck.engines.answers import checked_support, checked_version
+from crosscheck.engines.answers import checked_version, support_of
 from crosscheck.engines.contract import ENERGIES, Engine, Trajectory
 from flexmb.run.channels import channels_of
 from flexmb.scene.build import SceneBuilder
@@ -27,7 +27,7 @@ def version_is_text(engine: Engine) -> None:
 @FORM.clause("`supports` says how exactly a scene can be represented, and gives its reason where it cannot.")
 def a_refusal_has_a_reason(engine: Engine) -> None:
     for scene in (pendulum(), _exotic()):
-        support = checked_support(engine.supports(scene))
+        support = support_of(engine, scene)
         text = f'supports() of the scene "{scene.name}" is "{support.kind}" without a reason'
         require(support.kind == "exact" or bool(support.reason.strip()), text)
 

@@ -14,11 +14,24 @@ from typing import Any, get_args
 
 import numpy as np
 
-from crosscheck.engines.contract import ENERGIES, OUTPUTS, Effort, MarkerPath, Model, Status, Support, Trajectory
-from flexmb.scene.schema import Scene
+from crosscheck.engines.contract import (
+    ENERGIES,
+    OUTPUTS,
+    Effort,
+    Engine,
+    MarkerPath,
+    Model,
+    Status,
+    Support,
+    Trajectory,
+)
+from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
 
 RUNGS = 3
+LATER = ("connectors", "controllers", "events")
+"""Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -41,6 +54,22 @@ def checked_version(found: Any) -> str:
     text = _text(found, "version()")
     _require(bool(text.strip()), "version() is empty: name the version of the library")
     return text
+
+
+def support_of(engine: Engine, scene: Scene) -> Support:
+    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out.
+
+    Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
+    would not know.
+    """
+    for collection in LATER:
+        items, known = getattr(scene, collection), getattr(engine, "takes", ())
+        if items and collection not in known:
+            return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
+    for law in scene.controllers:
+        if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
+            return Support("no", f'the function "{law.function}" is not of flexmb: a record would not know its changes')
+    return checked_support(engine.supports(scene))
 
 
 def checked_support(found: Any) -> Support:
@@ -134,6 +163,8 @@ def _known(scene: Scene) -> dict[str, set[str]]:
         "loads": hinges | _names(scene.closures) | _names(scene.point_masses),
         "wheel_loads": wheels,
         "drives": hinges | wheels,
+        "connectors": _names(each for each in scene.connectors if isinstance(each, BetweenNodes)),
+        "hinge_forces": _names(each for each in scene.connectors if not isinstance(each, BetweenNodes)),
         "energy": set(ENERGIES),
     }
 

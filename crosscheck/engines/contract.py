@@ -69,7 +69,8 @@ class Snapshot:
     outboard hinge point; an engine may add its point masses, under their names. `wheel_loads[wheel]` (6,): on the wheel
     about its centre. `drives[name]` (n,): generalised drive load of each prescribed coordinate of a hinge or wheel,
     beyond springs and motors. `energy`: "kinetic", "strain", "spring", "gravity" (J), as far as the engine knows them.
-    `momentum` (6,): [angular about the World origin; linear].
+    `momentum` (6,): [angular about the World origin; linear]. `connectors[name]` (6,): [torque; force] of a connector
+    between nodes on body_b about frame B; `hinge_forces[name]` (1,): of one along a hinge, along its coordinate.
     """
 
     markers: dict[str, MarkerSnapshot]
@@ -78,6 +79,8 @@ class Snapshot:
     drives: dict[str, Real]
     energy: dict[str, float]
     momentum: Real | None
+    connectors: dict[str, Real] = field(default_factory=dict)
+    hinge_forces: dict[str, Real] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -106,8 +109,9 @@ class Trajectory:
     All this is checked before it is recorded (`crosscheck.engines.answers`); an answer that breaks it counts as
     *failed*. Names are those of the scene; a marker, a load or an energy that is left out is a channel that the engine
     does not offer.
-    `loads`, `wheel_loads` (T,6); `drives` (T,n); `energy` of each kind (T,); `momentum` (T,6); `work` (T,) is the work
-    done so far by drives, motors, dampers and loads, where the engine integrates it. `wall_s` times only the solve.
+    `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
+    `momentum` (T,6); `work` (T,) is the work done so far by drives, motors, dampers, friction, actuators and loads,
+    where the engine integrates it. `wall_s` times only the solve.
     """
 
     status: Status
@@ -117,6 +121,8 @@ class Trajectory:
     loads: dict[str, Real] = _by_name(6)
     wheel_loads: dict[str, Real] = _by_name(6)
     drives: dict[str, Real] = _by_name(None)
+    connectors: dict[str, Real] = _by_name(6)
+    hinge_forces: dict[str, Real] = _by_name(1)
     energy: dict[str, Real] = _by_name()
     momentum: Real | None = _single(6)
     work: Real | None = _single()
@@ -150,7 +156,9 @@ class Engine(Protocol):
 
     An engine may have a `summary`, one line that `crosscheck engines` shows; and for timing reports an `algorithm`, in
     a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
-    switched off, whose loop steps it, and what its `wall_s` contains.
+    switched off, whose loop steps it, and what its `wall_s` contains. `takes` names the collections of a scene beyond
+    the first contract that its adapter knows, such as "connectors" or "controllers"; a scene that has others is refused
+    for it.
     """
 
     name: str

@@ -13,7 +13,7 @@ import numpy as np
 from msgspec import Struct
 from scipy.interpolate import make_interp_spline
 
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 
 
@@ -42,6 +42,8 @@ def profile(function: Function) -> Callable[[float], Profile]:
             return lambda t: Profile(value if start <= t < start + duration else 0.0, 0.0, 0.0)
         case Table(times_s=times, values=values):
             return _table(times, values)
+        case ControlSignal(source=source):
+            raise NotImplementedError(f'the signal of controller "{source}" is no function of time')
 
 
 def breaks(function: Function) -> tuple[float, ...]:
@@ -73,7 +75,7 @@ def scene_functions(scene: Scene) -> list[Function]:
             for each in item:
                 visit(each)
 
-    for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads):
+    for part in (scene.hinges, scene.wheels, scene.point_masses, scene.loads, scene.connectors):
         visit(part)
     return found
 
@@ -81,7 +83,7 @@ def scene_functions(scene: Scene) -> list[Function]:
 def fastest_rate(function: Function, until: float = inf) -> float:
     """Largest |df/dt| (unit/s) over [0, until], for choosing a step: bounds where they are known, else samples."""
     match function:
-        case Constant() | Pulse():
+        case Constant() | Pulse() | ControlSignal():  # of a signal nothing is known before the run
             return 0.0
         case Ramp(rate=rate) | SpinUp(rate=rate):
             return abs(rate)

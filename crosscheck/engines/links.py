@@ -20,6 +20,7 @@ from crosscheck.engines.conventions import (
     outboard_frame,
 )
 from flexmb.scene.bodies import ZERO
+from flexmb.scene.connectors import Connector
 from flexmb.scene.functions import Function
 from flexmb.scene.schema import (
     AngularCoordinate,
@@ -121,12 +122,19 @@ class Attachment:
     frame: Frame
 
 
-def obstacle(scene: Scene, engine: str, closed_by: tuple[str, ...]) -> str:
-    """Why an engine of rigid trees with closures of some types cannot represent the scene; empty if it can."""
+def obstacle(
+    scene: Scene, engine: str, closed_by: tuple[str, ...], connected_by: tuple[type[Connector], ...] = ()
+) -> str:
+    """Why an engine of rigid trees with some types of closures and connectors cannot represent the scene, or ""."""
     for closure in scene.closures:
+        if not closed_by:
+            return f'closure "{closure.name}": {engine} closes no loops'
         if closure.type not in closed_by:
             known = ", ".join(closed_by)
             return f'closure "{closure.name}" is of type {closure.type}: {engine} closes loops by {known} only'
+    for connector in scene.connectors:
+        if not isinstance(connector, connected_by):
+            return f'connector "{connector.name}": the adapter of {engine} has none of its kind'
     for body in scene.bodies:
         if isinstance(body, SidBody):
             return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
@@ -147,8 +155,8 @@ def links(scene: Scene) -> tuple[Link, ...]:
         if parent >= 0:
             inboard = chain[parent].body @ inboard
         fixed, moving = _point_masses(scene, body)
-        lumps = [_placed(_point(point), in_link @ _place(point, body)) for point in fixed]
-        inertia = combine([_placed(inertia_of(rigid_equivalent(body)), in_link), *lumps])
+        lumps = [placed(_point(point), in_link @ _place(point, body)) for point in fixed]
+        inertia = combine([placed(inertia_of(rigid_equivalent(body)), in_link), *lumps])
         index[body.name] = own = len(chain)
         chain.append(Link(body.name, "body", hinge.name, parent, inboard, freedoms(hinge), inertia, in_link))
         for point in moving:
@@ -272,7 +280,7 @@ def _place(item: Wheel | PointMass, body: Body) -> Frame:
     return offset_frame(body, item.node, item.offset_m)
 
 
-def _placed(inertia: Inertia, frame: Frame) -> Inertia:
+def placed(inertia: Inertia, frame: Frame) -> Inertia:
     """Inertia known in B, in A, with frame = X_AB."""
     R = frame.rotation
     return Inertia(inertia.mass, frame.position + R @ inertia.com, R @ inertia.inertia @ R.T)

@@ -28,7 +28,8 @@ from crosscheck.engines.contract import (
 )
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
-from flexmb.run.simulate import simulate
+from flexmb.run.eventful import refuse_events
+from flexmb.run.simulate import refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
@@ -49,6 +50,8 @@ class NativeEngine:
         "general kernels, which serve all scenes, unless FLEXMB_KERNELS says otherwise; those made for one scene are "
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
+
+    takes = ("connectors", "controllers", "events")
 
     def __init__(
         self,
@@ -101,6 +104,9 @@ class NativeEngine:
         system.route(self._algorithm)
         if scene.closures and INTEGRATORS[self._method].linearises:
             raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
+        if INTEGRATORS[self._method].linearises:
+            refuse_without_jacobian(system, self._algorithm, self._method)
+        refuse_events(system, self._method)
         return NativeModel(system, self._algorithm, self._method)
 
 
@@ -165,6 +171,8 @@ class NativeModel:
             drives=seen.drives,
             energy=seen.energy,
             momentum=seen.momentum,
+            connectors=seen.connectors,
+            hinge_forces=seen.hinge_forces,
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:

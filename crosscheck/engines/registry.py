@@ -25,6 +25,8 @@ BUILT_IN = {
     "exudyn": "crosscheck.engines.exudyn:ExudynEngine",
     "exudyn-beam": "crosscheck.engines.exudyn:ExudynBeamEngine",
     "drake": "crosscheck.engines.drake:DrakeEngine",
+    "dart": "crosscheck.engines.dart:DartEngine",
+    "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
 }
 # Engines whose compiled code is another's: what that one leaves in caches on disk serves them too.
 COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}

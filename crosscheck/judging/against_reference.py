@@ -81,11 +81,14 @@ def judge_reference(case: CaseResults) -> Iterator[Verdict]:
             yield question.verdict(channel, goal, finding)
 
 
-def hold(result: Result, reference: ReferenceSignals, asked: Asked) -> Iterator[tuple[str, float, Finding]]:
+def hold(
+    result: Result, reference: ReferenceSignals, asked: Asked, like: Result | None = None
+) -> Iterator[tuple[str, float, Finding]]:
     """The finding on every channel of the reference for which there is a goal, with that goal. Never raises.
 
-    A kind of energy that the engine does not know is left out; any other channel that it does not offer it refuses. A
-    result that did not finish gives its status for each goal.
+    `like` is the result whose U `result` takes, as that of a control is that of the true run. A kind of energy that the
+    engine does not know is left out; any other channel that it does not offer it refuses. A result that did not finish
+    gives its status for each goal.
     """
     if result.status != "finished":
         ending = result.ending
@@ -105,7 +108,7 @@ def hold(result: Result, reference: ReferenceSignals, asked: Asked) -> Iterator[
         if channel in result.channels:
             scaled = most_specific(asked.scales, channel)
             scale = asked.scales[scaled] if scaled is not None else None
-            own = _at(result.signal(channel, across=False), places)
+            own = at_samples(result.control_signal(channel, like or result, across=False), places)
             yield channel, goal, compare(channel, own, reference.signal(channel), goal, scale)
         elif not channel.startswith("energy."):
             yield channel, goal, Finding("refused", f"{result.engine} does not offer {channel}")
@@ -121,7 +124,7 @@ def shared_times(wanted: Real, given: Real) -> np.ndarray | None:
     return places if np.all(np.abs(given[places] - wanted) <= CLOCK * np.max(np.abs(given))) else None
 
 
-def _at(signal: Signal, places: np.ndarray) -> Signal:
+def at_samples(signal: Signal, places: np.ndarray) -> Signal:
     """A signal at some of its samples, with the U that it has reached by the last of them."""
     envelope = signal.uncertainty.envelope[places]
     doubt = Uncertainty(envelope, float(envelope[-1]), signal.uncertainty.how, signal.uncertainty.order)

@@ -6,11 +6,13 @@ from collections import Counter
 from dataclasses import dataclass
 
 from crosscheck.engines.registry import BUILT_IN
+from crosscheck.judging.applicable import Inapplicable, set_apart
 from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import recordable
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
 
+NO_REFERENCE = "has a recipe of a reference, no reference yet: crosscheck regenerate {}"
 FAULTS = ("failed", "crashed", "did not finish")  # of an engine that was asked to run
 
 
@@ -30,13 +32,18 @@ class Absence:
 class SessionOutcome:
     """All verdicts of a session, by case; all absences; broken lines of the records, in words.
 
-    `strict`: figures that are worse than recorded, or not recorded, are not as expected.
+    `strict`: figures that are worse than recorded, or not recorded, and references that were never made, are not as
+    expected. `inapplicable` is what engines that have joined a case cannot represent of it. `asked` are the engines
+    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference.
     """
 
     verdicts: dict[str, list[Verdict]]
     absences: list[Absence]
     broken: tuple[str, ...] = ()
     strict: bool = False
+    inapplicable: tuple[Inapplicable, ...] = ()
+    asked: tuple[str, ...] = ()
+    unreferenced: tuple[str, ...] = ()
 
     @property
     def all(self) -> list[Verdict]:
@@ -50,8 +57,25 @@ class SessionOutcome:
 
     @property
     def idle(self) -> list[str]:
-        """Cases without any verdict, such as those that none of the requested engines takes part in."""
-        return [case for case, group in self.verdicts.items() if not group]
+        """Cases without any verdict though nothing in them is inapplicable: no engine asked for takes part in them."""
+        explained = {each.case for each in self.inapplicable}
+        return [case for case, group in self.verdicts.items() if not group and case not in explained]
+
+    @property
+    def uncompared(self) -> list[str]:
+        """Engines that were asked for by name and were judged in nothing at all."""
+        judged = {engine for verdict in self.all if verdict.kind != "control" for _, engine in verdict.sides}
+        return [engine for engine in self.asked if engine not in judged]
+
+    @property
+    def never_applicable(self) -> dict[str, list[str]]:
+        """By engine the cases of which it can represent nothing that it was asked for."""
+        judged = {(verdict.case, engine) for verdict in self.all for _, engine in verdict.sides}
+        found: dict[str, dict[str, None]] = {}
+        for each in self.inapplicable:
+            if (each.case, each.engine) not in judged:
+                found.setdefault(each.engine, {})[each.case] = None
+        return {engine: list(cases) for engine, cases in found.items()}
 
     @property
     def worse(self) -> list[Verdict]:
@@ -79,15 +103,16 @@ class SessionOutcome:
 
     @property
     def ok(self) -> bool:
-        """Every verdict is the expected one, everything asked for ran, nothing is lost, and there is a verdict."""
-        sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken
-        return sound and not (self.strict and (self.worse or self.unrecorded))
+        """Every verdict is the expected one, everything asked for ran and was judged in something, nothing is lost."""
+        sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken and not self.uncompared
+        return sound and not (self.strict and (self.worse or self.unrecorded or self.unreferenced))
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
         if not self.all:
-            return "Nothing was compared" + (f": {self._broken}" if self.broken else "")
+            why = self._broken if self.broken else self._uncompared if self.inapplicable else ""
+            return "Nothing was compared" + (f": {why}" if why else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
             return f"All {len(self.all)} verdicts are as expected{grown}"
@@ -101,9 +126,19 @@ class SessionOutcome:
             parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
         if self.strict and self.unrecorded:
             parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
+        if self.strict and self.unreferenced:
+            cases = "case has" if len(self.unreferenced) == 1 else "cases have"
+            parts.append(f"{len(self.unreferenced)} {cases} a recipe and no reference")
+        if self.uncompared:
+            parts.append(self._uncompared)
         if self.broken:
             parts.append(self._broken)
         return " and ".join(parts)
+
+    @property
+    def _uncompared(self) -> str:
+        were = "was" if len(self.uncompared) == 1 else "were"
+        return f"{', '.join(self.uncompared)} {were} asked for and compared in nothing"
 
     @property
     def _broken(self) -> str:
@@ -122,11 +157,21 @@ class SessionOutcome:
 
 def conclude(session: Session, strict: bool = False) -> SessionOutcome:
     """Judge every case of a session."""
+    verdicts: dict[str, list[Verdict]] = {}
+    inapplicable: tuple[Inapplicable, ...] = ()
+    for case in session.cases:
+        verdicts[case.case.case], apart = set_apart(case, judge(case))
+        inapplicable += apart
+    whole = {(each.case, each.variant, each.engine) for each in inapplicable if not each.channel}
+    absences = [absence for case in session.cases for absence in _absences(case)]
     return SessionOutcome(
-        verdicts={case.case.case: judge(case) for case in session.cases},
-        absences=[absence for case in session.cases for absence in _absences(case)],
+        verdicts=verdicts,
+        absences=[each for each in absences if (each.case, each.variant, each.engine) not in whole],
         broken=tuple(str(line) for line in session.broken),
         strict=strict,
+        inapplicable=inapplicable,
+        asked=tuple(dict.fromkeys(engine for case in session.cases for engine in case.case.asked)),
+        unreferenced=tuple(case.case.case for case in session.cases if case.case.unreferenced),
     )
 
 

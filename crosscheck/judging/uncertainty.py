@@ -16,7 +16,11 @@ of the grid convergence index for an unproven order.
 
 **Tolerance.** Error is not a power of the tolerance, but it falls. If the finest error is at most half the one before,
 |f_2 - f_3| >= e_2 - e_3 >= e_3: the difference bounds the error. d_12 >= 2 d_23 is the sign of it; without it
-U = 3 max(d_12, d_23) again.
+U = 3 max(d_12, d_23) again. How fast errors fall scatters: in runs of the library whose solutions are known in closed
+form, from one tolerance to the next the error fell by at least the tolerances' ratio over `SPREAD`. Where the fall q,
+the smaller of d_12/d_23 and that ratio, leaves no factor of 2 after such a scatter, U = SPREAD/(q - SPREAD) d_23, at
+most 3 d_23. A faster fall earns no credit: at the finest tolerance errors may have stopped to fall, for round-off that
+stiffness has magnified, and differences do not show it.
 
 **Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
 eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
@@ -42,6 +46,7 @@ from flexmb.typing import Real
 SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
 ORDER_BAND = 0.1
+SPREAD = 10.0
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
 LARGEST_RATIO = 1e6  # of two steps: an order seen across more is seen nowhere
@@ -162,7 +167,8 @@ def _bound(kind: str, efforts: Sequence[float], wider: Real, gap: Real) -> tuple
     if kind == "tolerance":
         if far < 2.0 * near:
             return unproven
-        return 1.0, gap, "difference of the two finest tolerances", None
+        factor = _after_scatter(min(far / near if near > 0.0 else np.inf, efforts[1] / efforts[2]))
+        return factor, gap, f"{factor:.2g} x the difference of the two finest tolerances", None
     order = observed_order(efforts, far, near)
     if order is None or order < 1.0 - ORDER_BAND:
         return unproven
@@ -172,3 +178,8 @@ def _bound(kind: str, efforts: Sequence[float], wider: Real, gap: Real) -> tuple
         return SAFETY / (ratio - 1.0), gap, how, order
     credited = min(order, ORDER_CREDIT)
     return SAFETY / float(np.expm1(credited * np.log(ratio))), gap, f"Richardson, observed order {order:.2f}", order
+
+
+def _after_scatter(fall: float) -> float:
+    """Bound of e_3 over d_23, if e_3 is at most SPREAD/fall times e_2 <= d_23 + e_3; never less than 1."""
+    return UNPROVEN_SAFETY if fall <= SPREAD else min(UNPROVEN_SAFETY, max(1.0, SPREAD / (fall - SPREAD)))

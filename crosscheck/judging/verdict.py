@@ -24,6 +24,7 @@ from typing import Literal, get_args
 import msgspec
 import numpy as np
 
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import Uncertainty
 from crosscheck.library.accepted import Figure
 from flexmb.run.channels import distance, family, signal_range
@@ -124,8 +125,8 @@ class Finding:
 class Signal:
     """One channel of one result: values (T, k), U, and further sizes (SI) for a signal that is zero within U.
 
-    `sizes`: the largest range in the channel's family (say, all hinge torques); for torques then the largest force
-    times the extent of the scene, since a torque that vanishes is the balance of forces at such distances.
+    `sizes`: the largest range in the channel's family (say, all hinge torques), then what other signals of the scene
+    say, see `crosscheck.judging.sizes`.
     """
 
     values: Real
@@ -205,11 +206,10 @@ def _unmeasurable(a: Signal, b: Signal, goal: float, scale: float | None) -> Fin
 
 
 def _size(channel: str, a: Signal, b: Signal, total: float) -> float:
-    """Range of the two signals, or the first of their further sizes above `total`, their uncertainty (SI).
+    """Range (SI) of the two signals, or one of their further sizes where it is nothing beside `total`, their U.
 
     Kinds of energy turn into each other: their size is always that of the largest of them.
     """
     own = max(signal_range(channel, a.values), signal_range(channel, b.values))
     further = [max(pair) for pair in zip_longest(a.sizes, b.sizes, fillvalue=0.0)]
-    candidates = further if family(channel) == "energy" else [own, *further]
-    return next((size for size in candidates if size > total), max(candidates, default=0.0))
+    return size_of(0.0 if family(channel) == "energy" else own, further, total)

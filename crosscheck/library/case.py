@@ -126,7 +126,8 @@ MutationKind = Literal[
     "speed_axes", "initial_attitude", "wheel_axis", "wheel_momentum", "wheel_inertia", "wheel_inertia_swapped",
     "wheel_offset", "gravity_sign", "gravity_size", "gravity_axis", "gravity_dropped", "load_sign", "load_point",
     "load_frame", "dropped_stiffening", "dropped_deformation", "mode_sign", "mode_order", "mode_rotation",
-    "section_axes", "motor_sign", "function_size", "function_phase",
+    "section_axes", "motor_sign", "function_size", "function_phase", "connector_stiffness", "connector_rest",
+    "connector_losses",
 ]  # fmt: skip
 Family = Literal["closed_form", "published", "converged", "agreed"]
 FAMILIES: dict[str, Family] = {

@@ -72,6 +72,8 @@ KINDS = (
     ),
     ChannelKind("load", "Hinge loads", of_items=True, parts=_load("Hinge")),
     ChannelKind("wheel_load", "Wheel loads", of_items=True, parts=_load("Wheel bearing")),
+    ChannelKind("connector", "Connector loads", of_items=True, parts=_load("Connector")),
+    ChannelKind("hinge_force", "Connector loads", of_items=True, parts=(Part("", "Loads along hinges", None),)),
     ChannelKind("drive", "Drive loads", of_items=True, parts=(Part("", "Drive loads", None),)),
     ChannelKind("work", "", of_items=False, parts=(Part("", "work", 1, "J"),)),
 )

@@ -5,7 +5,8 @@ In the reduced run file every comparison is an explicit pair, and `engines` of a
 No engine asked for: everything. One: every comparison it takes part in, its partners included. Several: what involves
 only these. An engine that the case names in no variant (one of ours, a user's own, or a misspelt one) joins every
 variant that is compared engine by engine, and the variant of the stored reference; if it does not exist, that shows as
-*did not run*. One that the case names stays where the case has put it.
+*did not run*. What it cannot represent there is *not applicable*, see `crosscheck.judging.applicable`. One that the
+case names stays where the case has put it.
 """
 
 from __future__ import annotations
@@ -62,6 +63,12 @@ def alone(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     )
 
 
+def joining(run: RunFile, asked: Iterable[str]) -> tuple[str, ...]:
+    """Those of the engines asked for that the run file does not know: none of its variants has them."""
+    known = {engine for variant in run.variants for engine in _all(variant)}
+    return tuple(engine for engine in asked if engine not in known)
+
+
 def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, float], dict[str, float]]]:
     """Goals and scales, by engine, of those of `engines` that are held against the stored reference.
 
@@ -73,7 +80,7 @@ def held(run: RunFile, engines: Iterable[str]) -> dict[str, tuple[dict[str, floa
     if recipe is None:
         return {}
     engines = tuple(engines)
-    foreign = {engine for engine in engines if _foreign(run, engine)}
+    foreign = joining(run, engines)
     run = _joined(run, engines)
     pairs = [pair for each in run.comparisons for pair in _pairs(run, each)]
     pairs = [pair for pair in pairs if all(side.variant == recipe.variant for side in pair.sides)]
@@ -109,7 +116,7 @@ def without_part(runs: Iterable[RunFile], asked: tuple[str, ...]) -> str:
 
 def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
     """The run file with engines that it does not know added to the variants that are compared engine by engine."""
-    foreign = tuple(engine for engine in asked if _foreign(run, engine))
+    foreign = joining(run, asked)
     open_to_all = {each.variant for each in run.comparisons if each.variant and not each.engines}
     open_to_all |= {run.reference.variant} if run.reference is not None else set()
     variants = tuple(
@@ -117,11 +124,6 @@ def _joined(run: RunFile, asked: tuple[str, ...]) -> RunFile:
         for variant in run.variants
     )
     return msgspec.structs.replace(run, variants=variants)
-
-
-def _foreign(run: RunFile, engine: str) -> bool:
-    """Whether the run file does not know an engine: none of its variants has it."""
-    return all(engine not in _all(variant) for variant in run.variants)
 
 
 def _pairs(run: RunFile, comparison: Comparison) -> list[Comparison]:

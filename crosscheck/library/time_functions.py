@@ -8,7 +8,7 @@ from typing import Any
 import msgspec
 
 from flexmb.scene.columns import struct_keys
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 
 VALUES: dict[type, tuple[str, ...]] = {
     Constant: ("value",),
@@ -18,6 +18,7 @@ VALUES: dict[type, tuple[str, ...]] = {
     SpinUp: ("rate",),
     Pulse: ("value",),
     Table: ("values",),
+    ControlSignal: ("gain",),
 }
 TIMES: dict[type, tuple[str, ...]] = {
     Ramp: ("start_s",),

@@ -153,7 +153,8 @@ class ChannelItem(_CaseItem):
         """Judge the channel."""
         verdict = self._verdict()
         if verdict is None:
-            pytest.skip(f"{self.engine} does not know {self.wanted[0]}")
+            self._without_verdict()
+            return
         numbers = {"E": verdict.E, "U": verdict.U, "goal": verdict.goal}
         for name, value in {"status": verdict.status, "expected": verdict.expected, **numbers}.items():
             self.tell(name, value if value is None or isinstance(value, str) else f"{value:.6g}")
@@ -166,6 +167,14 @@ class ChannelItem(_CaseItem):
             raise NotAsExpected(f"{told(verdict)}\nworse than recorded: {verdict.worse}")
         if verdict.status != "agree":
             pytest.xfail(f"{verdict.status}, as the case expects: {verdict.expected_reason}")
+
+    def _without_verdict(self) -> None:
+        """Not applicable, with the engine's reason; or an energy that it does not know."""
+        apart = self.request.runs.outcome(self.case, self.engine).inapplicable
+        reason = next((each.reason for each in apart if each.channel in ("", *self.wanted)), "")
+        if reason and self.request.strict:
+            raise NotAsExpected(f"{self.case.name}, {self.engine}, {self.wanted[0]}: not applicable: {reason}")
+        pytest.skip(f"{self.engine} refuses: {reason}" if reason else f"{self.engine} does not know {self.wanted[0]}")
 
     def _verdict(self) -> Verdict | None:
         """The verdict on the channel, or the one that stands for it; None where the engine has no such energy."""

@@ -51,7 +51,11 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     """A case as it was run: its run file reduced to the engines asked for, provenance, README, variants, the figures
-    accepted for it, its stored reference if it has one, and digests of the `files` in its folder."""
+    accepted for it, its stored reference if it has one, and digests of the `files` in its folder.
+
+    `asked` are the engines asked for by name, `joined` those among them that the case itself names nowhere.
+    `unreferenced`: it has a recipe of a reference whose files were never made.
+    """
 
     case: str
     run: RunFile
@@ -61,6 +65,9 @@ class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):
     accepted: Accepted = {}
     reference: RecordedReference | None = None
     files: dict[str, str] = {}
+    asked: tuple[str, ...] = ()
+    joined: tuple[str, ...] = ()
+    unreferenced: bool = False
 
 
 class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):

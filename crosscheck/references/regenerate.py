@@ -27,7 +27,8 @@ from crosscheck.references.change import beyond_uncertainty, largest_share
 from crosscheck.references.files import knowledge_text, write_both
 from crosscheck.references.routes import RouteSignals, run_routes
 from crosscheck.running.plan import sample_times
-from crosscheck.running.scheduler import BY_DEFAULT, Limits
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import BY_DEFAULT, Limits, Scheduler
 from crosscheck.running.sweep import PROVIDER, Listener
 from flexmb.scene.reading import read_text
 from flexmb.typing import Real
@@ -56,6 +57,7 @@ def regenerate(
     check: bool = False,
     provider: str = PROVIDER,
     limits: Limits = BY_DEFAULT,
+    scheduler: Scheduler = run_jobs,
     listener: Listener = lambda jobs, event: None,
 ) -> Regenerated:
     """Make the reference of a case by its recipe, and write it; with `check` nothing is written.
@@ -69,7 +71,7 @@ def regenerate(
         raise CaseError(f"{case.folder / 'run.toml'}: it has no table [reference]: add one with two routes at least")
     try:
         before = load_reference(case.folder) if has_reference(case.folder) else None
-        routes = run_routes(case, recipe, _times(case, recipe), provider, limits, listener)
+        routes = run_routes(case, recipe, _times(case, recipe), provider, limits, scheduler, listener)
         agreed = agree(routes, recipe.channels)
         meet(agreed, case.provenance.anchors if case.provenance is not None else ())
     except CaseError as error:

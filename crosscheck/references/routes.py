@@ -23,7 +23,7 @@ from crosscheck.library.recipe import ReferenceRecipe, ReferenceRoute
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import RunRecord
 from crosscheck.running.plan import MAIN, plan
-from crosscheck.running.scheduler import Limits
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import Listener, run_planned
 from flexmb.run.channels import family, magnitude
 from flexmb.typing import Real
@@ -57,7 +57,13 @@ class RouteSignals:
 
 
 def run_routes(
-    case: Case, recipe: ReferenceRecipe, times: Real, provider: str, limits: Limits, listener: Listener
+    case: Case,
+    recipe: ReferenceRecipe,
+    times: Real,
+    provider: str,
+    limits: Limits,
+    scheduler: Scheduler,
+    listener: Listener,
 ) -> list[RouteSignals]:
     """The signals of every route of the recipe at `times` (T,); CaseError where a route gives none.
 
@@ -68,7 +74,7 @@ def run_routes(
         for place, route in enumerate(recipe.routes)
         if route.exact
     }
-    results = _engine_results(case, recipe, times, provider, limits, listener)
+    results = _engine_results(case, recipe, times, provider, limits, scheduler, listener)
     for place, route in enumerate(recipe.routes):
         if route.engine:
             found[place] = _of_engine(case, results[_name(place)])
@@ -81,7 +87,13 @@ def _name(place: int) -> str:
 
 
 def _engine_results(
-    case: Case, recipe: ReferenceRecipe, times: Real, provider: str, limits: Limits, listener: Listener
+    case: Case,
+    recipe: ReferenceRecipe,
+    times: Real,
+    provider: str,
+    limits: Limits,
+    scheduler: Scheduler,
+    listener: Listener,
 ) -> dict[str, Result]:
     """The results of all routes that are engines, by name, each run as a variant of its own."""
     variants = tuple(
@@ -101,7 +113,7 @@ def _engine_results(
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
         planned = plan(replace(case, run=run), (), provider, limits.time_s)
-        run_planned([planned], (), records, limits=limits, listener=listener)
+        run_planned([planned], (), records, limits=limits, scheduler=scheduler, listener=listener)
         (results,) = collect(read(records)).cases
     return {each.name: results.get(each.name, each.engines[0], MAIN) for each in variants}
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from crosscheck.judging.outcome import Absence, SessionOutcome
+from crosscheck.judging.applicable import Inapplicable
+from crosscheck.judging.outcome import NO_REFERENCE, Absence, SessionOutcome
 from crosscheck.judging.results import CaseResults
 from crosscheck.library.case import Provenance
 from crosscheck.report.mutations import CaseScore
@@ -36,6 +37,8 @@ class CaseView:
     conservation: Block | None
     controls: Block | None
     absences: list[Absence]
+    inapplicable: list[Inapplicable]
+    unreferenced: str
     timings: list[dict[str, Any]]
     mutation: CaseScore | None
 
@@ -52,12 +55,14 @@ def case_view(case: CaseResults, outcome: SessionOutcome, place: CasePlace, muta
         summary=_first_paragraph(record.readme),
         provenance=record.provenance,
         variants=[_variant_view(case, variant) for variant in record.run.variants],
-        ok=bool(verdicts) and all(verdict.ok for verdict in verdicts) and not lost,
+        ok=record.case not in outcome.idle and all(verdict.ok for verdict in verdicts) and not lost,
         whole=summary_cell(verdicts),
         comparisons=comparison_blocks(verdicts),
         conservation=conservation_block(verdicts),
         controls=control_block(verdicts),
         absences=[absence for absence in outcome.absences if absence.case == record.case],
+        inapplicable=[each for each in outcome.inapplicable if each.case == record.case],
+        unreferenced=f"It {NO_REFERENCE.format(record.case)}" if record.case in outcome.unreferenced else "",
         timings=_timings(case),
         mutation=mutation,
     )

@@ -11,7 +11,7 @@ import msgspec
 
 from crosscheck.engines.registry import BUILT_IN
 from crosscheck.judging.figures import recordable
-from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from flexmb.output.printable import printable
 
@@ -27,7 +27,7 @@ def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
 
 
 def write_summary(outcome: SessionOutcome, file: Path) -> None:
-    """summary.md: headline, counts by case, what is not as expected, what did not run."""
+    """summary.md: headline, counts by case, what is not as expected, what did not run, what is not applicable."""
     lines = [f"# {'✅' if outcome.ok else '❌'} {_flat(outcome.headline)}", ""]
     lines += [f"| case | verdicts | as expected | {' | '.join(STATUSES)} |"]
     lines += ["|---" * (3 + len(STATUSES)) + "|"]
@@ -49,6 +49,13 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         for each in outcome.absences:
             what = _flat(f"{each.case}, {each.variant}, {each.engine}{_role(each.role)}: {each.reason}")
             lines.append(f"- **{each.status}** {what}")
+    if outcome.inapplicable:
+        lines += ["", "## Not applicable", ""]
+        for apart in outcome.inapplicable:
+            lines.append(f"- {_flat(f'{apart.case}, {apart.where}, {apart.engine}: {apart.reason}')}")
+    if outcome.unreferenced:
+        lines += ["", "## No stored reference", ""]
+        lines += [f"- {_flat(f'{case} {NO_REFERENCE.format(case)}')}" for case in outcome.unreferenced]
     if outcome.broken:
         lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
     file.write_text("\n".join(lines) + "\n", encoding="utf-8")
@@ -59,7 +66,9 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
 
     Verdicts that need a lost run are skipped, because the failing test of that run stands for them.
 
-    A verdict that is worse than recorded says so in its output, and fails if the session is strict.
+    A verdict that is worse than recorded says so in its output, and fails if the session is strict. What is not
+    applicable is skipped, and so is a reference that was never made, unless the session is strict. An engine that was
+    compared in nothing fails a test of its own.
     """
     suites = ElementTree.Element("testsuites", name="crosscheck")
     for case, verdicts in outcome.verdicts.items():
@@ -71,8 +80,9 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
             name = f"{each.variant} by {each.engine}{_role(each.role)} ran"
             test = ElementTree.SubElement(suite, "testcase", classname=case, name=name)
             ElementTree.SubElement(test, "failure", type=each.status, message=each.reason)
-        suite.set("tests", str(len(tests) + len(missing)))
-        suite.set("failures", str(tests.count("failure") + len(missing)))
+        tests += ["failure"] * len(missing) + _not_judged(suite, case, outcome)
+        suite.set("tests", str(len(tests)))
+        suite.set("failures", str(tests.count("failure")))
         suite.set("skipped", str(tests.count("skipped")))
     if outcome.broken:
         count = str(len(outcome.broken))
@@ -80,6 +90,10 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
         for line in outcome.broken:
             test = ElementTree.SubElement(suite, "testcase", classname="records", name="the line is a record")
             ElementTree.SubElement(test, "failure", type="broken", message=line)
+    for engine in outcome.uncompared if outcome.all else ():
+        suite = ElementTree.SubElement(suites, "testsuite", name=engine, tests="1", failures="1")
+        test = ElementTree.SubElement(suite, "testcase", classname=engine, name="it was compared in something")
+        ElementTree.SubElement(test, "failure", type="nothing", message="it was asked for and compared in nothing")
     if not outcome.all:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
         test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
@@ -87,6 +101,22 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
     for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
         element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
     ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
+
+
+def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
+    """Tests for what is not applicable in a case, and for a reference that was never made; what they count as."""
+    found = []
+    for each in outcome.inapplicable:
+        if each.case == case:
+            test = ElementTree.SubElement(suite, "testcase", classname=case, name=f"{each.where} by {each.engine}")
+            ElementTree.SubElement(test, "skipped", message=f"not applicable: {each.reason}")
+            found.append("skipped")
+    if case in outcome.unreferenced:
+        test = ElementTree.SubElement(suite, "testcase", classname=case, name="it has a stored reference")
+        kind = "failure" if outcome.strict else "skipped"
+        ElementTree.SubElement(test, kind, message=f"{case} {NO_REFERENCE.format(case)}")
+        found.append(kind)
+    return found
 
 
 def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:

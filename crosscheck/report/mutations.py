@@ -25,9 +25,13 @@ class ScoredMutation(msgspec.Struct, frozen=True, kw_only=True):
 
 
 class CaseScore(msgspec.Struct, frozen=True, kw_only=True):
-    """The part of the applicable mutations that a case noticed (None where none applies), and each of them."""
+    """The part of the applicable mutations that a case noticed, and its stored reference alone, and each of them.
+
+    None where none applies, and where there is no reference to judge by.
+    """
 
     score: float | None
+    by_reference: float | None = None
     mutations: tuple[ScoredMutation, ...] = ()
 
 
@@ -38,12 +42,64 @@ class Scores(msgspec.Struct, frozen=True, kw_only=True):
     error: str = ""
 
 
+class _Shown(msgspec.Struct):
+    """What one channel said of a mutant, as the file has it."""
+
+    status: str
+
+
+class _Mutant(msgspec.Struct):
+    mutation: str
+    target: str
+    outcome: str
+    reason: str
+    channels: dict[str, _Shown]
+
+
+class _PassedOver(msgspec.Struct):
+    mutation: str
+    target: str
+    reason: str
+
+
+class _Case(msgspec.Struct):
+    """A case in the file; `docs/mutations.md` explains every key."""
+
+    case: str
+    score: float | None
+    mutants: tuple[_Mutant, ...]
+    passed_over: tuple[_PassedOver, ...]
+    score_by_reference: float | None = None
+
+
+class _File(msgspec.Struct):
+    cases: tuple[_Case, ...]
+
+
 def read_scores(out: Path) -> Scores:
     """The scores in a folder; none where there is no file, and the reason where it cannot be read."""
     file = out / FILE
     if not file.is_file():
         return Scores()
     try:
-        return msgspec.json.decode(file.read_bytes(), type=Scores)
+        found = msgspec.json.decode(file.read_bytes(), type=_File)
     except (ValueError, OSError) as error:
         return Scores(error=f"{FILE} cannot be read: {error}")
+    return Scores(cases={each.case: _score(each) for each in found.cases})
+
+
+def _score(case: _Case) -> CaseScore:
+    mutations = [_scored(each) for each in case.mutants]
+    mutations += [ScoredMutation(mutation=p.mutation, target=p.target, reason=p.reason) for p in case.passed_over]
+    return CaseScore(score=case.score, by_reference=case.score_by_reference, mutations=tuple(mutations))
+
+
+def _scored(mutant: _Mutant) -> ScoredMutation:
+    judged = mutant.outcome in ("noticed", "missed")
+    return ScoredMutation(
+        mutation=mutant.mutation,
+        target=mutant.target,
+        noticed=mutant.outcome == "noticed" if judged else None,
+        channels={name: each.status == "differ" for name, each in mutant.channels.items()},
+        reason=mutant.reason if judged else f"{mutant.outcome}: {mutant.reason}",
+    )

@@ -9,7 +9,7 @@ from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Session
 from crosscheck.judging.verdict import Verdict
 from crosscheck.report.places import CasePlace
-from crosscheck.report.views import VerdictCell, anchor, summary_cell
+from crosscheck.report.views import INAPPLICABLE, VerdictCell, anchor, summary_cell
 
 
 @dataclass(frozen=True)
@@ -47,11 +47,12 @@ class Unexpected:
 
 
 def matrix(session: Session, outcome: SessionOutcome, places: Mapping[str, CasePlace]) -> Matrix:
-    """What every case found with every engine; cases that are not as expected come first."""
+    """What every case found with every engine; not as expected first, nothing to judge last."""
     everything = [verdict for verdict in outcome.all if verdict.kind == "comparison"]
     engines = list(dict.fromkeys(engine for verdict in everything for _, engine in verdict.sides))
+    engines += [engine for engine in outcome.never_applicable if engine not in engines]
     rows = [_row(case, outcome, engines, places[case.case.case].link()) for case in session.cases]
-    rows.sort(key=lambda row: row.look != "bad")
+    rows.sort(key=lambda row: (row.look != "bad", not row.verdicts))
     return Matrix((*engines, "Conservation", "Negative controls"), tuple(rows))
 
 
@@ -77,9 +78,9 @@ def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: s
     verdicts = outcome.verdicts[name]
     lost = any(absence.case == name for absence in outcome.lost)
     whole = summary_cell(verdicts)
-    look = "bad" if lost or not verdicts else whole.look
-    groups = [[each for each in verdicts if each.kind == "comparison" and _takes_part(each, key)] for key in engines]
-    groups += [[each for each in verdicts if each.kind == kind] for kind in ("conservation", "control")]
+    look = "bad" if lost or name in outcome.idle else whole.look
+    cells = [_engine_cell(name, engine, outcome) for engine in engines]
+    cells += [summary_cell([each for each in verdicts if each.kind == kind]) for kind in ("conservation", "control")]
     return CaseRow(
         name=name,
         title=run.title,
@@ -88,8 +89,16 @@ def _row(case: CaseResults, outcome: SessionOutcome, engines: list[str], link: s
         status="worse" if any(each.ok and each.worse for each in verdicts) and look != "bad" else look,
         verdicts=len(verdicts),
         words=" ".join((name, run.title, *run.tags)).lower(),
-        cells=tuple(map(summary_cell, groups)),
+        cells=tuple(cells),
     )
+
+
+def _engine_cell(name: str, engine: str, outcome: SessionOutcome) -> VerdictCell:
+    """What an engine found in a case."""
+    if name in outcome.never_applicable.get(engine, ()):
+        return INAPPLICABLE
+    found = outcome.verdicts[name]
+    return summary_cell([each for each in found if each.kind == "comparison" and _takes_part(each, engine)])
 
 
 def _takes_part(verdict: Verdict, engine: str) -> bool:

@@ -37,6 +37,7 @@ class VerdictCell:
 
 
 EMPTY = VerdictCell("", "empty", "", "")
+INAPPLICABLE = VerdictCell("not applicable", "empty", "not applicable", "")
 
 
 @dataclass(frozen=True)

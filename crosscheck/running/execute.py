@@ -17,9 +17,9 @@ from crosscheck.engines.answers import (
     checked_ladder,
     checked_model,
     checked_run,
-    checked_support,
     checked_version,
     clean,
+    support_of,
 )
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
 from crosscheck.engines.registry import home
@@ -91,7 +91,7 @@ def describe(error: BaseException) -> str:
 
 def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit: Emit) -> None:
     version = checked_version(engine.version())
-    support = checked_support(engine.supports(scene))
+    support = support_of(engine, scene)
     blank = msgspec.structs.replace(blank, version=version, support=support.reason)
     if support.kind == "no":
         emit(msgspec.structs.replace(blank, status="refused", message=support.reason))

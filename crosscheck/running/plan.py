@@ -15,7 +15,8 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
-from crosscheck.library.selection import alone, select
+from crosscheck.library.reference import has_reference
+from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
 from crosscheck.running.draw import draw
@@ -23,7 +24,7 @@ from crosscheck.running.film import ENGINE, FRAMES, film, film_channels
 from crosscheck.running.held import held_reference
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import SceneWarning, check_and_warn, check_scene
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import finite_segments, modal_points, rigidify, substructured
 from flexmb.typing import Real
@@ -118,6 +119,9 @@ def plan(
         accepted=case.accepted,
         reference=held_reference(case, run),
         files=case_digests(case.folder),
+        asked=asked,
+        joined=joining(case.run, asked),
+        unreferenced=case.run.reference is not None and not has_reference(case.folder),
     )
     return record, jobs
 
@@ -178,9 +182,10 @@ def _attempt(
             scene = mutate(at_level(scene, variant), control.mutation, control.target)
             variant = msgspec.structs.replace(variant, level=None)
         scene = variant_scene(scene, variant, refined)
-        check_scene(scene, t_end=variant.duration_s or case.run.duration_s)
+        check = check_and_warn if control is None else check_scene  # a fault that was put in may be doubtful
+        check(scene, t_end=variant.duration_s or case.run.duration_s)
         return scene, ""
-    except (ValueError, NotImplementedError, OSError) as error:
+    except (ValueError, NotImplementedError, OSError, SceneWarning) as error:  # a warning where it is made an error
         return None, str(error)
 
 

@@ -14,6 +14,9 @@ The file is one JSON object. Every key:
   - ``verdicts``: by comparison and "channel | engine (variant) | engine (variant)": ``kind`` (left out: "comparison"),
     ``status``, ``expected`` (left out: "agree"), ``ok`` (left out: true), ``E``, ``U`` (relative; left out where there
     is none), ``goal``, ``worse`` and, where it is not as expected, ``reason``;
+  - ``not_applicable`` (left out if empty): the engine's reason by "variant | engine", or "variant | engine | channel"
+    where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
+    of a reference and no reference;
   - ``runs``: by "variant | engine | role": ``status``, ``effort``, ``wall_s`` and ``compile_s`` of the finest effort.
 
 Figures have four digits, times three.
@@ -64,12 +67,14 @@ class SealedRun(_SealedPart, frozen=True, kw_only=True):
 
 
 class SealedCase(_SealedPart, frozen=True, kw_only=True):
-    """A case: digests of its files and scenes, its verdicts by comparison, its runs."""
+    """A case: digests of its files and scenes, its verdicts by comparison, its runs, what is not applicable in it."""
 
     files: dict[str, str]
     scenes: dict[str, str]
     verdicts: dict[str, dict[str, SealedVerdict]]
     runs: dict[str, SealedRun]
+    not_applicable: dict[str, str] = {}
+    unreferenced: bool = False
 
 
 class Origin(_SealedPart, frozen=True, kw_only=True):
@@ -121,13 +126,14 @@ def results_of(session: Session, outcome: SessionOutcome, records: Path) -> Seal
         made=made,
         records=file_digest(records),
         broken=len(outcome.broken),
-        cases={case.case.case: _case(case, outcome.verdicts[case.case.case]) for case in session.cases},
+        cases={case.case.case: _case(case, outcome) for case in session.cases},
     )
 
 
-def _case(case: CaseResults, verdicts: list[Verdict]) -> SealedCase:
+def _case(case: CaseResults, outcome: SessionOutcome) -> SealedCase:
+    name = case.case.case
     judged: dict[str, dict[str, SealedVerdict]] = {}
-    for verdict in verdicts:
+    for verdict in outcome.verdicts[name]:
         judged.setdefault(verdict.comparison, {})[key_of(verdict)] = _verdict(verdict)
     mains = {key: result for key, result in case.results.items() if result.runs}
     return SealedCase(
@@ -135,6 +141,12 @@ def _case(case: CaseResults, verdicts: list[Verdict]) -> SealedCase:
         scenes={variant: result.finest.scene for (variant, _, role), result in mains.items() if role == "main"},
         verdicts=judged,
         runs={" | ".join(key): _run(result) for key, result in case.results.items()},
+        not_applicable={
+            " | ".join(filter(None, (each.variant, each.engine, each.channel))): each.reason
+            for each in outcome.inapplicable
+            if each.case == name
+        },
+        unreferenced=name in outcome.unreferenced,
     )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.dop853 import dop853
+from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.run.propagate import recursion
 from flexmb.system.tree_system import System
@@ -38,7 +39,8 @@ def flow(system: System, start: Real, time: float) -> Real:
     times, out = np.array([0.0, time]), np.empty((2, len(start)))
     counts, accuracy = np.zeros(COUNTS, np.int64), Accuracy(RTOL, ATOL, system.nq + system.nu, MAX_STEPS)
     equations = recursion(system.recursion_constants, system.recursion_workspace())
-    status, _ = dop853(equations, start.copy(), Clock(times, times[1:]), accuracy, out, counts)
+    clock, begins = Clock(times, times[1:]), memory(len(start), 0)
+    status, _ = dop853(equations, start.copy(), clock, accuracy, out, counts, begins, None)
     if status != OK:
         raise StoppedError(Status(status))
     return np.asarray(out[1])

@@ -8,7 +8,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 
-from crosscheck.biting.score import ENOUGH, CaseBite, Mutant, mean_score
+from crosscheck.biting.score import ENOUGH, CaseBite, Mutant, mean
 from crosscheck.terminal.text import words
 
 
@@ -22,21 +22,19 @@ def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = Fal
             console.print(words(f"not judged: {each.case}: {_named(mutant)}: {mutant.reason}", "red"), soft_wrap=True)
         if verbose:
             _details(console, each)
-    mean = mean_score(bites)
+    score = mean(each.score for each in bites)
     judged = not any(each.not_judged or each.score is None for each in bites)
-    good = judged and mean is not None and mean >= ENOUGH
-    shown = "none" if mean is None else f"{mean:.3f}"
-    console.print(words(f"Mean mutation score {shown}; {ENOUGH:g} is asked for.", "green" if good else "red"))
+    good = judged and score is not None and score >= ENOUGH
+    console.print(words(f"Mean mutation score {_figure(score)}; {ENOUGH:g} is asked for.", "green" if good else "red"))
+    console.print(words(f"By the stored references alone {_figure(mean(each.score_by_reference for each in bites))}."))
     return 0 if good else 1
 
 
 def _table(bites: Sequence[CaseBite]) -> Table:
-    numbers = [Column(name, justify="right") for name in ("mutants", "noticed", "score", "at goals")]
+    headings = ("noticed", "score", "at goals", "reference")
     table = Table(
         Column("case", no_wrap=True),
-        "variant",
-        *numbers,
-        "weakest channel",
+        *(Column(name, justify="right", no_wrap=True) for name in headings),
         box=SIMPLE_HEAD,
         pad_edge=False,
         header_style="bold",
@@ -44,26 +42,25 @@ def _table(bites: Sequence[CaseBite]) -> Table:
     for each in bites:
         counted = each.counted
         noticed = sum(mutant.outcome == "noticed" for mutant in counted)
-        figures = ["–" if value is None else f"{value:.2f}" for value in (each.score, each.score_at_goals)]
-        cells = (each.case, each.variant, str(len(counted)), str(noticed), *figures, _weakest(each))
-        table.add_row(*(words(cell) for cell in cells))
+        figures = map(_figure, (each.score, each.score_at_goals, each.score_by_reference))
+        table.add_row(*(words(cell) for cell in (each.case, f"{noticed}/{len(counted)}", *figures)))
     return table
 
 
-def _weakest(each: CaseBite) -> str:
-    """Of the channels that notice anything: those of quantities that the case does not have notice nothing."""
-    seeing = {name: score for name, score in each.channels.items() if score.noticed}
-    if not seeing:
-        return ""
-    name, score = min(seeing.items(), key=lambda item: item[1].noticed / item[1].mutants)
-    return f"{name} {score.noticed}/{score.mutants}"
+def _figure(score: float | None) -> str:
+    return "–" if score is None else f"{score:.3f}"
 
 
 def _details(console: Console, each: CaseBite) -> None:
+    console.print(words(f"  {each.case}: variant {each.variant}, run by {each.engine}"), soft_wrap=True)
     for name, score in each.channels.items():
         console.print(words(f"  {each.case}: {name}: {score.noticed} of {score.mutants}"), soft_wrap=True)
     for mutant in each.mutants:
-        console.print(words(f"  {each.case}: {_named(mutant)}: {mutant.outcome}: {mutant.reason}"), soft_wrap=True)
+        referred = f"; by the reference {mutant.by_reference}" if mutant.by_reference else ""
+        text = f"  {each.case}: {_named(mutant)}: {mutant.outcome}{referred}: {mutant.reason}"
+        console.print(words(text), soft_wrap=True)
+    if each.no_reference:
+        console.print(words(f"  {each.case}: by reference: nothing: {each.no_reference}"), soft_wrap=True)
     for passed in each.passed_over:
         where = f" of {passed.target}" if passed.target else ""
         console.print(words(f"  {each.case}: {passed.mutation}{where}: passed over: {passed.reason}"), soft_wrap=True)

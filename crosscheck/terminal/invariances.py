@@ -21,7 +21,7 @@ def print_invariances(console: Console, verdicts: Sequence[InvarianceVerdict], v
     """Print the verdicts; the exit code: 1 where one is neither *agree* nor *not applicable*."""
     table = Table(
         Column("case", no_wrap=True),
-        *(each.name for each in INVARIANCES),
+        *(Column(each.name, overflow="fold") for each in INVARIANCES),
         box=SIMPLE_HEAD,
         pad_edge=False,
         header_style="bold",

@@ -8,7 +8,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from crosscheck.terminal.text import marked, words
 from crosscheck.terminal.verbosity import Verbosity
@@ -31,6 +31,9 @@ def print_outcome(console: Console, outcome: SessionOutcome, verbosity: Verbosit
         shown = lines if verbosity is Verbosity.VERBOSE else lines[:LINES]
         for line in shown:
             console.print(line, soft_wrap=True)
+        for each in outcome.inapplicable if verbosity is Verbosity.VERBOSE else ():
+            text = f"{each.case}, {each.where}, {each.engine} not applicable: {each.reason}"
+            console.print(marked("○", "dim", text), soft_wrap=True)
         if len(shown) < len(lines):
             console.print(words(f"... and {len(lines) - len(shown)} lines more: --verbose shows all", "dim"))
     colour = "green" if outcome.ok else "red"
@@ -45,6 +48,8 @@ def _inventory(outcome: SessionOutcome) -> str:
     noticed, controls = outcome.controls()
     if controls:
         parts.append(f"{noticed} of {controls} deliberate faults noticed")
+    for engine, cases in outcome.never_applicable.items():
+        parts.append(f"{engine} not applicable in {len(cases)}")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 
 
@@ -59,12 +64,23 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         yield marked("✕", "red", line)
     for each in outcome.lost:
         yield marked("–", "yellow", f"{each.case}, {each.variant}, {each.engine} {each.status}: {each.reason}")
+    for engine in outcome.uncompared:
+        yield marked("✕", "red", f"{engine} was asked for and compared in nothing{_first_reason(outcome, engine)}")
     for case in outcome.idle:
         yield marked("–", "yellow", f"{case}: nothing was compared")
+    for case in outcome.unreferenced:
+        sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
+        yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
     for verdict in outcome.worse:
         yield marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}")
     for verdict in outcome.unrecorded if outcome.strict else ():
         yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
+
+
+def _first_reason(outcome: SessionOutcome, engine: str) -> str:
+    """Why an engine has nothing to compare, where it said so itself."""
+    reasons = [f": {each.case}: {each.reason}" for each in outcome.inapplicable if each.engine == engine]
+    return reasons[0] if reasons else ""
 
 
 def _place(verdict: Verdict) -> str:

@@ -17,6 +17,7 @@ import numpy as np
 from crosscheck.judging.against_reference import REFERENCE, of_stored
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import Result, collect
+from crosscheck.judging.sizes import size_of
 from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
 from crosscheck.library.case import RunFile, Variant
@@ -26,7 +27,8 @@ from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import current_reference, has_reference
 from crosscheck.records.archive import read
 from crosscheck.running.plan import MAIN, plan, sample_times, variant_scene
-from crosscheck.running.scheduler import Limits
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import PROVIDER, run_planned
 from crosscheck.verify.causes import likely_cause
 from crosscheck.verify.columns import Columns, VerifyError, read_columns, short_names
@@ -77,6 +79,7 @@ def verify_csv(
     variant: str | None = None,
     engine: str | None = None,
     provider: str = PROVIDER,
+    scheduler: Scheduler = run_jobs,
 ) -> CsvOutcome:
     """Verdicts on every channel of a CSV against the stored reference of a case, for which no engine runs.
 
@@ -86,7 +89,7 @@ def verify_csv(
     those channels are compared that the case sets a goal for and the reference has.
     """
     chosen = _variant(case, variant, stored=engine is None)
-    target = _target(case, chosen, engine, provider)
+    target = _target(case, chosen, engine, provider, scheduler)
     mine = read_columns(file, target.times)
     rough = read_columns(coarse, target.times) if coarse is not None else Columns({})
     lacking = [name for name in mine.channels if name not in rough.channels]
@@ -198,7 +201,7 @@ def _has_stored(case: Case, variant: Variant) -> bool:
     return recipe is not None and recipe.variant == variant.name and has_reference(case.folder)
 
 
-def _target(case: Case, variant: Variant, engine: str | None, provider: str) -> Target:
+def _target(case: Case, variant: Variant, engine: str | None, provider: str, scheduler: Scheduler) -> Target:
     """The stored reference, or the result of an engine that runs now."""
     if engine is None and _has_stored(case, variant):
         stored = current_reference(case)
@@ -206,12 +209,12 @@ def _target(case: Case, variant: Variant, engine: str | None, provider: str) -> 
         title = f"the stored reference of variant {variant.name}, to {stored.times[-1]:g} s"
         return Target(REFERENCE, title, stored.times, {name: signals.signal(name) for name in signals.channels})
     name = engine or "native"
-    result = _run(case, variant, name, provider)
+    result = _run(case, variant, name, provider, scheduler)
     signals_now = {channel: result.signal(channel, across=False) for channel in result.channels}
     return Target(name, f"{name}, run now on variant {variant.name}", result.times, signals_now)
 
 
-def _run(case: Case, variant: Variant, engine: str, provider: str) -> Result:
+def _run(case: Case, variant: Variant, engine: str, provider: str, scheduler: Scheduler) -> Result:
     """The engine's result on the variant, run now, in a worker: what hangs or ends its process gives no reference."""
     run = msgspec.structs.replace(
         case.run,
@@ -224,7 +227,8 @@ def _run(case: Case, variant: Variant, engine: str, provider: str) -> Result:
     )
     with TemporaryDirectory() as folder:
         records = Path(folder) / "records.jsonl"
-        run_planned([plan(replace(case, run=run), (), provider)], (), records, limits=Limits(workers=1))
+        planned = plan(replace(case, run=run), (), provider)
+        run_planned([planned], (), records, limits=Limits(workers=1), scheduler=scheduler)
         (results,) = collect(read(records)).cases
     result = results.get(variant.name, engine, MAIN)
     if result.status != "finished":
@@ -290,8 +294,7 @@ def _claimed(channel: str, target: Signal, goal: float, added: float) -> Uncerta
 
     The goal is relative to what the verdict takes for the signal's size: that of its family where the signal is zero.
     """
-    sizes = (signal_range(channel, target.values), *target.sizes)
-    size = next((size for size in sizes if size > target.uncertainty.value), 0.0)
+    size = size_of(signal_range(channel, target.values), target.sizes, target.uncertainty.value)
     allowed = goal * size * (1.0 - 1e-12) - target.uncertainty.value
     value, how = (allowed, "claimed: the case's goal") if allowed >= added else (added, INTERPOLATION)
     value = max(value, 0.0)

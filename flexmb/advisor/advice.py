@@ -17,7 +17,8 @@ from flexmb.advisor.models import BodyModel, Model, built, flexible_bodies, leve
 from flexmb.advisor.quantity import Quantity, measured, quantities, scales
 from flexmb.advisor.search import search
 from flexmb.scene.bodies import BeamBody
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.tables import arguments
 
@@ -98,6 +99,7 @@ def advise(
     the advice is the same wherever it is asked for. Raises SceneError for a scene that is wrong, ValueError for a
     quantity that is not there; where no model is adequate, the advice says so in `refusal`.
     """
+    refuse_feedback(scene, "advise")
     asked = prepare(scene, tolerance, quantity, t_end)
     advice = Advice(scene.name, t_end, tolerance, asked.bench.wanted, notes=asked.notes)
     try:
@@ -157,7 +159,7 @@ def prepare(
 ) -> Prepared:
     """Check the question, run the rigid scene, predict. Raises as `advise` does."""
     t_end, tolerance = arguments.number("t_end", t_end), arguments.number("tolerance", tolerance)
-    check_scene(scene, t_end)
+    check_and_warn(scene, t_end)
     if not 0.0 < tolerance < 1.0:
         raise ValueError(f"the tolerance is {tolerance:g}: give a fraction, such as 1e-3")
     bench = Bench(scene, t_end, quantities(quantity, scene))

@@ -30,7 +30,10 @@ from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.modal.integrals import modal_integrals
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.bodies import BeamBody, ModalBody
+from flexmb.scene.connectors import BetweenNodes
+from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Load, Marker, Scene
+from flexmb.scene.tree import GROUND, node_frame
 from flexmb.surrogate import rigidify
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -199,7 +202,7 @@ def _initial(scene: Scene, body: BeamBody | ModalBody, model: FlexibleModel) -> 
 
 
 def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real) -> list[tuple[str, Real, Real]]:
-    """Loads of hinges, wheels, point masses and node loads on the body: (node, torque, force), body axes."""
+    """Loads of hinges, wheels, point masses, connectors and at nodes on the body: (node, torque, force), body axes."""
     origin, _ = rigid.frame(body.name)
     model = eigenmodes(body)
     found = []
@@ -218,12 +221,28 @@ def _loads(rigid: RigidRun, scene: Scene, body: BeamBody | ModalBody, turn: Real
                 at = model.nodes[item.node]
                 point = origin + np.einsum("tij,j->ti", turn, at.position + at.rotation @ np.array(item.offset_m))
                 add(item.node, point, loads[item.name], -1.0)
+    for connector in scene.connectors:
+        if isinstance(connector, BetweenNodes):
+            for side, sign in (("a", -1.0), ("b", 1.0)):
+                if getattr(connector, f"body_{side}") == body.name:
+                    point = _acting_on(rigid, scene, connector)
+                    add(getattr(connector, f"node_{side}"), point, rigid.run.connectors[connector.name], sign)
     for load in scene.loads:
         if load.body == body.name:
             at = model.nodes[load.node]
             point = origin + np.einsum("tij,j->ti", turn, at.position)
             add(load.node, point, _given(load, rigid.run.t, turn @ at.rotation), 1.0)
     return found
+
+
+def _acting_on(rigid: RigidRun, scene: Scene, connector: BetweenNodes) -> Real:
+    """World positions (T,3) of frame B of a connector, about which its load is."""
+    offset = np.array(connector.position_b_m)
+    if connector.body_b == GROUND:
+        return np.tile(offset, (len(rigid.run.t), 1))
+    node = node_frame(next(each for each in scene.bodies if each.name == connector.body_b), connector.node_b)
+    origin, turn = rigid.frame(connector.body_b)
+    return origin + np.einsum("tij,j->ti", turn, np.array(node.position) + rotation_matrix(node.quaternion) @ offset)
 
 
 def _given(load: Load, times: Real, turn: Real) -> Real:

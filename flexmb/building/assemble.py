@@ -10,6 +10,7 @@ from typing import TypeVar
 import numpy as np
 
 from flexmb.building.carried import CarriedTables, moved_inertia
+from flexmb.building.connector_arrays import connector_arrays, end_ports
 from flexmb.building.inertia_arrays import group, inertia_arrays, second_order_rows, shape_rows
 from flexmb.building.links import BodyLink, Port, closure_sides, port
 from flexmb.building.models import ORIGIN
@@ -82,6 +83,7 @@ class Assembled:
     constants: a.Constants
     markers: dict[str, tuple[int, int]]  # by name
     closures: list[tuple[int, int]]  # sides A and B of the first, of the second ...
+    signals: dict[int, s.ControlSignal]  # by number among the functions, those that controllers drive
 
 
 def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_partitions: bool = False) -> Assembled:
@@ -119,6 +121,7 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         for closure in scene.closures
         for side in closure_sides(closure)
     ]
+    ends = [None if end is None else ports.add(*end) for end in end_ports(scene, chain, index)]
 
     m = whole(max((link.mode_count for link in chain), default=0))
     inertia, points, of_points = inertia_arrays(chain, m)
@@ -147,6 +150,8 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
     _who_starts(body)
     speed = _speeds(chain, wheels, numbering, functions, body)
     load = _loads(loads, [ports.number(at) for at in load_ports], functions)
+    on_bodies = [(-1 if end is None else end[0], ports.number(end)) for end in ends]
+    connected = connector_arrays(scene, on_bodies, numbering, functions.number)
     function, table = pack(functions.all())
     port = _ports(ports, port_rows)
     wheel = _wheels(wheels, [ports.number(at) for at in wheel_ports], numbering)
@@ -162,11 +167,13 @@ def assemble(scene: s.Scene, chain: list[BodyLink], numbering: Numbering, null_p
         speed=speed,
         function=function,
         table=table,
+        **connected,
         **inertia,
         **points,
     )
     markers = {name: (at[0], ports.number(at)) for name, at in marker_ports.items()}
-    return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides])
+    signals = {number: each for number, each in enumerate(functions.all()) if isinstance(each, s.ControlSignal)}
+    return Assembled(constants, markers, [(-1 if at is None else at[0], ports.number(at)) for at in sides], signals)
 
 
 def _who_starts(body: a.Record) -> None:

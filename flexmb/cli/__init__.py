@@ -10,6 +10,7 @@ from flexmb.cli.advising import advise
 from flexmb.cli.appendages import equivalence
 from flexmb.cli.interchanging import export, import_, reduce
 from flexmb.cli.linearising import campbell, linearize
+from flexmb.cli.properties import mass
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
 
@@ -45,7 +46,7 @@ def everything(
     """Has no words of its own: the application's help stands above."""
 
 
-for command in (simulate, check, equivalence, advise, linearize, campbell, export, reduce, schema):
+for command in (simulate, check, mass, equivalence, advise, linearize, campbell, export, reduce, schema):
     app.command()(command)
 app.command("import")(import_)  # as a function it cannot have this name
 

@@ -9,7 +9,7 @@ import typer
 
 from flexmb.cli.terminal import SceneFile, console, no_traceback, vector
 from flexmb.output.writing import check_folder, writing
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.files import load_scene
 
 
@@ -54,7 +54,7 @@ def equivalence(
         from flexmb.frisch.equivalence.equivalence_tables import equivalence_tables
 
         loaded = load_scene(scene)
-        check_scene(loaded)
+        check_and_warn(loaded)
         check_folder(picture.parent)
         result = compare(
             appendage_of(loaded, body, modes),

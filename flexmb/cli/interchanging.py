@@ -64,10 +64,10 @@ def export(
     """
     with no_traceback():
         from flexmb.interchange.sid import sid_of, with_sid_bodies, write_sid
-        from flexmb.scene.check import check_scene
+        from flexmb.scene.check import check_and_warn
 
         loaded = load_scene(scene)
-        check_scene(loaded)
+        check_and_warn(loaded)
         check_folder(out.parent)
         flexible = {
             each.name: each for each in with_sid_bodies(loaded).bodies if isinstance(each, BeamBody | ModalBody)

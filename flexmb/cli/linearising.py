@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.text import Text
@@ -11,7 +11,11 @@ from rich.text import Text
 from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, errors, no_traceback, range_of
 from flexmb.output.printable import printable
 from flexmb.output.writing import check_folder, writing
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
+
+if TYPE_CHECKING:
+    from flexmb.linear.linear_model import LinearModel
 
 
 def linearize(
@@ -23,6 +27,10 @@ def linearize(
         str | None, typer.Option(help="Hinge or wheel that spins steadily instead, at `--rate`.", show_default=False)
     ] = None,
     rate: Annotated[float, typer.Option(help="Its rate in rad/s.")] = 0.0,
+    cut: Annotated[
+        bool,
+        typer.Option("--truncation/--no-truncation", help="Linearise again with twice the modes of every beam."),
+    ] = True,
     export: Annotated[
         Path | None, typer.Option(help="File of matrices, names and eigenvalues: .npz or .mat.", show_default=False)
     ] = None,
@@ -39,6 +47,9 @@ def linearize(
         flexmb linearize gyrostat.toml --at initial --export gyrostat.npz
         flexmb linearize rotor.toml --spin shaft --rate 30
 
+    **Truncation** is the relative change of each eigenvalue when every beam has twice its modes: how far a frequency
+    may still fall. Motions that nothing holds are listed as rigid-body motions.
+
     **Exported** are A, B, C, D of x' = A x + B f, y = C x + D f with x = [displacements; speeds], their names and
     units, the mass matrix and the eigenvalues.
 
@@ -49,24 +60,36 @@ def linearize(
         from flexmb.linear.linear_tables import modes_table
         from flexmb.linear.linearize import linearize as linearized
         from flexmb.linear.spin import steady_spin
+        from flexmb.linear.truncation import truncation
         from flexmb.system.compile import compile
+        from flexmb.system.tree_system import System
+
+        def linear(system: System) -> LinearModel:
+            if spin is not None:
+                return steady_spin(system, spin, rate).linearize()
+            if at == "equilibrium":
+                return linearized(system, equilibrium(system), held=True)
+            return linearized(system)
 
         if at not in ("equilibrium", "initial"):
             raise ValueError(f"--at is equilibrium or initial, not {at!r}")
         loaded = load_scene(scene)
         try:
             with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
-                system = compile(loaded)
-                if spin is not None:
-                    model = steady_spin(system, spin, rate).linearize()
-                elif at == "equilibrium":
-                    model = linearized(system, equilibrium(system), held=True)
-                else:
-                    model = linearized(system)
+                model = linear(compile(loaded))
+                bends = any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies)
+                missing, note = None, ""
+                if cut and bends:
+                    try:
+                        missing = truncation(model, loaded, linear)
+                    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
+                        note = f"truncation is not known, for with twice the modes of every beam: {error}"
         except EquilibriumError as error:
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
-        console.print(modes_table(model))
+        console.print(modes_table(model, missing))
+        if note:
+            console.print(Text(printable(note), style="yellow"))
         if export is not None:
             with writing(export):
                 console.print("wrote", str(model.save(export)), soft_wrap=True)

@@ -8,20 +8,25 @@ from typing import Annotated, get_args
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, console, no_traceback
+from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
 from flexmb.integrate.integrator import Method
 from flexmb.output.writing import check_folder, folder, writing
+from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
+from flexmb.scene.schema import Scene
+from flexmb.scene.values import parsed
 
 METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
 
+SECTIONS = 21  # equally spaced, where no positions are given
+
 
 def simulate(
     scene: SceneFile,
-    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s; it starts at 0.", show_default=False)],
+    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s.", show_default=False)],
     out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
     method: Annotated[
         str,
@@ -38,6 +43,17 @@ def simulate(
         float | None,
         typer.Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False),
     ] = None,
+    from_time: Annotated[
+        float | None, typer.Option("--from-time", help="Start of the run in s; 0.", show_default=False)
+    ] = None,
+    values: Annotated[
+        list[str] | None,
+        typer.Option("--set", help="A value in the scene, `rod.mass_kg=2.0`; may be repeated.", show_default=False),
+    ] = None,
+    restart: Annotated[
+        Path | None,
+        typer.Option(help="Go on from this `restart.npz` of another run, to the last bit.", show_default=False),
+    ] = None,
     samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
     algorithm: Annotated[
         str,
@@ -51,9 +67,17 @@ def simulate(
         typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
     ] = None,
     plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
+    sections: Annotated[
+        list[str] | None,
+        typer.Option(help="Loads across a beam's sections, to sections-BEAM.csv: `BEAM`, or `BEAM:x,x,...` in m."),
+    ] = None,
+    error: Annotated[
+        bool, typer.Option("--error-estimate", help="Run again, tighter, and print the largest error of each channel.")
+    ] = False,
+    strict: Strict = False,
 ) -> None:
     """
-    Simulate a scene; write `trajectory.csv` and charts; print a summary.
+    Simulate a scene; write `trajectory.csv`, `restart.npz` and charts; print a summary.
 
     **Examples**
 
@@ -63,27 +87,36 @@ def simulate(
         flexmb simulate boom.toml --t-end 60 --method exponential --rtol 1e-6 --atol 1e-8
         flexmb simulate boom.toml --t-end 60 --algorithm frisch
         flexmb simulate boom.toml --t-end 60 --also parquet --also rrd
+        flexmb simulate boom.toml --t-end 60 --set tip.mass_kg=0.2 --set hub_hinge.rotation.angle_rad=0.1
+        flexmb simulate boom.toml --t-end 120 --restart out/restart.npz --out later
+        flexmb simulate boom.toml --t-end 60 --sections strip --sections mast:0,0.5,1 --error-estimate
 
     **Columns** of the CSV are named `channel [unit]`: coordinates, speeds, markers, hinge loads, drives, energy,
     momentum. Markers and loads are in World axes; loads act on the outboard body about the outboard hinge point.
 
     **Exit code**: 0 finished, 1 stopped before the end (what was reached is written), 2 the scene or an option is
-    wrong, 130 interrupted by Ctrl-C (what was reached is written).
+    wrong, or the scene is doubtful with `--strict`, 130 interrupted by Ctrl-C (what was reached is written).
     """
     interrupted = False
-    with no_traceback():
+    with no_traceback(strict):
         from flexmb.run.interruption import Interrupted
+        from flexmb.run.restart import Restart
+        from flexmb.run.section_table import write_sections
         from flexmb.run.simulate import simulate as run  # after the words are understood: it loads the compiler
-        from flexmb.run.summary import summary
+        from flexmb.run.summary import errors_table, summary
 
         check_folder(out)
         strange = [word for word in also or () if word not in FORMATS]
         if strange:
             raise ValueError(f"--also is one of {', '.join(FORMATS)}; got {strange[0]!r}")
+        loaded = load_scene(scene)
+        wanted = dict(_sections(loaded, word) for word in sections or ())
         with console.status(Text(f"simulating {scene} (the first run after an update compiles)")):
+            changed = load_scene(scene).with_values(dict(map(parsed, values or ())))
+            begin = None if restart is None else Restart.load(restart)
             try:
                 trajectory = run(
-                    load_scene(scene), t_end, method,  # type: ignore[arg-type]
+                    changed, t_end, method, t_start=from_time, state=begin,  # type: ignore[arg-type]
                     rtol=rtol, atol=atol, step=step, samples=samples, algorithm=algorithm,  # type: ignore[arg-type]
                     spectral_radius=spectral_radius,
                 )  # fmt: skip
@@ -98,8 +131,39 @@ def simulate(
             for path in others:
                 getattr(trajectory, FORMATS[path.suffix[1:]])(path)
             written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
-    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+            if trajectory.restart is not None:
+                written.append(out / "restart.npz")
+                trajectory.restart.save(written[-1])
+        console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+        for name, x in wanted.items():  # from here on the run itself is safe
+            loads, path = trajectory.section_loads(name, x), out / f"sections-{name}.csv"
+            with writing(path):
+                write_sections(path, trajectory.t, loads)
+            console.print("wrote", str(path), soft_wrap=True)
+        if error and not interrupted:
+            with console.status(Text("running again, tighter")):
+                estimated = errors_table(trajectory, trajectory.error_estimate())
+            console.print(estimated)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:
+    """A beam and positions along it (m), by default equally spaced ones; ValueError where there is no such beam."""
+    name, _, places = word.rpartition(":") if ":" in word else (word, "", "")
+    beams = {body.name: body for body in scene.bodies if isinstance(body, BeamBody)}
+    if word in beams:  # a name may hold a colon
+        name, places = word, ""
+    if name not in beams:
+        raise ValueError(f"--sections: there is no beam {name!r}; these are: {', '.join(beams) or 'none'}")
+    if not places:
+        return name, [beams[name].length_m * i / (SECTIONS - 1) for i in range(SECTIONS)]
+    try:
+        found = [float(place) for place in places.split(",")]
+    except ValueError:
+        raise ValueError(f"--sections is BEAM or BEAM:x,x,...; got {word!r}") from None
+    if not all(0.0 <= x <= beams[name].length_m for x in found):
+        raise ValueError(f"--sections: beam {name!r} reaches from 0 to {beams[name].length_m:g} m, not {places}")
+    return name, found

@@ -7,26 +7,30 @@ from typing import Annotated
 import typer
 from rich.text import Text
 
-from flexmb.cli.terminal import SceneFile, console, no_traceback
+from flexmb.cli.terminal import SceneFile, Strict, console, no_traceback
 from flexmb.output.printable import printable
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.files import load_scene
 from flexmb.scene.reference import json_schema
 
 End = Annotated[float | None, typer.Option("--t-end", help="Check that profiles cover the run up to here, in s.")]
 
 
-def check(scene: SceneFile, t_end: End = None) -> None:
+def check(scene: SceneFile, t_end: End = None, strict: Strict = False) -> None:
     """
     Check a scene without running it: every defect with its place and its remedy.
 
         flexmb check boom.toml --t-end 60
+        flexmb check boom.toml --strict
 
-    **Exit code**: 0 sound, 2 wrong.
+    What is doubtful is a warning, on stderr: numbers that no usual structure has, as after a slip of units. A scene
+    that means it says so under `allow`.
+
+    **Exit code**: 0 sound, 2 wrong, or with `--strict` doubtful.
     """
-    with no_traceback():
+    with no_traceback(strict):
         loaded = load_scene(scene)
-        check_scene(loaded, t_end)
+        check_and_warn(loaded, t_end)
     counts = ", ".join(
         f"{len(getattr(loaded, key))} {key.replace('_', ' ')}" for key in ("bodies", "hinges", "markers")
     )

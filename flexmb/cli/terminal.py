@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -13,7 +14,7 @@ from rich.text import Text
 
 from flexmb.output.printable import printable
 from flexmb.output.writing import in_words
-from flexmb.scene.check import SceneError
+from flexmb.scene.check import SceneError, SceneWarning
 
 EXIT_STOPPED = 1
 EXIT_USAGE = 2
@@ -23,6 +24,7 @@ console = Console(markup=False, emoji=False)  # names and paths stand in what th
 errors = Console(stderr=True, markup=False, emoji=False)
 
 SceneFile = Annotated[Path, typer.Argument(help="Scene file (TOML).", metavar="SCENE", show_default=False)]
+Strict = Annotated[bool, typer.Option("--strict", help="Warnings about the scene are errors.")]
 
 
 def vector(option: str, text: str) -> tuple[float, ...]:
@@ -51,13 +53,30 @@ def range_of(option: str, text: str) -> list[float]:
 
 
 @contextmanager
-def no_traceback() -> Iterator[None]:
-    """Errors that the user can put right are shown as messages, not as tracebacks."""
+def no_traceback(strict: bool = False) -> Iterator[None]:
+    """Warnings, and errors that the user can put right, are shown as messages on stderr, not as tracebacks.
+
+    `strict`: warnings about the scene are errors.
+    """
+    with warnings.catch_warnings():
+        warnings.showwarning = _show
+        if strict:
+            warnings.simplefilter("error", SceneWarning)
+        with _messages():
+            yield
+
+
+def _show(message: Warning | str, *_: object) -> None:
+    errors.print(Text("warning: ", style="bold yellow") + Text(printable(str(message))), soft_wrap=True)
+
+
+@contextmanager
+def _messages() -> Iterator[None]:
     try:
         yield
     except BrokenPipeError:  # whoever read the output has read enough
         raise
-    except (SceneError, NotImplementedError, ValueError, ImportError, OSError) as error:
+    except (SceneError, SceneWarning, NotImplementedError, ValueError, ImportError, OSError) as error:
         text = in_words(error) if isinstance(error, OSError) else str(error)
         errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)
         raise typer.Exit(EXIT_USAGE) from None

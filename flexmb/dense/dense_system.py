@@ -15,12 +15,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.dense.body_frames import InertiaPoints, Motions, member_frames, point_frames, points, seat_frame
+from flexmb.dense.connectors import Grip, grip, hold
 from flexmb.dense.first_order_bodies import FirstOrderBody, body_jacobian, first_order_body
 from flexmb.dense.function_jets import profile
 from flexmb.dense.hinge_frames import ball_energy, ball_torque
 from flexmb.dense.jets import MovingFrame
 from flexmb.dense.members import DenseTree, ScalarSpeed, Seat, build
 from flexmb.scene import schema as s
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.typing import Real
 
 
@@ -109,7 +111,10 @@ class DenseSystem:
         return M + sum((S[k].T @ body.M @ S[k] for k, body in now.first_order.items()), start=np.zeros_like(M))
 
     def bias(self, q: Real, u: Real, t: float = 0.0) -> Real:
-        """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes."""
+        """c (nu,) in M udot + c = tau: gyroscopic and centrifugal forces, gravity, elasticity, loads at nodes.
+
+        And of connectors between nodes.
+        """
         J, S, now = self._jacobian(q), self._body_jacobians(q), self._seen(q, u, np.zeros(self.nu))
         inertial = self._inertial(now, self._summed)
         c = np.einsum("pai,pa->i", J.linear, inertial.force) + np.einsum("pai,pa->i", J.angular, inertial.torque)
@@ -118,6 +123,10 @@ class DenseSystem:
         for name, load in self._loads(q, t).items():
             site = self._site_jacobian(f"load:{name}", q)
             c -= load.torque[0] @ site.angular[0] + load.force[0] @ site.linear[0]
+        for name, gripped in self.grips(q, u, t).items():
+            for side, wrench in (("a", gripped.on_a), ("b", gripped.on_b)):
+                site = self._site_jacobian(f"connector {side}:{name}", q)
+                c -= wrench[:3] @ site.angular[0] + wrench[3:] @ site.linear[0]
         for member in self.tree.members:
             c[member.u_modes] += member.model.stiffness @ q[member.q_modes]
             c[member.u_modes] += member.model.damping @ u[member.u_modes]
@@ -132,7 +141,20 @@ class DenseSystem:
                 tau[x.u] += profile(x.motor, t).value
         for member in self.tree.members:
             tau[member.u_hinge] += ball_torque(member.hinge, q[member.q_hinge], u[member.u_hinge])
+        for connector in self.scene.connectors:
+            if not isinstance(connector, BetweenNodes):
+                held = hold(self.scene, self.tree, connector, q, u)
+                tau[held.u] += held.load
         return tau
+
+    def grips(self, q: Real, u: Real, t: float = 0.0) -> dict[str, Grip]:
+        """What connectors between nodes do, by name."""
+        now, found = self._at(q, u), {}
+        for connector in self.scene.connectors:
+            if isinstance(connector, BetweenNodes):
+                a, b = (now.seat(*self.tree.sites[f"connector {side}:{connector.name}"]) for side in "ab")
+                found[connector.name] = grip(connector, a, b, t)
+        return found
 
     def on_profile(self, q: Real, u: Real, t: float) -> tuple[Real, Real]:
         """q and u with every prescribed coordinate at its function's value and rate."""
@@ -165,11 +187,12 @@ class DenseSystem:
     def hinge_loads(self, t: float, q: Real, u: Real, rates: Real) -> dict[str, Real]:
         """Total load (6,) [torque; force] on the outboard body about the outboard hinge point, by hinge.
 
-        Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes.
+        Newton and Euler for everything outboard of the hinge: inertia minus gravity minus loads at nodes and of
+        connectors.
         """
         q, u = self.on_profile(q, u, t)
         now = self._seen(q, u, rates)
-        inertial, loads = self._inertial(now, self._summed), self._loads(q, t)
+        inertial, loads, grips = self._inertial(now, self._summed), self._loads(q, t), self.grips(q, u, t)
         bodies = {k: Wrenches(*body.world(body.force(self._gravity))) for k, body in now.first_order.items()}
         found = {}
         for k, member in enumerate(self.tree.members):
@@ -181,6 +204,12 @@ class DenseSystem:
             for load in self.scene.loads:
                 if self.tree.index(load.body) in outboard:
                     total -= loads[load.name].about(origin, np.array([True]))
+            for name, gripped in grips.items():
+                for side, wrench in (("a", gripped.on_a), ("b", gripped.on_b)):
+                    body, seat = self.tree.sites[f"connector {side}:{name}"]
+                    if body in outboard:
+                        arm = now.seat(body, seat).position.value - origin
+                        total -= np.concatenate([wrench[:3] + np.cross(arm, wrench[3:]), wrench[3:]])
             found[member.hinge.name] = total
         return found
 
@@ -220,6 +249,10 @@ class DenseSystem:
             eta = q[member.q_modes]
             strain += 0.5 * float(eta @ member.model.stiffness @ eta)
             spring += ball_energy(member.hinge, q[member.q_hinge])
+        spring += sum(gripped.energy for gripped in self.grips(q, u).values())
+        for connector in self.scene.connectors:
+            if not isinstance(connector, BetweenNodes):
+                spring += hold(self.scene, self.tree, connector, q, u).energy
         return {
             "kinetic": kinetic + sum(body.kinetic for body in bodies),
             "strain": strain,

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.polynomial import Polynomial
 
 from flexmb.dense.jets import Jet, chain, constant, polynomial
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 
 SEPTIC = Polynomial([0.0, 0.0, 0.0, 0.0, 35.0, -84.0, 70.0, -20.0])
 
@@ -36,6 +36,8 @@ def profile(function: Function, t: float) -> Jet:
             return (growth + swing).map(lambda x: rate / duration * x)
         case Pulse(value=value, start_s=start, duration_s=duration):
             return constant(value if start <= t < start + duration else 0.0)
+        case ControlSignal():
+            return constant(0.0)  # at one state, by itself: the loop is open
         case Table(times_s=times, values=values):
             from scipy.interpolate import make_interp_spline  # slow to import, and few scenes have tables
 

@@ -17,6 +17,7 @@ from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel, FlexibleNode
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO, Quaternion, Vector
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.tree import GROUND, Coordinate, coordinates, ordered, rest_frames
 from flexmb.typing import Real
 
@@ -88,7 +89,7 @@ class DenseTree:
     members: list[Member]
     rotors: list[Rotor]
     scalars: list[ScalarSpeed]
-    sites: dict[str, tuple[int, Seat]]  # of loads ("load:<name>") and markers ("marker:<name>")
+    sites: dict[str, tuple[int, Seat]]  # "load:<name>", "marker:<name>", "connector a:<name>"
     nq: int
     nu: int
 
@@ -122,6 +123,12 @@ def build(scene: s.Scene, folder: Path | None = None) -> DenseTree:
     sites = {f"load:{x.name}": (tree.index(x.body), _seat(models[x.body], x.node)) for x in scene.loads}
     for x in scene.markers:
         sites[f"marker:{x.name}"] = tree.index(x.body), _seat(models[x.body], x.node, x.offset_m)
+    for each in scene.connectors:
+        if isinstance(each, BetweenNodes):
+            for side in "ab":
+                at, node = getattr(each, f"body_{side}"), getattr(each, f"node_{side}")
+                offset = getattr(each, f"position_{side}_m"), getattr(each, f"quaternion_{side}", IDENTITY)
+                sites[f"connector {side}:{each.name}"] = tree.index(at), _seat(models[at], node, *offset)
     return replace(tree, sites=sites)
 
 

@@ -22,9 +22,9 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.body import AT_REST
 from flexmb.motion.coordinates import load_state
-from flexmb.spatial.spatial_vector import store6, times6
+from flexmb.spatial.spatial_vector import store6, times6, vec6
 from flexmb.spatial.vector import add, mat3, matmul, store3, store9, times, vec3
-from flexmb.tables.features import WHEELS
+from flexmb.tables.features import CONNECTORS, FRICTION, HINGE_SPRINGS, WHEELS
 from flexmb.typing import Index, Real
 
 Places = dict[str, tuple[slice, tuple[int, ...]]]
@@ -44,9 +44,13 @@ class Outputs:
     wheel_loads: Real  # (W,6)
     energy: Real  # (4,) as in flexmb.jain.balance
     momentum: Real  # (6,) likewise
+    connectors: Real  # (C,6) [torque; force] of connectors between nodes, on B about B
+    hinge_forces: Real  # (S,) loads of springs, then of friction, along coordinates
 
 
-def shapes(speeds: int, markers: int, hinges: int, wheels: int) -> dict[str, tuple[int, ...]]:
+def shapes(
+    speeds: int, markers: int, hinges: int, wheels: int, connectors: int = 0, hinge_forces: int = 0
+) -> dict[str, tuple[int, ...]]:
     """Of the parts of `Outputs.every`, in their order."""
     return {
         "rates": (speeds,),
@@ -55,6 +59,8 @@ def shapes(speeds: int, markers: int, hinges: int, wheels: int) -> dict[str, tup
         "wheel_loads": (wheels, 6),
         "energy": (4,),
         "momentum": (6,),
+        "connectors": (connectors, 6),
+        "hinge_forces": (hinge_forces,),
     }
 
 
@@ -116,6 +122,22 @@ def observe_motion(t, y, c, w, out):
     _observe_motion(c, w, out)
 
 
+@kernel
+def sense_markers(t, y, c, w, out):
+    """The rows of all markers, out.markers, at y = [q, u, work] and given accelerations, out.rates.
+
+    Positions and velocities do not depend on the latter. Bodies of level ruthless are seen as markers see them.
+    """
+    load_state(t, y, c, w)
+    for j in range(out.rates.shape[0]):
+        w.speed[j].acceleration = out.rates[j]
+    velocity_sweep(c, w, True, True)
+    pose_sweep(c, w)
+    acceleration_sweep(c, w)
+    for i in range(out.marker_port.shape[0]):
+        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
 @helper
 def _observe_motion(c, w, out):
     """Needs the velocity, pose and acceleration sweeps as the equations of motion see the state.
@@ -127,12 +149,27 @@ def _observe_motion(c, w, out):
     if has(c, AT_REST):
         velocity_sweep(c, w, False, True)
     energy_and_momentum(c, w, out.energy, out.momentum)
+    if has(c, CONNECTORS):
+        for i in range(c.connector.shape[0]):
+            store6(out.connectors[i], 0, vec6(w.connector[i].load, 0))
+    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+        _observe_along_hinges(c, w, out.hinge_forces)
     if has(c, AT_REST):
         velocity_sweep(c, w, True, True)
         pose_sweep(c, w)
         acceleration_sweep(c, w)
     for i in range(out.marker_port.shape[0]):
         _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+
+
+@helper
+def _observe_along_hinges(c, w, loads):
+    """Loads of springs, then of friction, along coordinates."""
+    springs = c.hinge_spring.shape[0]
+    for i in range(springs):
+        loads[i] = w.hinge_spring[i].load
+    for i in range(c.friction.shape[0]):
+        loads[springs + i] = w.friction[i].load
 
 
 @helper

@@ -1,17 +1,21 @@
 """Entry points of Frisch's route: right-hand side of the motion, accelerations, loads."""
 
+from flexmb.connectors.between import connector_power
+from flexmb.connectors.bushings import overturned
 from flexmb.frisch.bodies import node_load
 from flexmb.frisch.constraint import constraint_loads
 from flexmb.frisch.motion import relative_motion
 from flexmb.frisch.nests import nest_sums
 from flexmb.frisch.partitions import coefficient_matrix
 from flexmb.frisch.reduction import reduce, solve
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces, load_state, speed_power, store_slope
 from flexmb.spatial.spatial_vector import dot6, shift_motion, sum6, vec6
 from flexmb.spatial.vector import vec3
-from flexmb.tables.status import OK, OUT_OF_RANGE
+from flexmb.tables.features import BUSHINGS, CONNECTORS
+from flexmb.tables.status import CONNECTOR_OVERTURNED, OK, OUT_OF_RANGE
 
 
 @kernel
@@ -55,6 +59,11 @@ def _solution(t, y, c, w):
             w.fault[0] = k
             return OUT_OF_RANGE
     _equations(c, w)
+    if has(c, BUSHINGS):
+        i = overturned(c, w)
+        if i >= 0:
+            w.fault[0] = i
+            return CONNECTOR_OVERTURNED
     return solve(c, w)
 
 
@@ -85,4 +94,6 @@ def _power(c, w):
         for i in range(c.body[k].load_start, c.body[k].load_stop):
             port, F = node_load(c, w, i)
             total += dot6(F, sum6(shift_motion(V, vec3(w.port[port].r, 0)), vec6(w.port[port].v, 0)))
+    if has(c, CONNECTORS):
+        total += connector_power(w)
     return total

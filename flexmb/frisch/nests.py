@@ -5,8 +5,11 @@ further out, shifted along beta. So the work is of order N, where the print's do
 """
 
 from flexmb.frisch.bodies import body_terms, load_terms, steiner, store_sym6, wheel_terms
+from flexmb.frisch.connected import connector_terms
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.spatial.vector import add, add3, axpy, cross, store3, sym6, sym_add, sym_axpy, vec3
+from flexmb.tables.features import CONNECTORS
 
 
 @helper
@@ -18,6 +21,8 @@ def nest_sums(c, w):
             wheel_terms(c, w, k, i)
         for i in range(c.body[k].load_start, c.body[k].load_stop):
             load_terms(c, w, k, i)
+    if has(c, CONNECTORS):
+        connector_terms(c, w)
     for k in range(c.body.shape[0] - 1, -1, -1):
         if c.body[k].parent >= 0:
             _join_nest(w, k, c.body[k].parent)

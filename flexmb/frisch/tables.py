@@ -13,6 +13,7 @@ import numpy as np
 from flexmb.jit.bundle import bundle
 from flexmb.jit.strips import strip_zeros
 from flexmb.tables.arrays import SPEED_STATE, Constants
+from flexmb.tables.workspaces import connector_states
 from flexmb.typing import Index, Real, Record
 
 _F, _I = np.float64, np.int64
@@ -115,6 +116,9 @@ class NestedWorkspace:
     rate: Real  # (nq,)
     function: Real  # (F,3)
     speed: Record  # (nu,) SPEED_STATE
+    connector: Record  # (C,) CONNECTOR_STATE
+    hinge_spring: Record  # ALONG_HINGE_STATE
+    friction: Record  # ALONG_HINGE_STATE
     nest: Record  # (N,) NEST
     modal: Real  # (N,m) modal coordinates as the level sees them
     modal_rate: Real  # (N,m)
@@ -151,6 +155,7 @@ def workspace(c: NestedConstants, nq: int) -> NestedWorkspace:
         rate=np.zeros(nq),
         function=np.zeros((len(c.function), 3)),
         speed=np.zeros(nu, SPEED_STATE),
+        **connector_states(c),
         nest=np.zeros(n, NEST),
         modal=strip_zeros((n, m)),
         modal_rate=strip_zeros((n, m)),

@@ -25,6 +25,7 @@ HALVED = 0.5  # change of step where an iteration did not converge
 # A fixed step may exceed the one asked for by this fraction: 0.1 s in steps of 0.01 s are 10, whatever 0.1/0.01 rounds
 # to.
 _STEP_SLACK = 1e-9
+_ADVANCING = 1e3  # roundings of time: a first step is not shorter, whatever is guessed from a state at rest
 
 # Entries of `counts`: evaluations, steps, samples stored, Jacobians, and factorisations or exponentials of a matrix.
 # STOP is not a count: another thread sets it during a run, and the run then ends.
@@ -100,14 +101,6 @@ def step_factor(error, error_before, exponent, rejected_before):
 
 
 @helper
-def begin(problem, t, y, out, counts):
-    """Put the initial state on its manifold; it is the first sample."""
-    problem.project(t, y, problem.constants)
-    copy(y, out[0])
-    counts[SAMPLES] = 1
-
-
-@helper
 def initial_step(problem, segment, y, dy, accuracy, exponent, counts):
     """First step size: Hairer, Norsett, Wanner I, II.4. `dy` = f(t, y) at the segment's start."""
     trial, slope = np.empty(y.shape[0]), np.empty(y.shape[0])
@@ -124,7 +117,8 @@ def initial_step(problem, segment, y, dy, accuracy, exponent, counts):
         slope[i] -= dy[i]
     d2 = scaled_norm(slope, y, accuracy) / h0
     h1 = max(1e-6, h0 * 1e-3) if d1 <= 1e-15 and d2 <= 1e-15 else (0.01 / max(d1, d2)) ** (1.0 / exponent)
-    return min(100.0 * h0, h1, span)
+    shortest = _ADVANCING * (np.nextafter(segment.start, math.inf) - segment.start)
+    return min(max(min(100.0 * h0, h1), shortest), span)
 
 
 @helper

@@ -19,7 +19,6 @@ from flexmb.integrate.control import (
     SAMPLES,
     Interval,
     all_finite,
-    begin,
     copy,
     derivative,
     enter_segment,
@@ -33,6 +32,8 @@ from flexmb.integrate.control import (
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -154,6 +155,53 @@ def store_samples(problem, step, y, s, times, out, counts):
 
 
 @helper
+def fraction_at(y, f, entry, level, side):
+    """The fraction of the step at which the interpolant has come to a level that it crosses, to rounding."""
+    low, high = 0.0, 1.0
+    while True:
+        x = 0.5 * (low + high)
+        if x <= low or x >= high:
+            return high
+        value = 0.0
+        for row in range(6, -1, -1):
+            value = (value + f[row, entry]) * (x if row % 2 == 0 else 1.0 - x)
+        if crosses(side, (y[entry] - level) + value, 0):
+            high = x
+        else:
+            low = x
+
+
+@helper
+def end_at_crossing(problem, step, y, s, times, out, counts, watch):
+    """y, and the samples before it, at the first level that the interpolant of the step crosses.
+
+    Returns (CROSSED, the time), or the status of a stage that fails.
+    """
+    h, trial = step.end - step.start, np.empty(y.shape[0])
+    status = interpolant(problem, step, y, s, trial, counts)
+    if status != OK:
+        return status, step.start
+    x, first = 2.0, 0
+    for i in range(watch.entry.shape[0]):
+        if crosses_one(watch, i, s.y_new):
+            found = fraction_at(y, s.f, watch.entry[i], watch.level[i], watch.side[i])
+            if found < x:
+                x, first = found, i
+    t = min(step.start + x * h, step.end)
+    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
+        sample = counts[SAMPLES]
+        interpolate(y, s.f, (times[sample] - step.start) / h, out[sample])
+        problem.project(times[sample], out[sample], problem.constants)
+        counts[SAMPLES] = sample + 1
+    interpolate(y, s.f, x, trial)
+    problem.project(t, trial, problem.constants)
+    note(watch, first, trial)
+    copy(trial, y)
+    counts[ACCEPTED] += 1
+    return CROSSED, t
+
+
+@helper
 def attempt(problem, step, y, s, accuracy, counts):
     """One trial step: s.y_new, projected, and its slope s.k[END]. Returns (status, error norm)."""
     h = step.end - step.start
@@ -168,7 +216,7 @@ def attempt(problem, step, y, s, accuracy, counts):
 
 
 @kernel
-def dop853(problem, y, clock, accuracy, out, counts):
+def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`.
 
     A step whose right-hand side fails is retried shorter: it may only have reached too far. When the step gets too
@@ -177,17 +225,21 @@ def dop853(problem, y, clock, accuracy, out, counts):
     times, segment_ends = clock
     n = y.shape[0]
     s = ExplicitStages(np.empty((STAGES_DENSE, n)), np.empty(n), np.empty((7, n)))
-    t, h, error_before = times[0], 0.0, CALM
-    begin(problem, t, y, out, counts)
-    for end in segment_ends:
+    t = begin(problem, times, y, s.y_new, memory, out, counts)
+    h, error_before, kept = memory.numbers[STEP], memory.numbers[ERROR_BEFORE], False
+    rejected, trouble = memory.numbers[RETRIED] != 0.0, STEP_TOO_SMALL
+    for i in range(segment_ends.shape[0]):
+        end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
         last = np.nextafter(end, t)
         segment = Interval(t, end, last)
         status, h = enter_segment(problem, segment, y, s.k[0], h, accuracy, ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
-        rejected, trouble = False, STEP_TOO_SMALL
         while t < end:
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
+            if not kept and (status != OK or (is_last and t_new == end)):
+                keep(memory, t, y, h, error_before, rejected, counts)
+                kept = True
             if status != OK:
                 return status, t
             step, length = Interval(t, t_new, last), t_new - t
@@ -201,6 +253,8 @@ def dop853(problem, y, clock, accuracy, out, counts):
                     store_leapt(step, y, s.k[0], s.y_new, s.k[END], times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
+                if watch is not None and is_crossed(watch, s.y_new):
+                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:
                     return status, t
@@ -214,6 +268,9 @@ def dop853(problem, y, clock, accuracy, out, counts):
                 h = length * (shorter(error, ERROR_EXPONENT) if status == OK else retreat(status))
                 counts[REJECTED] += 1
             rejected = not accepted
+        rejected, trouble = False, STEP_TOO_SMALL
+    if not kept:
+        keep(memory, t, y, h, error_before, rejected, counts)
     return OK, t
 
 

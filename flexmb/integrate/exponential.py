@@ -20,12 +20,10 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
-    CALM,
     FACTORISATIONS,
     REJECTED,
     SAMPLES,
     Interval,
-    begin,
     copy,
     derivative,
     enter_segment,
@@ -40,6 +38,8 @@ from flexmb.integrate.control import (
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
+from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -186,21 +186,56 @@ def attempt(problem, step, y, s, accuracy, counts):
 
 
 @helper
+def state_at(problem, step, y, s, t, result):
+    """The state inside a step, by the exact flow under the same polynomial, projected."""
+    theta = (t - step.start) / (step.end - step.start)
+    at_fraction(s.flow, s.v, s.X, s.x, theta, result, s.term, s.product)
+    for i in range(y.shape[0]):
+        result[i] = y[i] + s.flow.scale[i] * result[i]
+    problem.project(t, result, problem.constants)
+
+
+@helper
 def store_samples(problem, step, y, s, times, out, counts):
     """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
     """
-    sample, flow = counts[SAMPLES], s.flow
+    sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            theta = (times[sample] - step.start) / (step.end - step.start)
-            at_fraction(flow, s.v, s.X, s.x, theta, out[sample], s.term, s.product)
-            for i in range(y.shape[0]):
-                out[sample, i] = y[i] + flow.scale[i] * out[sample, i]
-            problem.project(times[sample], out[sample], problem.constants)
+            state_at(problem, step, y, s, times[sample], out[sample])
         sample += 1
     counts[SAMPLES] = sample
+
+
+@helper
+def end_at_crossing(problem, step, y, s, times, out, counts, watch):
+    """y, and the samples before it, at the first level that the flow of the step crosses; (CROSSED, the time)."""
+    trial, t, first = np.empty(y.shape[0]), step.end, 0
+    for i in range(watch.entry.shape[0]):
+        if crosses_one(watch, i, s.y_new):
+            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
+            while low < 0.5 * (low + high) < high:
+                middle = 0.5 * (low + high)
+                state_at(problem, step, y, s, middle, trial)
+                if crosses(watch.side[i], trial[entry] - level, 0):
+                    high = middle
+                else:
+                    low = middle
+            if high <= t:
+                t, first = high, i
+    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
+        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
+        counts[SAMPLES] += 1
+    if t < step.end:
+        state_at(problem, step, y, s, t, trial)
+    else:
+        copy(s.y_new, trial)
+    note(watch, first, trial)
+    copy(trial, y)
+    counts[ACCEPTED] += 1
+    return CROSSED, t
 
 
 @helper
@@ -218,7 +253,7 @@ def scratch(n):
 
 
 @kernel
-def exponential(problem, y, clock, accuracy, out, counts):
+def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
     The retreat from a failing right-hand side is that of `dop853`. Where the iteration does not converge, the step is
@@ -226,23 +261,29 @@ def exponential(problem, y, clock, accuracy, out, counts):
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
-    t, h, error_before = times[0], 0.0, CALM
-    begin(problem, t, y, out, counts)
-    for end in segment_ends:
+    t = begin(problem, times, y, s.y_new, memory, out, counts)
+    h, error_before, kept = memory.numbers[STEP], memory.numbers[ERROR_BEFORE], False
+    rejected, linear, trouble = memory.numbers[RETRIED] != 0.0, False, STEP_TOO_SMALL
+    for i in range(segment_ends.shape[0]):
+        end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
         last = np.nextafter(end, t)
         status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
-        rejected, trouble = False, STEP_TOO_SMALL
+        linear = False
         while t < end:
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
+            if not kept and (status != OK or (is_last and t_new == end)):
+                keep(memory, t, y, h, error_before, rejected, counts)
+                kept = True
             if status != OK:
                 return status, t
             step, length = Interval(t, t_new, last), t_new - t
-            if not rejected:
+            if not linear:
                 status = linearisation(problem, t, y, s.J, counts)
                 if status != OK:
                     return status, t
+                linear = True
             status, error = NOT_CONVERGED, math.inf
             counts[FACTORISATIONS] += 1
             if prepare(s.flow, s.J, length):
@@ -250,6 +291,8 @@ def exponential(problem, y, clock, accuracy, out, counts):
             trouble = reason(status)
             accepted = status == OK and error < 1.0
             if accepted:
+                if watch is not None and is_crossed(watch, s.y_new):
+                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 store_samples(problem, step, y, s, times, out, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)
@@ -260,7 +303,10 @@ def exponential(problem, y, clock, accuracy, out, counts):
             else:
                 h = length * (shorter(error, _ERROR_EXPONENT) if status == OK else retreat(status))
                 counts[REJECTED] += 1
-            rejected = not accepted
+            rejected, linear = not accepted, not accepted
+        rejected, trouble = False, STEP_TOO_SMALL
+    if not kept:
+        keep(memory, t, y, h, error_before, rejected, counts)
     return OK, t
 
 

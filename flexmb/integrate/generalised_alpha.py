@@ -22,7 +22,6 @@ from flexmb.integrate.control import (
     SAMPLES,
     Interval,
     all_finite,
-    begin,
     copy,
     derivative,
     permitted,
@@ -32,6 +31,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.memory import DONE, FACTORED, FRESH, STRETCH, TAKEN_UP, begin, keep_place
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
@@ -164,11 +164,43 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
             return NOT_CONVERGED, 0.0
         status, iterations = newton(problem, min(step.end, step.last), y, h, s, accuracy, counts)
         return status, h
-    return status, h if iterations < _WORN else 0.0
+    return status, h_factored if iterations < _WORN else 0.0
+
+
+@helper
+def keep_slopes(memory, s, at_start, h_factored):
+    """What only this method knows before a step: Jacobian, slopes, a."""
+    n, nu = s.f.shape[0], s.a.shape[0]
+    memory.numbers[FACTORED], memory.numbers[FRESH] = h_factored, 1.0 if at_start else 0.0
+    for i in range(n):
+        copy(s.J[i], memory.rows[i])
+    copy(s.f, memory.rows[n])
+    for j in range(nu):
+        memory.rows[n + 1, j], memory.rows[n + 2, j] = s.rate[j], s.a[j]
+
+
+@helper
+def recall(memory, s, accuracy, counts):
+    """The same of a run that is taken up, with factors made again; of another one that there is nothing.
+
+    Returns (whether slopes are to be found at the start, step of the factors).
+    """
+    numbers, n, nu = memory.numbers, s.f.shape[0], s.a.shape[0]
+    if numbers[TAKEN_UP] == 0.0:
+        return True, 0.0
+    for i in range(n):
+        copy(memory.rows[i], s.J[i])
+    copy(memory.rows[n], s.f)
+    for j in range(nu):
+        s.rate[j], s.a[j] = memory.rows[n + 1, j], memory.rows[n + 2, j]
+    h_factored = numbers[FACTORED]
+    if h_factored > 0.0:
+        factorise(s, h_factored, accuracy, counts)
+    return numbers[FRESH] != 0.0, h_factored
 
 
 @kernel
-def generalised_alpha(problem, y, clock, accuracy, out, counts):
+def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y = [q, u, quadratures] as told by `Integrator`; problem: a `StiffProblem`.
 
     Steps are those of `rk4`. Newton's method stops where its correction is below rtol |y| + atol over the controlled
@@ -182,17 +214,18 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts):
         np.empty((n, n)), np.empty((nu, nu)), np.empty(nu, np.int64), np.empty(nu), np.empty(nu), np.empty(nu),
         np.empty(nu), np.empty(nu), np.empty(nu), np.empty(n), np.empty(n), np.empty(n), np.empty(n),
     )  # fmt: skip
-    t = times[0]
-    begin(problem, t, y, out, counts)
+    t = begin(problem, times, y, s.y_new, memory, out, counts)
     copy(y, s.y_new)
-    segment, at_start, h_factored = 0, True, 0.0
-    for sample in range(1, times.shape[0]):
+    at_start, h_factored = recall(memory, s, accuracy, counts)
+    start, done, segment = memory.numbers[STRETCH], int(memory.numbers[DONE]), 0
+    for sample in range(counts[SAMPLES], times.shape[0]):
         while t < times[sample]:
-            start = t
             end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
-            for k in range(steps):
+            for k in range(done, steps):
                 status = permitted(accuracy.max_steps, counts)
                 if status != OK:
+                    keep_place(memory, t, y, start, k)
+                    keep_slopes(memory, s, at_start, h_factored)
                     return status, t
                 if at_start:
                     status = derivative(problem, t, y, s.f, counts)
@@ -215,14 +248,18 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts):
                 copy(s.a_new, s.a)
                 copy(s.f_new, s.f)
                 counts[ACCEPTED] += 1
+            start, done = t, 0
             if t == segment_ends[segment]:
                 segment, at_start = segment + 1, True
         copy(y, out[sample])
         counts[SAMPLES] = sample + 1
+    keep_place(memory, t, y, t, 0)
+    keep_slopes(memory, s, at_start, h_factored)
     return OK, t
 
 
 INTEGRATOR = Integrator(
-    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, damps=True, algebra=(2.0 / 3.0, 2.0),
+    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True, pauses=False,
+    damps=True, algebra=(2.0 / 3.0, 2.0),
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

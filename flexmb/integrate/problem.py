@@ -54,8 +54,9 @@ class StiffProblem(NamedTuple):
 class Clock(NamedTuple):
     """times (T,) s of the output, increasing, the first is the start of the run and the last is its end.
 
-    segment_ends (S,) s, increasing, the last is times[-1]: no step crosses one, and the stages before one see the
-    right-hand side's limit from the left.
+    segment_ends (S,) s, increasing: no step crosses one, and the stages before one see the right-hand side's limit from
+    the left. The last is the end of the run: times[-1], once more where a segment ends there in any longer run too; for
+    methods of equal steps it is infinite, as nothing need end where the run does.
     """
 
     times: np.ndarray

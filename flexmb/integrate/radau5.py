@@ -20,7 +20,6 @@ from flexmb.integrate.control import (
     SAMPLES,
     SHRINK,
     Interval,
-    begin,
     copy,
     derivative,
     enter_segment,
@@ -33,7 +32,9 @@ from flexmb.integrate.control import (
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -222,19 +223,89 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
 
 
 @helper
+def state_at(problem, step, y, s, t, result):
+    """The state inside a step, by the collocation polynomial, projected."""
+    evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
+    for i in range(y.shape[0]):
+        result[i] += y[i]
+    problem.project(t, result, problem.constants)
+
+
+@helper
 def store_samples(problem, step, y, s, times, out, counts):
-    """Store the samples in the step, its end included; inside by the collocation polynomial, projected."""
+    """Store the samples in the step, its end included."""
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            evaluate_polynomial(s.Z, (times[sample] - step.start) / (step.end - step.start), out[sample])
-            for i in range(y.shape[0]):
-                out[sample, i] += y[i]
-            problem.project(times[sample], out[sample], problem.constants)
+            state_at(problem, step, y, s, times[sample], out[sample])
         sample += 1
     counts[SAMPLES] = sample
+
+
+@helper
+def end_at_crossing(problem, step, y, s, times, out, counts, watch):
+    """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
+    trial, t, first = np.empty(y.shape[0]), step.end, 0
+    for i in range(watch.entry.shape[0]):
+        if crosses_one(watch, i, s.y_new):
+            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
+            while low < 0.5 * (low + high) < high:
+                middle = 0.5 * (low + high)
+                state_at(problem, step, y, s, middle, trial)
+                if crosses(watch.side[i], trial[entry] - level, 0):
+                    high = middle
+                else:
+                    low = middle
+            if high <= t:
+                t, first = high, i
+    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
+        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
+        counts[SAMPLES] += 1
+    if t < step.end:
+        state_at(problem, step, y, s, t, trial)
+    else:
+        copy(s.y_new, trial)
+    note(watch, first, trial)
+    copy(trial, y)
+    counts[ACCEPTED] += 1
+    return CROSSED, t
+
+
+@helper
+def keep_stages(memory, s, h_factored, h_before, renew, fresh):
+    """What only this method knows before a step: Jacobian, stages of the step before."""
+    numbers, n = memory.numbers, s.f.shape[0]
+    numbers[FACTORED], numbers[STEP_BEFORE] = h_factored, h_before
+    numbers[RENEW], numbers[FRESH] = 1.0 if renew else 0.0, 1.0 if fresh else 0.0
+    for i in range(n):
+        copy(s.J[i], memory.rows[i])
+    for stage in range(3):
+        copy(s.Z_before[stage], memory.rows[n + stage])
+
+
+@helper
+def recall(memory, s, counts):
+    """The same of a run that is taken up, with factors made again; of another one that there is nothing.
+
+    Returns (step of the factors, step and error norm before, whether to renew the Jacobian, whether it is of this
+    place, whether the step before was rejected).
+    """
+    numbers, n = memory.numbers, s.f.shape[0]
+    h_factored = numbers[FACTORED]
+    if numbers[STEP_BEFORE] == 0.0 and h_factored == 0.0:
+        return 0.0, 0.0, 0.0, True, False, numbers[RETRIED] != 0.0
+    for i in range(n):
+        copy(memory.rows[i], s.J[i])
+    for stage in range(3):
+        copy(memory.rows[n + stage], s.Z_before[stage])
+    if h_factored > 0.0:
+        factorise(s, h_factored, counts)
+    return (
+        h_factored, numbers[STEP_BEFORE], numbers[ERROR_BEFORE], numbers[RENEW] != 0.0, numbers[FRESH] != 0.0,
+        numbers[RETRIED] != 0.0,
+    )  # fmt: skip
 
 
 @helper
@@ -256,7 +327,7 @@ def after_acceptance(h, length, cut, factor, rejected, worn):
 
 
 @kernel
-def radau5(problem, y, clock, accuracy, out, counts):
+def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
     The retreat from a failing right-hand side is that of `dop853`. Where Newton's method does not converge, an old
@@ -264,17 +335,22 @@ def radau5(problem, y, clock, accuracy, out, counts):
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
-    t, h = times[0], 0.0
-    begin(problem, t, y, out, counts)
-    for end in segment_ends:
+    t = begin(problem, times, y, s.y_new, memory, out, counts)
+    h, kept = memory.numbers[STEP], False
+    h_factored, h_before, error_before, renew, fresh, rejected = recall(memory, s, counts)
+    trouble = STEP_TOO_SMALL
+    for i in range(segment_ends.shape[0]):
+        end, is_last = segment_ends[i], i + 1 == segment_ends.shape[0]
         last = np.nextafter(end, t)
         status, h = enter_segment(problem, Interval(t, end, last), y, s.f, h, accuracy, _ERROR_EXPONENT, counts)
         if status != OK:
             return status, t
-        h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
-        renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
         while t < end:
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
+            if not kept and (status != OK or (is_last and t_new == end)):
+                keep(memory, t, y, h, error_before, rejected, counts)
+                keep_stages(memory, s, h_factored, h_before, renew, fresh)
+                kept = True
             if status != OK:
                 return status, t
             step, length = Interval(t, t_new, last), t_new - t
@@ -298,6 +374,8 @@ def radau5(problem, y, clock, accuracy, out, counts):
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
+                if watch is not None and is_crossed(watch, s.y_new):
+                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 store_samples(problem, step, y, s, times, out, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
@@ -317,10 +395,16 @@ def radau5(problem, y, clock, accuracy, out, counts):
                     h, renew = length * retreat(status), not fresh
                 counts[REJECTED] += 1
                 rejected = True
+        h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
+        renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
+    if not kept:
+        keep(memory, t, y, h, error_before, rejected, counts)
+        keep_stages(memory, s, h_factored, h_before, renew, fresh)
     return OK, t
 
 
 INTEGRATOR = Integrator(
-    "radau5", radau5, order=5, linearises=True, algebra=(10.0 / 3.0, 10.0),  # a real and a complex matrix
+    "radau5", radau5, order=5, linearises=True, keeps_jacobian=True,
+    algebra=(10.0 / 3.0, 10.0),  # a real and a complex matrix
     summary="modes or springs that are damped or hardly ring; moderate accuracy; the smallest cost of a step",
 )  # fmt: skip

@@ -13,7 +13,6 @@ from flexmb.integrate.control import (
     SAMPLES,
     Interval,
     all_finite,
-    begin,
     copy,
     derivative,
     permitted,
@@ -22,6 +21,8 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
+from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -49,6 +50,50 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
     for i in range(y.shape[0]):
         trial[i] = y[i] + h / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
     return OK if all_finite(trial) else NONFINITE
+
+
+@helper
+def end_at_crossing(problem, step, y, k, trial, counts, watch):
+    """y at the first level that a step crosses, by shorter steps from the same start.
+
+    The regula falsi of Illinois for each level, halving where the step starts at it; a shorter step is as accurate as
+    the whole one. Returns (status, the time): CROSSED, or the status of a stage that fails.
+    """
+    t, last, h = step.start, step.last, step.end - step.start
+    whole, shortest, first = trial.copy(), h, 0
+    for i in range(watch.entry.shape[0]):
+        if crosses_one(watch, i, whole):
+            entry, level = watch.entry[i], watch.level[i]
+            low, high = 0.0, h
+            below, above = y[entry] - level, whole[entry] - level
+            last_side = 0
+            while above != 0.0 and high - low > 4.0 * (np.nextafter(t + high, math.inf) - (t + high)):
+                middle = 0.5 * (low + high)
+                if crosses(watch.side[i], above, 0) and not crosses(watch.side[i], below, 0):
+                    middle = low + (high - low) * below / (below - above)
+                    middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
+                status = rk4_step(problem, t, last, y, middle, k, trial, counts)
+                if status != OK:
+                    return status, t
+                value = trial[entry] - level
+                if crosses(watch.side[i], value, 0):
+                    high, above = middle, value
+                    below = 0.5 * below if last_side > 0 else below
+                    last_side = 1
+                else:
+                    low, below = middle, value
+                    above = 0.5 * above if last_side < 0 else above
+                    last_side = -1
+            if high <= shortest:
+                shortest, first = high, i
+    status = rk4_step(problem, t, last, y, shortest, k, trial, counts)
+    if status != OK:
+        return status, t
+    problem.project(t + shortest, trial, problem.constants)
+    note(watch, first, trial)
+    copy(trial, y)
+    counts[ACCEPTED] += 1
+    return CROSSED, t + shortest
 
 
 @helper
@@ -95,7 +140,7 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
 
 
 @kernel
-def rk4(problem, y, clock, accuracy, out, counts):
+def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`.
 
     Every stretch between samples and segment ends is divided into equal steps not exceeding `accuracy.step`, and y is
@@ -103,16 +148,15 @@ def rk4(problem, y, clock, accuracy, out, counts):
     """
     times, segment_ends = clock
     k, trial = np.empty((4, y.shape[0])), np.empty(y.shape[0])
-    t = times[0]
-    begin(problem, t, y, out, counts)
-    segment = 0
-    for sample in range(1, times.shape[0]):
+    t = begin(problem, times, y, trial, memory, out, counts)
+    start, done, segment = memory.numbers[STRETCH], int(memory.numbers[DONE]), 0
+    for sample in range(counts[SAMPLES], times.shape[0]):
         while t < times[sample]:
-            start = t
             end, steps, h, last = stretch(start, times[sample], segment_ends[segment], accuracy.step)
-            for j in range(steps):
+            for j in range(done, steps):
                 status = permitted(accuracy.max_steps, counts)
                 if status != OK:
+                    keep_place(memory, t, y, start, j)
                     return status, t
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
                 if may_leap(status):
@@ -122,15 +166,19 @@ def rk4(problem, y, clock, accuracy, out, counts):
                         break
                 if status != OK:
                     return status, t
+                if watch is not None and is_crossed(watch, trial):
+                    return end_at_crossing(problem, Interval(t, t + h, last), y, k, trial, counts, watch)
                 t = end if j == steps - 1 else start + (j + 1) * h
                 copy(trial, y)
                 problem.project(t, y, problem.constants)
                 counts[ACCEPTED] += 1
+            start, done = t, 0
             if t == segment_ends[segment]:
                 segment += 1
         if counts[SAMPLES] == sample:  # not met within a leap
             copy(y, out[sample])
             counts[SAMPLES] = sample + 1
+    keep_place(memory, t, y, t, 0)
     return OK, t
 
 

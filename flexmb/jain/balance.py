@@ -1,5 +1,8 @@
 """Energy, momentum and power of a whole system, from the same modal mass matrices that move it."""
 
+from flexmb.connectors.along_hinges import evaluate_along_hinges, stored_along_hinges
+from flexmb.connectors.between import connector_power, stored_in_connectors
+from flexmb.jain.connected import evaluate_connectors
 from flexmb.jain.forces import load_at_port
 from flexmb.jain.ports import port_velocity
 from flexmb.jain.wheels import spin_axis
@@ -11,7 +14,17 @@ from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.rotation import rotation_vector
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, shift_force, times6, vec6
 from flexmb.spatial.vector import add, axpy, dot, mat3, scale, times, vec3
-from flexmb.tables.features import BALL_SPRINGS, LOADS, MODAL_DAMPING, MODES, SPRINGS, WHEELS
+from flexmb.tables.features import (
+    BALL_SPRINGS,
+    CONNECTORS,
+    FRICTION,
+    HINGE_SPRINGS,
+    LOADS,
+    MODAL_DAMPING,
+    MODES,
+    SPRINGS,
+    WHEELS,
+)
 
 KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 
@@ -20,7 +33,8 @@ KINETIC, STRAIN, SPRING, GRAVITY = range(4)
 def energy_and_momentum(c, w, energy, momentum):
     """energy (4,) kinetic, strain, spring, gravity in J; momentum (6,) [angular about the World origin; linear].
 
-    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr and w.zf.
+    Needs the velocity and pose sweeps of this state. Overwrites w.body.inertia, w.body.force, w.pff, w.pfr, w.zf, and
+    what connectors write.
     """
     for i in range(4):
         energy[i] = 0.0
@@ -40,6 +54,12 @@ def energy_and_momentum(c, w, energy, momentum):
                 i = c.body[k].q_index
                 theta = rotation_vector(w.q[i], w.q[i + 1], w.q[i + 2], w.q[i + 3])
                 energy[SPRING] += 0.5 * c.body[k].ball_spring * dot(theta, theta)
+    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+        evaluate_along_hinges(c, w)
+        energy[SPRING] += stored_along_hinges(c, w)
+    if has(c, CONNECTORS):
+        evaluate_connectors(c, w)
+        energy[SPRING] += stored_in_connectors(w)
 
 
 @helper
@@ -73,7 +93,7 @@ def _body(c, w, k, energy, momentum):
 
 @helper
 def power(c, w):
-    """Power of everything that is not conservative: motors, dampers, drives, node loads, modal damping (W)."""
+    """Power of everything that is not conservative: motors, dampers, drives, loads, modal damping, friction (W)."""
     total = speed_power(c, w)
     for k in range(c.body.shape[0]):
         if has(c, MODAL_DAMPING):
@@ -85,4 +105,6 @@ def power(c, w):
             for i in range(c.body[k].load_start, c.body[k].load_stop):
                 port, F = load_at_port(c, w, k, i)
                 total += dot6(F, port_velocity(w, k, port))
+    if has(c, CONNECTORS):
+        total += connector_power(w)
     return total

@@ -50,7 +50,9 @@ def forward_dynamics(c, w, m):
     for j in range(w.u.shape[0]):
         f = c.speed[j].prescribed
         w.speed[j].acceleration = w.function[f, 2] if f >= 0 else 0.0
-    inverse.inverse_dynamics(c, w, m.bias)
+    status = inverse.inverse_dynamics(c, w, m.bias)
+    if status != OK:
+        return status
     for k in range(c.body.shape[0]):
         if is_out_of_range(c, w.eta[k], k):
             w.fault[0] = k

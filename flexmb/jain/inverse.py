@@ -1,27 +1,34 @@
 """Inverse dynamics tau = M udot + c of trees, O(N): Jain & Rodriguez (44), (45).
 
-tau holds inertia, gravity, elasticity and node loads, but not hinge springs and motors: these are what it is compared
-with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
+tau holds inertia, gravity, elasticity, node loads and connectors between nodes, but not hinge springs and motors: these
+are what it is compared with. Its modal rows vanish where the accelerations are consistent with an undriven structure.
 """
 
 from flexmb.jain.accelerations import acceleration_sweep
+from flexmb.jain.connected import connect
 from flexmb.jain.explicit import force_to_parent
 from flexmb.jain.forces import add_port_torque, elastic_forces, node_loads
 from flexmb.jain.kinematics import motion_column, pose_sweep, velocity_sweep
 from flexmb.jain.ports import mode_motion, port_acceleration
 from flexmb.jain.wheels import gyroscopic_torque, spin_axis
+from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.levels.body import body_inertia
 from flexmb.spatial.inertia import inertia_times, load_inertia
 from flexmb.spatial.spatial_vector import add6, axpy6, dot6, plus6, shift_force, store6, vec6
 from flexmb.spatial.vector import axpy, dot, scale, vec3
+from flexmb.tables.features import CONNECTORS
+from flexmb.tables.status import OK
 
 
 @helper
 def inverse_dynamics(c, w, tau):
-    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads."""
+    """tau (nu,) for the state in w.q, w.u and the rates in w.speed.acceleration; w.body.load receives the loads.
+
+    Returns the status code of connectors.
+    """
     velocity_sweep(c, w, False, False)
-    if c.load.shape[0] > 0:
+    if c.load.shape[0] > 0 or has(c, CONNECTORS):
         pose_sweep(c, w)
     acceleration_sweep(c, w)
     for k in range(c.body.shape[0]):
@@ -29,8 +36,10 @@ def inverse_dynamics(c, w, tau):
         elastic_forces(c, w, k)
         node_loads(c, w, k)
         _inertial_force(c, w, k, tau)
+    status = connect(c, w) if has(c, CONNECTORS) else OK
     for k in range(c.body.shape[0] - 1, -1, -1):
         _project_force(c, w, k, tau)
+    return status
 
 
 @helper

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 
 from flexmb.dense.dense_system import DenseSystem, Instant
 from flexmb.dense.function_jets import profile
-from flexmb.jain.elements import Configuration, rate, undeformed, value, with_wheels
+from flexmb.jain.elements import Configuration, phi, rate, undeformed, value, with_wheels
 from flexmb.scene import schema as s
 from flexmb.tables import arguments
 from flexmb.typing import Real
@@ -288,7 +288,7 @@ class SpatialOperators:
         return M_m, b_m
 
     def _external(self, now: Configuration, t: float, columns: tuple[slice, ...], M_m: Real) -> Real:
-        """Modal forces (nbar,) of gravity and of loads at nodes."""
+        """Modal forces (nbar,) of gravity, of loads at nodes and of connectors between them."""
         fall = np.zeros(len(M_m))
         for at in columns:
             fall[at][-3:] = self._dense.scene.gravity_m_s2
@@ -301,4 +301,10 @@ class SpatialOperators:
             F = np.zeros(6)
             F[slice(0, 3) if load.type == "torque" else slice(3, 6)] = profile(load.function, t).value * direction
             found[columns[k]] += value(now.transmission(k, seat)[1]) @ F
+        for name, gripped in self._dense.grips(now.q, now.u, t).items():
+            for side, F in (("a", gripped.on_a), ("b", gripped.on_b)):
+                k, seat = self._bodies.sites[f"connector {side}:{name}"]
+                if k >= 0:
+                    node, A = now.transmission(k, seat)
+                    found[columns[k]] += value(A @ phi(now.seat(k, seat)[0] - node)) @ F
         return found

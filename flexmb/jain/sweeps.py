@@ -8,6 +8,7 @@ enters as acceleration -g of the ground.
 from flexmb.jain import hinge_solve
 from flexmb.jain.accelerations import inboard_acceleration, store_body_acceleration
 from flexmb.jain.axis import turn
+from flexmb.jain.connected import connect
 from flexmb.jain.forces import elastic_forces, node_loads
 from flexmb.jain.kinematics import move_body, pose_body
 from flexmb.jain.variants import eliminate_modes, inertia, modal_accelerations
@@ -19,7 +20,7 @@ from flexmb.levels import rigid
 from flexmb.levels.body import RIGID
 from flexmb.levels.range import is_out_of_range
 from flexmb.motion.coordinates import hinge_forces
-from flexmb.tables.features import LOADS, MODES, WHEELS
+from flexmb.tables.features import CONNECTORS, LOADS, MODES, WHEELS
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK, OUT_OF_RANGE
 
 AHEAD = 6  # bodies between asking for a record and writing it: what the memory takes for one
@@ -54,12 +55,15 @@ def bodies(c, w):
             inertia(c, w, k)
         if has(c, MODES):
             elastic_forces(c, w, k)
-        if has(c, LOADS):
+        if has(c, LOADS) or has(c, CONNECTORS):
             pose_body(c, w, k)
+        if has(c, LOADS):
             node_loads(c, w, k)
         if has(c, WHEELS):
             wheel_forces(c, w, k)
     w.displaced[0] = 0
+    if has(c, CONNECTORS):
+        return connect(c, w)
     return OK
 
 

@@ -17,6 +17,7 @@ from flexmb.typing import Real
 
 Complex = NDArray[np.complex128]
 ROUNDOFF = 2.0**-53
+NOT_ANOTHER = 1e-4  # shapes of a double eigenvalue differ by the root of rounding; two motions by far more
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,9 +33,22 @@ class Mode:
     tolerance: float
     participation: Real
 
+    def __str__(self) -> str:
+        if self.is_rigid_body:
+            return "rigid-body motion"
+        if self.eigenvalue.imag == 0.0:
+            return f"no oscillation, {self.eigenvalue.real:.6g} 1/s"
+        ratio = self.damping_ratio if abs(self.eigenvalue.real) > self.tolerance else 0.0
+        return f"{self.frequency_hz:.6g} Hz, damping ratio {ratio:.3g}"
+
+    @property
+    def is_rigid_body(self) -> bool:
+        """Whether the eigenvalue cannot be told from zero: a motion that nothing holds, drives or damps."""
+        return abs(self.eigenvalue) <= self.tolerance
+
     @property
     def natural_rad_s(self) -> float:
-        """|eigenvalue|."""
+        """Modulus of the eigenvalue."""
         return abs(self.eigenvalue)
 
     @property
@@ -49,7 +63,7 @@ class Mode:
 
     @property
     def damping_ratio(self) -> float:
-        """-Re / |eigenvalue|; NaN for an eigenvalue that is zero."""
+        """Real part over modulus, with the opposite sign; NaN for an eigenvalue that is zero."""
         return -self.eigenvalue.real / abs(self.eigenvalue) if abs(self.eigenvalue) > self.tolerance else np.nan
 
 
@@ -114,6 +128,19 @@ class LinearModel:
                 energy = np.abs(shape) ** 2 * np.diag(self.mass)
                 found.append(Mode(complex(value), shape, float(tolerance), energy / np.sum(energy)))
         return tuple(found)
+
+    @cached_property
+    def rigid_body_shapes(self) -> Real:
+        """(n,r) displacements that nothing holds, orthonormal: those of all eigenvalues that are zero.
+
+        A motion that may also begin with any speed has two of them, one that a damper stops has one.
+        """
+        shapes = [mode.shape for mode in self.modes if mode.is_rigid_body]
+        if not shapes:
+            return np.zeros((len(self.rates), 0))
+        columns = np.array([part for shape in shapes for part in (shape.real, shape.imag)]).T
+        basis, size, _ = np.linalg.svd(columns, full_matrices=False)
+        return basis[:, size > NOT_ANOTHER * size[0]]
 
     @property
     def stability(self) -> Stability:

@@ -8,25 +8,36 @@ from rich.table import Table
 from rich.text import Text
 
 from flexmb.linear.campbell import Campbell
-from flexmb.linear.linear_model import LinearModel, Mode
+from flexmb.linear.linear_model import LinearModel
+from flexmb.linear.truncation import Truncation
+from flexmb.typing import Real
 
 _COLOURS = {"asymptotically stable": "green", "neutral": "yellow", "unstable": "bold red"}
 _DOMINANT = 3  # displacements named per mode
 _PART = 0.05  # of the kinetic energy, below which one is not named
+_RIGID_BODY = 8  # displacements named of all rigid-body motions together
 
 
-def modes_table(model: LinearModel) -> RenderableType:
-    """Frequency, damping and dominant displacements of every mode; stability; accelerations that are not balanced."""
-    table = _table(f"\nModes of {model.scene}", "Parts: of the kinetic energy of the shape, by displacement.")
-    for name in ("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)"):
+def modes_table(model: LinearModel, cut: Truncation | None = None) -> RenderableType:
+    """Frequency, damping and dominant displacements of every mode, and what truncation leaves open, if that is known.
+
+    Then stability, and accelerations that are not balanced.
+    """
+    table = _table(f"\nModes of {model.scene}", _caption(cut))
+    for name in ("mode", "Hz", "rad/s", "damping ratio", "Re (1/s)", *([] if cut is None else ["truncation"])):
         table.add_column(name, justify="right")
     table.add_column("dominant displacements")
-    for number, mode in enumerate(model.modes, 1):
+    if model.rigid_body_shapes.shape[1]:
+        table.add_row(*_rigid_body_row(model, cut))
+    for i, mode in enumerate(model.modes):
+        if mode.is_rigid_body:
+            continue
         real = mode.eigenvalue.real if abs(mode.eigenvalue.real) > mode.tolerance else 0.0
-        ratio = "" if np.isnan(mode.damping_ratio) else f"{0.0 - real / mode.natural_rad_s:.3g}"
         table.add_row(
-            str(number), f"{mode.frequency_hz:.6g}", f"{mode.frequency_rad_s:.6g}", ratio,
-            f"{real:.4g}", _dominant(model, mode),
+            str(i + 1), f"{mode.frequency_hz:.6g}", f"{mode.frequency_rad_s:.6g}",
+            f"{0.0 - real / mode.natural_rad_s:.3g}", f"{real:.4g}",
+            *([] if cut is None else ["" if np.isnan(cut.change[i]) else f"{cut.change[i]:.1e}"]),
+            _dominant(model, mode.participation),
         )  # fmt: skip
     stability = model.stability
     lines = [Text(str(stability), style=_COLOURS[stability.verdict])]
@@ -36,10 +47,29 @@ def modes_table(model: LinearModel) -> RenderableType:
     return Group(table, *lines)
 
 
-def _dominant(model: LinearModel, mode: Mode) -> str:
-    order = np.argsort(-mode.participation, kind="stable")[:_DOMINANT]
-    named = [i for i in order if mode.participation[i] >= _PART]
-    return ", ".join(f"{model.displacements[i]} {100.0 * mode.participation[i]:.0f} %" for i in named)
+def _caption(cut: Truncation | None) -> str:
+    parts = "Parts: of the kinetic energy of the shape, by displacement."
+    if cut is None:
+        return parts
+    others = f"; not of {', '.join(cut.unrefined)}, which have no finer model" if cut.unrefined else ""
+    return f"{parts} Truncation: relative change with twice the modes of every beam{others}."
+
+
+def _rigid_body_row(model: LinearModel, cut: Truncation | None) -> list[str]:
+    """All motions that nothing holds, together: which of them an eigenvector mixes means nothing."""
+    shapes, count = model.rigid_body_shapes, sum(mode.is_rigid_body for mode in model.modes)
+    which = np.flatnonzero(np.max(np.abs(shapes), axis=1) > _PART)
+    named = ", ".join(model.displacements[i] for i in which[:_RIGID_BODY])
+    more = f" and {len(which) - _RIGID_BODY} more" if len(which) > _RIGID_BODY else ""
+    numbers = "1" if count == 1 else f"1-{count}"
+    motions = f"{shapes.shape[1]} rigid-body motion{'s' if shapes.shape[1] > 1 else ''}"
+    return [numbers, "rigid", "", "", "", *([] if cut is None else [""]), f"{motions}: {named}{more}"]
+
+
+def _dominant(model: LinearModel, participation: Real) -> str:
+    order = np.argsort(-participation, kind="stable")[:_DOMINANT]
+    named = [i for i in order if participation[i] >= _PART]
+    return ", ".join(f"{model.displacements[i]} {100.0 * participation[i]:.0f} %" for i in named)
 
 
 def campbell_table(result: Campbell) -> RenderableType:

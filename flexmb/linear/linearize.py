@@ -7,6 +7,7 @@ import numpy as np
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.variations import Equations, entering
 from flexmb.scene.schema import Scene
+from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Real
@@ -21,11 +22,25 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
     Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
     state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` has its accelerations.
-    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains, ValueError or
-    TypeError for what is not a state of this system.
+    Of a scene with controllers it is that of the closed loop: their states come last, and start where the scene says.
+    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains and
+    for sampled controllers, ValueError or TypeError for what is not a state of this system.
     """
+    if isinstance(system, Scene) and system.controllers:
+        system = compile(system)
+    if isinstance(system, System) and system.scene.controllers:
+        from flexmb.linear.closed_loop import closed_loop  # few scenes need it
+
+        state = system.initial_state if state is None else state
+        system.layout.entering(state)
+        return closed_loop(system, state, held_model if held else linear_model)
     equations, state = entering(system, state)
-    return linear_model(equations.held(state.t) if held else equations, state)
+    return held_model(equations, state) if held else linear_model(equations, state)
+
+
+def held_model(equations: Equations, state: State) -> LinearModel:
+    """The model with all functions of time held at their values at the state's time."""
+    return linear_model(equations.held(state.t), state)
 
 
 def linear_model(equations: Equations, state: State) -> LinearModel:

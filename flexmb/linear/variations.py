@@ -12,6 +12,7 @@ speeds and w, v those of a free or spherical hinge,
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -19,6 +20,7 @@ import numpy as np
 from flexmb.entry import articulated
 from flexmb.entry.tangent import jacobian, tangent_workspace, time_derivative
 from flexmb.scene.functions import Constant, Function, Ramp
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
@@ -74,22 +76,24 @@ class Equations:
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""
-        return self._with(self._constant_functions(t))
+        return self.with_functions(self.constant_functions(t))
 
     def spinning(self, speed: int, rate: float, state: State) -> Equations:
         """The same with all functions held, and the scalar coordinate whose speed has that number driven at `rate`."""
-        functions = self._constant_functions(state.t)
+        functions = self.constant_functions(state.t)
         angle = float(state.q[self.constants.speed["coordinate"][speed]])
         speeds = self.constants.speed.copy()
         speeds["prescribed"][speed] = len(functions)
-        return self._with([*functions, Ramp(value=angle, rate=rate, start_s=state.t)], speeds)
+        return self.with_functions([*functions, Ramp(value=angle, rate=rate, start_s=state.t)], speeds)
 
-    def _with(self, functions: list[Function], speeds: Record | None = None) -> Equations:
+    def with_functions(self, functions: Sequence[Function], speeds: Record | None = None) -> Equations:
+        """The same with other functions of time, as many."""
         rows, table = pack_functions(functions)
         speed = self.constants.speed if speeds is None else speeds
         return Equations(self.system, replace(self.constants, function=rows, table=table, speed=speed))
 
-    def _constant_functions(self, t: float) -> list[Function]:
+    def constant_functions(self, t: float) -> list[Constant]:
+        """All functions of time, held at their values at time t (s)."""
         w = self._real_w
         articulated.accelerations(t, pack(self.system.initial_state), self.constants, w)  # fills in the functions
         return [Constant(value=float(value)) for value in w.function[:, 0]]
@@ -156,10 +160,12 @@ class Equations:
 def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
     """The two parts of a linear model: the equations of a tree or its scene, and a state of it (default: initial).
 
-    NotImplementedError for closed chains, ValueError or TypeError for a state that is not one of this system.
+    NotImplementedError for closed chains and scenes with controllers, ValueError or TypeError for a state that is not
+    one of this system.
     """
     if not isinstance(system, System | Scene):
         raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
+    refuse_feedback(system if isinstance(system, Scene) else system.scene, "a linear model of the motion alone")
     equations = Equations(system if isinstance(system, System) else compile(system))
     if state is None:
         return equations, equations.system.initial_state

@@ -52,7 +52,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
         damping = damping_matrix(modes.frequencies, body.modes.damping_ratio)
     except ValueError as error:
         raise ValueError(f"beam '{body.name}': {error}") from error
-    points = _points(body, elements, modes.columns, stations, rigid_lumps)
+    points = points_of(body, elements, modes.columns, stations, rigid_lumps)
     return FlexibleModel(
         mass=points.mass,
         position=points.position,
@@ -68,7 +68,7 @@ def beam_model(body: BeamBody) -> FlexibleModel:
     )
 
 
-def _points(
+def points_of(
     body: BeamBody, elements: BeamElements, columns: Real, stations: Stations, rigid_lumps: tuple[Lump, ...]
 ) -> Points:
     """Stations and lumps in the form that `body.points` asks for."""

@@ -6,6 +6,7 @@ they agree to round-off.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,9 +43,10 @@ class Lump:
     inertia: Real
 
 
-def quadrature(mesh: ElementMesh, table: SectionTable) -> tuple[Real, Real]:
-    """Gauss points and weights (n,) on every piece between nodes and stations, so that kinks cost no accuracy."""
-    inside = table.x[(table.x > mesh.nodes[0]) & (table.x < mesh.nodes[-1])]
+def quadrature(mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | Real = ()) -> tuple[Real, Real]:
+    """Gauss points and weights (n,) on every piece between nodes, stations and cuts, so that kinks cost no accuracy."""
+    others = np.concatenate([table.x, cuts])
+    inside = others[(others > mesh.nodes[0]) & (others < mesh.nodes[-1])]
     breaks = np.unique(np.concatenate([mesh.nodes, inside]))
     s, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     half = np.diff(breaks) / 2.0
@@ -52,13 +54,15 @@ def quadrature(mesh: ElementMesh, table: SectionTable) -> tuple[Real, Real]:
     return (middle[:, None] + half[:, None] * s).ravel(), (half[:, None] * w).ravel()
 
 
-def inertia_stations(body: BeamBody, mesh: ElementMesh, table: SectionTable) -> Stations:
+def inertia_stations(
+    body: BeamBody, mesh: ElementMesh, table: SectionTable, cuts: Sequence[float] | Real = ()
+) -> Stations:
     """The beam's own inertia: at the Gauss points ("consistent") or at the element nodes ("lumped").
 
     Lumped: each node receives the inertia weighted by its hat function. `points = "line"` leaves the section's inertia
-    out. Stations without mass are dropped.
+    out. Stations without mass are dropped. No Gauss point's interval reaches across one of the `cuts` (m).
     """
-    x, weight = quadrature(mesh, table)
+    x, weight = quadrature(mesh, table, cuts)
     mass = weight * table.at(table.mass, x)
     inertia_y = weight * table.at(table.rotary_y, x)
     inertia_z = weight * table.at(table.rotary_z, x)

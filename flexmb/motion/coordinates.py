@@ -4,6 +4,7 @@ them.
 Both algorithms, Jain's recursion and Frisch's matrices, start here.
 """
 
+from flexmb.connectors.along_hinges import add_loads_along_hinges, power_along_hinges
 from flexmb.hinges import catalogue
 from flexmb.jit.features import has
 from flexmb.jit.kernel import helper, kernel
@@ -13,7 +14,9 @@ from flexmb.spatial.scalar import sqrt
 from flexmb.tables.features import (
     BALL_SPRINGS,
     DAMPERS,
+    FRICTION,
     FUNCTIONS,
+    HINGE_SPRINGS,
     MODES,
     MOTORS,
     PRESCRIBED,
@@ -120,8 +123,11 @@ def store_slope(c, w, power, dy):
 
 @helper
 def hinge_forces(c, w):
-    """Springs, dampers and motors of all scalar coordinates, and of spherical hinges, into w.speed.applied."""
-    if not (has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)):
+    """Springs, dampers, friction and motors of scalar coordinates, and of spherical hinges, into w.speed.applied."""
+    if not (
+        has(c, DAMPERS) or has(c, SPRINGS) or has(c, MOTORS) or has(c, BALL_SPRINGS)
+        or has(c, HINGE_SPRINGS) or has(c, FRICTION)
+    ):  # fmt: skip
         return  # they are zero from the start
     for j in range(w.u.shape[0]):
         force = 0.0
@@ -138,6 +144,8 @@ def hinge_forces(c, w):
         w.speed[j].applied = force
     if has(c, BALL_SPRINGS):
         _ball_springs(c, w)
+    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+        add_loads_along_hinges(c, w)
 
 
 @helper
@@ -153,7 +161,7 @@ def _ball_springs(c, w):
 
 @helper
 def speed_power(c, w):
-    """Power of all dampers, motors and drives along the speeds (W)."""
+    """Power of all dampers, motors, drives and friction along the speeds (W)."""
     total = 0.0
     for j in range(w.u.shape[0]):
         rate = w.u[j]
@@ -165,4 +173,6 @@ def speed_power(c, w):
                 total += w.function[f, 0] * rate
         if has(c, PRESCRIBED) and c.speed[j].prescribed >= 0:
             total += w.speed[j].drive * rate
+    if has(c, HINGE_SPRINGS) or has(c, FRICTION):
+        total += power_along_hinges(c, w)
     return total

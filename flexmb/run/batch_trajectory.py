@@ -39,6 +39,11 @@ class BatchTrajectory:
         return not len(self.failed)
 
     @property
+    def statuses(self) -> tuple[Status, ...]:
+        """How the runs ended, by name."""
+        return tuple(map(Status, self.status.tolist()))
+
+    @property
     def failed(self) -> Index:
         """Numbers of the copies that did not."""
         return np.flatnonzero(self.status != OK)

@@ -23,7 +23,8 @@ class Path(Protocol):
 
 
 class Recorded(Protocol):
-    """A trajectory, ours or another code's: loads (T,6), drives (T,k), energies (T,), momentum (T,6), work (T,)."""
+    """A trajectory, ours or another code's: loads and connectors (T,6), drives and hinge forces (T,k), energies (T,),
+    momentum (T,6), work (T,)."""
 
     @property
     def markers(self) -> Mapping[str, Path]: ...
@@ -33,6 +34,10 @@ class Recorded(Protocol):
     def wheel_loads(self) -> Mapping[str, Real]: ...
     @property
     def drives(self) -> Mapping[str, Real]: ...
+    @property
+    def connectors(self) -> Mapping[str, Real]: ...
+    @property
+    def hinge_forces(self) -> Mapping[str, Real]: ...
     @property
     def energy(self) -> Mapping[str, Real]: ...
     @property
@@ -65,11 +70,13 @@ def channels_of(trajectory: Recorded) -> dict[str, Real]:
         found[f"marker:{name}.orientation"] = path.quaternion
         found[f"marker:{name}.angular_velocity"] = path.velocity[:, :3]
         found[f"marker:{name}.velocity"] = path.velocity[:, 3:]
-    for prefix, loads in (("load", trajectory.loads), ("wheel_load", trajectory.wheel_loads)):
+    on_bodies = ("load", trajectory.loads), ("wheel_load", trajectory.wheel_loads), ("connector", trajectory.connectors)
+    for prefix, loads in on_bodies:
         for name, load in loads.items():
             found[f"{prefix}:{name}.torque"] = load[:, :3]
             found[f"{prefix}:{name}.force"] = load[:, 3:]
-    found |= {f"drive:{name}": drive.reshape(len(drive), -1) for name, drive in trajectory.drives.items()}
+    for prefix, along in (("drive", trajectory.drives), ("hinge_force", trajectory.hinge_forces)):
+        found |= {f"{prefix}:{name}": values.reshape(len(values), -1) for name, values in along.items()}
     if trajectory.momentum is not None:
         found["momentum.angular"] = trajectory.momentum[:, :3]
         found["momentum.linear"] = trajectory.momentum[:, 3:]
@@ -91,14 +98,14 @@ def family(channel: str) -> str:
     kind, _, rest = channel.partition(":")
     if not rest:
         return "energy" if channel.startswith("energy.") else channel
-    return f"{kind}.{rest.rpartition('.')[2]}" if kind != "drive" else kind
+    return f"{kind}.{rest.rpartition('.')[2]}" if kind not in ("drive", "hinge_force") else kind
 
 
 def unit(channel: str) -> str:
     """SI unit of a channel."""
     if channel.startswith(("energy.", "work")):
         return "J"
-    if channel.startswith("drive:"):
+    if channel.startswith(("drive:", "hinge_force:")):
         return "N or Nm"
     return next((symbol for ending, symbol in UNITS.items() if channel.endswith(ending)), "")
 

@@ -19,7 +19,7 @@ from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
 from flexmb.run.propagate import Integration, recursion
-from flexmb.run.switching import timing_of
+from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.batch import Batch, LaneTables, in_threads
 from flexmb.system.tree_system import System
@@ -60,7 +60,8 @@ class BatchRun:
 
     def __init__(self, batch: Batch, times: Real, settings: Settings, found: Runs) -> None:
         self._batch, self._times, self._settings, self._found = batch, times, settings, found
-        self._ends = [np.array([*timing_of(system).before(times[-1]), times[-1]]) for system in batch.systems]
+        fixed = settings.integrator.fixed
+        self._ends = [segment_ends(system, times[0], times[-1], fixed) for system in batch.systems]
 
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
@@ -91,6 +92,7 @@ class BatchRun:
             self._examine(first, found.status)
         accuracy = self._settings.accuracy(self._batch.nq, self._batch.nu)
         if self._settings.method == "dop853":
+            ends = [np.unique(each) for each in ends]
             most = max(map(len, ends))
             padded = np.array([[*each, *[each[-1]] * (most - len(each))] for each in ends])
             lengths = np.array(list(map(len, ends)))
@@ -152,7 +154,7 @@ class Alone:
 
     def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
         """See `Integrator`."""
-        status, t = self._solve(y, clock, accuracy, out, counts)
+        status, t = self._solve(y, clock, accuracy, out, counts, self._method.memory(len(y)), None)
         return status, t
 
     @property

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from flexmb.entry.sampling import observe_samples
 from flexmb.jit.direct import addresses, bound, settled
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.tree_system import System
+from flexmb.system.observables import Observation
 from flexmb.tables.state import DynamicsError
 from flexmb.typing import Real
 
@@ -28,19 +28,32 @@ class Rows(NamedTuple):
     trouble: DynamicsError | KeyboardInterrupt | None
 
 
-def batch(system: System, rhs: Any, observing: Any, constants: Any, workspace: Any) -> Sampler:
+class Observed(Protocol):
+    """A system, or a closed loop around one, as outputs are asked of it."""
+
+    @property
+    def _observation(self) -> Observation: ...
+
+    def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None: ...
+
+
+def batch(observed: Observed, motion: tuple[Any, ...], observing: Any, n: int) -> Sampler:
     """A function of times (T,), states (T,n) and rows (T,m) that fills rows and returns how many, up to the first that
-    is for Python to look into. It has outputs of its own."""
-    out, slope = system._observation.outputs(), np.empty(system.nq + system.nu + 1)
+    is for Python to look into. It has outputs of its own.
+
+    motion: a right-hand side with its constants and workspace; `observing` is a kernel of these and of the outputs.
+    """
+    rhs, constants, workspace = motion
+    out, slope = observed._observation.outputs(), np.empty(n)
     entry = settled(observe_samples, INDEX, INDEX, VECTOR, MATRIX, VECTOR, MATRIX)
-    motion = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace)
+    moving = addresses(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace)
     found, *_, outputs = addresses(observing, NOTHING, constants, workspace, out)
-    where = np.array([*motion, found, outputs])
+    where = np.array([*moving, found, outputs])
     call = bound(entry, (), constants, workspace, out)
     return lambda times, states, rows: call(where, workspace.doubt, times, states, slope, rows)
 
 
-def observe(system: System, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:
+def observe(system: Observed, algorithm: Algorithm, times: Real, states: Real, sampled: Sampler | None) -> Rows:
     """Rows at all states (T,n) that are reached at these times, or up to where it fails or Ctrl-C is pressed.
 
     `sampled` does many at once; what it leaves is evaluated as a single state is, with its errors and warnings.

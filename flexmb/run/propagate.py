@@ -5,20 +5,23 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from time import perf_counter
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
 from flexmb.entry import articulated, tangent
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.memory import Memory
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
 from flexmb.motion import coordinates, retraction
 from flexmb.run.interruption import interruptible
-from flexmb.run.observing import batch
-from flexmb.run.switching import timing_of
+from flexmb.run.observing import Sampler, batch
+from flexmb.run.origin import Beginning
+from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -26,9 +29,17 @@ from flexmb.tables.arrays import Constants
 from flexmb.tables.status import Status
 from flexmb.typing import Index, Real
 
+if TYPE_CHECKING:
+    from flexmb.control.feedback import Feedback
+    from flexmb.control.memory import LoopMemory
+
 
 class Raw(NamedTuple):
-    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost."""
+    """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
+
+    y (n,): the last good state; memory, controllers: how it can be taken up there; paused: whether it stopped at a
+    level.
+    """
 
     states: Real
     status: Status
@@ -38,6 +49,10 @@ class Raw(NamedTuple):
     compile_s: float
     run_s: float
     interrupted: bool
+    y: Real
+    memory: Memory
+    paused: bool = False
+    controllers: LoopMemory | None = None
 
 
 def recursion(constants: Constants, workspace: Any) -> Problem:
@@ -51,27 +66,60 @@ class Integration:
     def __init__(self, system: System, algorithm: DynamicsAlgorithm, route: Route, integrator: Integrator) -> None:
         constants, self._workspace = route.tables()
         self._integrator = integrator
+        self.feedback: Feedback | None = None
+        """Of a scene with controllers."""
+        if system.scene.controllers:
+            from flexmb.control.feedback import Feedback  # few scenes need it
+
+            self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
+        self._linear: tuple[Any, ...] = ()
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
             exact = system.constants  # with every body eliminated explicitly, for Jacobians
             moving = tangent.tangent_workspace(exact, system.nq, system.nu)
             self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
+            self._linear = tangent.jacobian, exact, moving
+            if self.feedback is not None:
+                self.feedback.with_retraction()
         else:
             self._problem = problem(*motion, route.leaping)
-        batched = algorithm.observing is not None and not system.scene.closures
-        self.batch = batch(system, route.rhs, algorithm.observing, constants, self._workspace) if batched else None
+        self.batch: Sampler | None = None
         """Observes many samples at once."""
-        self._enter: Any = None
+        self._batched = algorithm.observing is not None and not system.scene.closures
+        if self._batched and self.feedback is None:
+            moving = route.rhs, constants, self._workspace
+            self.batch = batch(system, moving, algorithm.observing, system.nq + system.nu + 1)
+        self._enter: dict[bool, Any] = {}  # by whether levels are watched
 
-    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
-        """Integrate y (nq+nu+1,) = [q, u, work]; see `Integrator`. All arrays in C order."""
-        self.compile(y, clock, accuracy, out, counts)
-        return self._enter(self._problem, y, clock, accuracy, out, counts)
+    def __call__(self, *given: Any) -> tuple[int, float]:
+        """Integrate: (y, clock, accuracy, out, counts, memory, watch) of `Integrator`, all arrays in C order."""
+        self.compile(*given)
+        return self._enter[given[-1] is not None](self._problem, *given)
 
-    def compile(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> None:
+    def compile(self, *given: Any) -> None:
         """For a call with these, unless that is done."""
-        if self._enter is None:
-            self._enter = undispatched(self._integrator.run, self._problem, y, clock, accuracy, out, counts)
+        watched = given[-1] is not None
+        if watched not in self._enter:
+            self._enter[watched] = undispatched(self._integrator.run, self._problem, *given)
+
+    def begin(self, begin: Beginning, clock: Clock, accuracy: Accuracy, counts: Index) -> tuple[Real, Clock, Accuracy]:
+        """State, clock and accuracy of a run; of a scene with controllers those of the closed loop."""
+        if self.feedback is None:
+            return begin.y, clock, accuracy
+        self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
+        if self._batched:
+            self.batch = batch(self.feedback, self.feedback.motion, self.feedback.observing, len(y))
+        self.feedback.heed(counts[STOP : STOP + 1])
+        return y, clock, accuracy
+
+    def ended(self) -> LoopMemory | None:
+        """What controllers know at the end of a run, which is looked at from now on; raises what they raised."""
+        if self.feedback is None:
+            return None
+        self.feedback.raise_trouble()
+        known = self.feedback.remember()
+        self.feedback.replay()
+        return known
 
     @property
     def fault(self) -> int:
@@ -92,23 +140,32 @@ def integration(
     try:
         found = spare.pop()
     except IndexError:
+        if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
+            system = system.anew()
+            route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found
     if not system.scene.closures:
         spare.append(found)
 
 
-def integrate(system: System, solve: Integration, times: Real, settings: Settings) -> Raw:
+def integrate(
+    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None
+) -> Raw:
     """Run over the whole time, after what has to be compiled for it."""
-    initial, accuracy = system.initial_state, settings.accuracy(system.nq, system.nu)
-    ends = np.array([*timing_of(system).before(times[-1]), times[-1]])
-    out, counts = np.empty((len(times), len(initial.y))), np.zeros(COUNTS, np.int64)
-    given = initial.y, Clock(times, ends), accuracy, out, counts
+    method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
+    ends, counts = segment_ends(system, begin.state.t, times[-1], method.fixed), np.zeros(COUNTS, np.int64)
+    y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
+    memory = method.memory(len(y)) if begin.memory is None else begin.memory
+    out = np.empty((len(times), len(y)))
+    given = y, clock, accuracy, out, counts, memory, watch
     start = perf_counter()
     solve.compile(*given)
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
+    controllers = solve.ended()
     return Raw(
-        out[: counts[SAMPLES]], Status(status), solve.fault, t, counts.tolist(), begun - start, end - begun, interrupted
-    )
+        out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
+        begun - start, end - begun, interrupted, y, memory, status == CROSSED, controllers,
+    )  # fmt: skip

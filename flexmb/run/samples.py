@@ -16,22 +16,24 @@ _NUMBER_BYTES, _SAMPLE_BYTES = 16, 200  # evaluated in rows, then gathered by na
 _TOO_MANY = f"outputs would take more than {OUTPUT_BYTES / 2**30:g} GiB; ask for fewer, or run the time in pieces"
 
 
-def sample_times(samples: int | Sequence[float] | Real, t_end: float) -> Real:
-    """Times (T,) from 0 to t_end (s), so many or these; ValueError or TypeError for what makes no sense."""
+def sample_times(samples: int | Sequence[float] | Real, t_end: float, t_start: float = 0.0) -> Real:
+    """Times (T,) from t_start to t_end (s), so many or these; ValueError or TypeError for what makes no sense."""
     if np.ndim(samples) == 0:
         number = arguments.whole("samples", samples)
         if number < 2:
             raise ValueError(f"samples is {number}: ask for at least 2 output times, the start and the end")
         if number > OUTPUT_BYTES // _SAMPLE_BYTES:
             raise ValueError(f"samples is {number}: {_TOO_MANY}")
-        times = np.linspace(0.0, t_end, number)
+        times = np.linspace(t_start, t_end, number)
         if np.all(np.diff(times) > 0.0):
             return times
-        raise ValueError(f"samples is {number}: there are not so many numbers from 0 to t_end = {t_end:g} s")
+        raise ValueError(f"samples is {number}: there are not so many numbers from {t_start:g} to t_end = {t_end:g} s")
     times = arguments.array("samples", samples)
     increasing = times.ndim == 1 and len(times) > 1 and bool(np.all(np.diff(times) > 0.0))
-    if not (increasing and times[0] == 0.0 and times[-1] == t_end):
-        raise ValueError(f"the output times must increase from 0 to t_end = {t_end:g} s: sort them and add both ends")
+    if not (increasing and times[0] == t_start and times[-1] == t_end):
+        raise ValueError(
+            f"the output times must increase from {t_start:g} to t_end = {t_end:g} s: sort them and add both ends"
+        )
     return times.copy()
 
 
@@ -45,6 +47,7 @@ def refuse_too_many(samples: int, system: System) -> None:
 def sample_bytes(system: System) -> int:
     """Memory that one output time of a run takes, at most."""
     scene = system.scene
-    places = len(scene.hinges) + len(scene.wheels) + len(scene.closures) + len(scene.point_masses)
+    loaded = (scene.hinges, scene.wheels, scene.closures, scene.point_masses, scene.connectors)
+    places = sum(map(len, loaded))
     numbers = system.nq + 3 * system.nu + 24 * len(scene.markers) + 6 * places + 11
     return _NUMBER_BYTES * numbers + _SAMPLE_BYTES

@@ -5,29 +5,34 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import replace
-from time import perf_counter
-from typing import TypedDict, Unpack
+from functools import partial
+from typing import Any, TypedDict, Unpack
 
 import numpy as np
 
 from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.control import ACCEPTED, COUNTS, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
+from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
+from flexmb.run.eventful import EventfulRun, refuse_events
 from flexmb.run.interruption import Interrupted
-from flexmb.run.observing import Sampler, observe
+from flexmb.run.making import Making
+from flexmb.run.origin import Beginning, Values, origin, start_time
+from flexmb.run.outputs import observed
 from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
-from flexmb.run.switching import refuse_end
-from flexmb.run.trajectory import Statistics, Trajectory, gathered
-from flexmb.scene.check import check_scene
+from flexmb.run.switching import refuse_times
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.compile import assembled
+from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.state import DynamicsError, NotFiniteError, PrecisionWarning
+from flexmb.tables.state import PrecisionWarning, State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -50,12 +55,14 @@ def simulate(
     t_end: float,
     method: Method = "dop853",
     *,
+    t_start: float | None = None,
+    state: State | Restart | Values | None = None,
     samples: int | Sequence[float] | Real = 201,
     algorithm: Algorithm = "articulated",
     stabilise: float = 0.0,
     **settings: Unpack[RunSettings],
 ) -> Trajectory:
-    """Simulate a scene from its initial state at t = 0 to `t_end` (s).
+    """Simulate a scene from its initial state at t = 0 to `t_end` (s), or from another time and state.
 
     method: "dop853" adapts its step so that the error of each step stays below `rtol |y_i| + atol` (1e-10 and 1e-12 if
     left out), in the root mean square over all coordinates and speeds y_i, in SI units; "rk4" takes equal steps not
@@ -65,41 +72,56 @@ def simulate(
     equal steps and damps the modes that they do not resolve, by `spectral_radius` from 1 (no damping) to 0 (all in one
     step), 0.8 if left out; rtol and atol bound the remaining error of its Newton iterations. See docs/integrators.md.
     max_steps: a run of more steps stops, 1,000,000 if left out. samples: how many equally spaced output times, both
-    ends included, or the times themselves, from 0 to t_end. algorithm: "articulated", the O(N) recursion; "composite",
-    the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which take bodies
-    of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how closures are kept
-    closed. 0: after every step coordinates and speeds are projected back to where all closures are closed, to 1e-13 of
-    the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0 (Baumgarte), which
-    costs less and leaves a drift; k times the step should stay below 1.
+    ends included, or the times themselves, from start to end. algorithm: "articulated", the O(N) recursion;
+    "composite", the mass matrix and its Cholesky factors; or Frisch's equations, "frisch" or "frisch_as_printed", which
+    take bodies of level `full` as `linear`. Accelerations and loads of the output are theirs too. stabilise: how
+    closures are kept closed. 0: after every step coordinates and speeds are projected back to where all closures are
+    closed, to 1e-13 of the mechanism's size. With a rate k (1/s) errors g of closures decay by g'' + 2 k g' + k^2 g = 0
+    (Baumgarte), which costs less and leaves a drift; k times the step should stay below 1.
 
-    Raises SceneError for a scene that is wrong or whose profiles end before t_end, NotImplementedError for one that is
-    not supported yet, ValueError or TypeError for settings that make no sense, ClosureError where no initial state
-    closes the closures or they leave no motion. A run that fails raises nothing: `status` and `message` of the
-    trajectory say why it stopped, and the samples up to there are kept. Ctrl-C ends a run at its next step and raises
-    `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up to there; a second Ctrl-C while their
-    outputs are evaluated keeps those that are finished.
+    t_start (s), any finite time, which functions of time know: 0 or the state's own if left out. state: a `State`, such
+    as `Trajectory.last_state`; or values of coordinates and speeds by name, all others being the scene's: names as in
+    `Trajectory.q_names` and `u_names`, or all coordinates of a hinge, wheel or "<body>.modes", with ".speeds" behind it
+    all its speeds; closed chains take the nearest state that closes their closures. Or a `Restart`, by which a run of
+    the same scene and method is taken up to the last bit.
+
+    Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene that is wrong or whose profiles end before
+    t_end, NotImplementedError for one that is not supported yet, ValueError or TypeError for settings that make no
+    sense, ClosureError where no initial state closes the closures or they leave no motion, or the state that is given
+    is far from it. A run that fails raises
+    nothing: `status` and `message` of the trajectory say why it stopped, and the samples up to there are kept. Ctrl-C
+    ends a run at its next step and raises `Interrupted`, a KeyboardInterrupt, whose `trajectory` holds the samples up
+    to there; a second Ctrl-C while their outputs are evaluated keeps those that are finished.
     """
     refuse_unknown("simulate", settings)
-    t_end = _end(t_end)
+    t_end, t = _end(t_end), start_time(t_start, state)
     if isinstance(scene, System):
-        refuse_end(scene, t_end)
+        refuse_times(scene, t, t_end)
     else:
-        check_scene(scene, t_end)
-    chosen = Settings(method, **settings).checked(t_end)
+        check_and_warn(scene, t_end, t)
+    chosen = Settings(method, **settings).checked(max(abs(t), abs(t_end)))
     stabilise = arguments.number("stabilise", stabilise)
-    times = sample_times(samples, t_end)
+    times = sample_times(samples, t_end, t)
     system = scene if isinstance(scene, System) else assembled(scene)
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
+    refuse_events(system, method)
+    same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
+    made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
-        start = system.start_precision
+        begin = origin(system, t, state, method)
+        start = system.start_precision if state is None and t == 0.0 else system.precision_if_doubtful(begin.state)
         if start is not None and start.status != Status.OK:
-            nothing = np.empty((0, system.nq + system.nu + 1))
-            raw = Raw(nothing, Status(start.status), start.fault, 0.0, [0] * COUNTS, 0.0, 0.0, interrupted=False)
-            return _observed(system, times, raw, algorithm, solve.batch)
-        raw = integrate(system, solve, times, chosen)
-        trajectory = _observed(system, times, raw, algorithm, solve.batch)
+            return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
+        if not system.scene.events:
+            raw = integrate(system, solve, begin, times, chosen)
+            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
+    if system.scene.events:
+        run = EventfulRun(system, times, chosen, algorithm, stabilise)
+        trajectory, raw = run(begin)
+        system = run.system
+    trajectory = replace(trajectory, restart=_restart(system, raw, method))
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")
@@ -108,11 +130,27 @@ def simulate(
     return trajectory
 
 
+def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Trajectory:
+    """The same run with other settings; ValueError for one that was taken up, whose beginning is another run's."""
+    if isinstance(same["state"], Restart):
+        raise ValueError("this run took up another, and only that one's beginning is exact: ask a run of both for this")
+    return simulate(
+        system, t_end, settings.method, rtol=settings.rtol, atol=settings.atol, step=settings.step,
+        max_steps=settings.max_steps, spectral_radius=settings.spectral_radius, **same,
+    )  # fmt: skip
+
+
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError where a method that linearises finds no Jacobian."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
+    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
+    if continuous:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which continuous controllers have none of: use {others}, or give '
+            f'"{continuous[0]}" a period_s'
+        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
@@ -137,53 +175,17 @@ def _end(t_end: float) -> float:
         return float(t_end) if isinstance(t_end, float) else np.inf
 
 
-def _observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, batch: Sampler | None) -> Trajectory:
-    """Evaluate everything observable at the samples reached."""
-    start = perf_counter()
-    rows, trouble = observe(system, algorithm, times, raw.states, batch)
-    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
-    if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
-        status, stopped_at = _why(trouble), float(times[len(rows)])
-        message = f"stopped at t = {stopped_at:g} s" + (
-            f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
-        )
-    states = raw.states[: len(rows)]
-    q_names, u_names = system.state_names
-    return Trajectory(
-        scene=system.scene.name,
-        status=status,
-        message=message,
-        stopped_at=stopped_at,
-        t=times[: len(rows)],
-        q=states[:, : system.nq],
-        u=states[:, system.nq : -1],
-        q_names=q_names,
-        u_names=u_names,
-        **gathered(system._observation, rows),
-        work=states[:, -1],
-        statistics=Statistics(
-            evaluations=raw.counts[EVALUATIONS],
-            accepted_steps=raw.counts[ACCEPTED],
-            rejected_steps=raw.counts[REJECTED],
-            jacobians=raw.counts[JACOBIANS],
-            factorisations=raw.counts[FACTORISATIONS],
-            compile_s=raw.compile_s,
-            run_s=raw.run_s,
-            output_s=perf_counter() - start,
-        ),
-    )
+def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
+    """The result of a run whose first state has no accelerations."""
+    nothing, memory = np.empty((0, len(begin.y))), settings.integrator.memory(len(begin.y))
+    return Raw(
+        nothing, Status(start.status), start.fault, begin.state.t, [0] * COUNTS, 0.0, 0.0, interrupted=False,
+        y=begin.y, memory=memory,
+    )  # fmt: skip
 
 
-def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
-    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
-    the place where the dynamics ends."""
-    if isinstance(trouble, KeyboardInterrupt):
-        return Status.INTERRUPTED
-    return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
-
-
-def _message(system: System, raw: Raw) -> str:
-    if raw.status is Status.OK:
-        return f"finished at t = {raw.t:g} s"
-    place = system.fault_name(raw.status, raw.fault)
-    return f"stopped at t = {raw.t:g} s: " + raw.status.advice.format(body=f'"{place}"')
+def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
+    """Of a run that did not fail."""
+    if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
+        return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
+    return None

@@ -16,7 +16,8 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
-from flexmb.run.switching import refuse_end
+from flexmb.run.switching import refuse_times
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
 from flexmb.system.tree_system import System
@@ -54,8 +55,11 @@ def simulate_batch(
     chosen = Settings(method, **settings).checked(t_end)
     if chosen.integrator.linearises:
         refuse_without_jacobian(batch.systems[0], "articulated", method)
+    refuse_feedback(batch.systems[0].scene, "simulate_batch")
     for system in batch.systems:
-        refuse_end(system, t_end)
+        refuse_times(system, 0.0, t_end)
+        if system.scene.events:
+            raise NotImplementedError(f'scene "{system.scene.name}" has events, which simulate alone runs')
     times = sample_times(samples, t_end)
     rows = batch.states(*_given(batch, q, u))
     number = number_of_threads(threads, -(-len(rows[0]) // LANES))

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from rich.table import Table
 from rich.text import Text
 
+from flexmb.run.channels import channels_of, signal_range, unit
 from flexmb.run.trajectory import Trajectory
+from flexmb.typing import Real
+
+MOST_EVENTS = 8  # that are told one by one
 
 
 def summary(trajectory: Trajectory) -> Table:
@@ -19,6 +25,22 @@ def summary(trajectory: Trajectory) -> Table:
     return table
 
 
+def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Table:
+    """The largest estimated error of each channel, in its unit and relative to its range."""
+    table = Table(
+        title="\nErrors by a tighter run", title_justify="left", box=None, padding=(0, 2, 0, 0),
+        caption="Relative: to the channel's range; for positions and orientations how far they get from the start.",
+        caption_justify="left",
+    )  # fmt: skip
+    for name, justify in (("channel", "left"), ("largest error", "right"), ("relative", "right")):
+        table.add_column(name, justify=justify)  # type: ignore[arg-type]
+    for name, values in channels_of(trajectory).items():
+        largest, scale = float(np.max(errors[name], initial=0.0)), signal_range(name, values)
+        relative = f"{largest / scale:.1e}" if scale > 0.0 else ""
+        table.add_row(name, f"{largest:.1e} {'rad' if name.endswith('.orientation') else unit(name)}", relative)
+    return table
+
+
 def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
     cost = trajectory.statistics
     steps = f"{cost.accepted_steps} accepted, {cost.rejected_steps} rejected, {cost.evaluations} evaluations"
@@ -28,6 +50,8 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("status", Text(trajectory.message, style="green" if trajectory.finished else "bold red")),
         ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),
     ]
+    if trajectory.events:
+        rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
         rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
     return [
@@ -35,6 +59,13 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("steps", steps),
         ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run, {cost.output_s:.2f} s output"),
     ]
+
+
+def _events(trajectory: Trajectory) -> str:
+    """The first few by name and time."""
+    told = [f"{event.name} at {event.t:.6g} s" for event in trajectory.events[:MOST_EVENTS]]
+    left = len(trajectory.events) - len(told)
+    return ", ".join(told) + (f", and {left} more" if left else "")
 
 
 def _energy(trajectory: Trajectory) -> str:

@@ -5,28 +5,33 @@ from __future__ import annotations
 from math import inf
 from typing import NamedTuple
 
+import numpy as np
+
 from flexmb.scene.check import check_run
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
 from flexmb.scene.functions import Pulse, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
+from flexmb.typing import Real
 
 
 class Timing(NamedTuple):
-    """switches (s), increasing: where a function jumps or is no longer smooth; end (s): until when all are defined."""
+    """switches (s), increasing: where a function jumps or is no longer smooth; from `start` to `end` (s) all are
+    defined."""
 
     switches: tuple[float, ...]
+    start: float
     end: float
 
-    def before(self, t_end: float) -> list[float]:
-        """Switches in (0, t_end): no step may cross one (s)."""
-        return [time for time in self.switches if 0.0 < time < t_end]
+    def between(self, t_start: float, t_end: float) -> list[float]:
+        """Switches in (t_start, t_end): no step may cross one (s)."""
+        return [time for time in self.switches if t_start < time < t_end]
 
 
 def timing(scene: Scene) -> Timing:
     """Of all functions of a scene."""
-    switches, end = set[float](), inf
+    switches, start, end = set[float](), -inf, inf
     for _, _, function in values(ROOT, scene):
         match function:
             case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
@@ -34,8 +39,8 @@ def timing(scene: Scene) -> Timing:
             case SpinUp(duration_s=duration):
                 switches.add(duration)
             case Table(times_s=times):
-                end = min(end, times[-1])
-    return Timing(tuple(sorted(switches)), end)
+                start, end = max(start, times[0]), min(end, times[-1])
+    return Timing(tuple(sorted(switches)), start, end)
 
 
 def timing_of(system: System) -> Timing:
@@ -46,7 +51,17 @@ def timing_of(system: System) -> Timing:
     return found
 
 
-def refuse_end(system: System, t_end: float) -> None:
-    """SceneError unless t_end (s) is positive and finite, and every profile covers the run."""
-    if not 0.0 < t_end <= min(timing_of(system).end, 1e300):
-        check_run(system.scene, t_end)
+def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool) -> Real:
+    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`."""
+    found = timing_of(system)
+    is_switch = t_end in found.switches
+    if equal_steps:
+        return np.array([*found.between(t_start, t_end), *[t_end] * is_switch, inf])
+    return np.array([*found.between(t_start, t_end), t_end, *[t_end] * is_switch])
+
+
+def refuse_times(system: System, t_start: float, t_end: float) -> None:
+    """SceneError unless the run has finite ends in order, and every profile covers it."""
+    found = timing_of(system)
+    if not max(found.start, -1e300) <= t_start < t_end <= min(found.end, 1e300):
+        check_run(system.scene, t_end, t_start)

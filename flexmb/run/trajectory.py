@@ -5,15 +5,25 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flexmb.run import exports
+from flexmb.run.joining import joined
+from flexmb.run.making import Making, error_estimate
+from flexmb.run.restart import Restart
+from flexmb.run.situation import EventRecord
+from flexmb.scene.angles import Angles, angles_of
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
+from flexmb.system.load_axes import Axes
 from flexmb.system.observables import ENERGIES, Observation
+from flexmb.system.section_loads import SectionBalance, SectionLoads
+from flexmb.tables.state import State
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -34,6 +44,14 @@ class MarkerPath:
     quaternion: Real
     velocity: Real
     acceleration: Real
+
+    def angles(self, sequence: str = "zyx") -> Angles:
+        """Angles (T,3) rad of a gimbal's `sequence` of axes, without whole turns of jumps; (T,) where singular.
+
+        See `flexmb.scene.angles.angles_of`.
+        """
+        found = angles_of(self.quaternion, sequence)
+        return Angles(np.unwrap(found.values, axis=0), found.singular)
 
 
 @dataclass(frozen=True)
@@ -61,7 +79,11 @@ class Trajectory:
     loads by hinge (T,6) [torque; force] on the outboard body about the outboard hinge point, World axes; wheel_loads by
     wheel (T,6) about its centre; drives by hinge or wheel (T,n) generalised loads of the prescribed coordinates; energy
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
-    motors, dampers and loads. `stopped_at` is the time of the last good state: the end of the run if it finished.
+    motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
+    if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
+    connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
+    `events`: what happened, in the order of time. signals (T,k) by sensor and controller, power (T,k) W that each
+    output of a controller puts into the motion, of a scene that has some.
     """
 
     scene: str
@@ -81,10 +103,93 @@ class Trajectory:
     momentum: Real
     work: Real
     statistics: Statistics
+    connectors: dict[str, Real] = field(default_factory=dict)
+    hinge_forces: dict[str, Real] = field(default_factory=dict)
+    restart: Restart | None = None
+    signals: dict[str, Real] = field(default_factory=dict)
+    power: dict[str, Real] = field(default_factory=dict)
+    events: tuple[EventRecord, ...] = ()
+    made_by: Making | None = field(default=None, repr=False, compare=False)
+    """The system and the settings of the run; None where it was put together otherwise."""
+
+    def error_estimate(self) -> dict[str, Real]:
+        """Error (T,) of every channel, in its unit (orientations: rad), by a second, tighter run from start to end.
+
+        That run has rtol and atol of a hundredth, or half the step; its distance from this one is the error of this
+        one but for a hundredth, or a third, which is added. NaN where the second run did not come. Errors that both
+        have in common, such as too few modes, do not show. ValueError where settings cannot be tighter.
+        """
+        return error_estimate(self, self._making("its error"))
+
+    def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
+        """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).
+
+        See `System.hinge_loads`.
+        """
+        system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
+        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
+            at = system._loads_in(float(t), y, {name: load[i] for name, load in self.loads.items()}, axes, about)
+            for name, load in at.items():
+                found[name][i] = load
+        return found
+
+    @property
+    def _states(self) -> Real:
+        """(T,nq+nu+1) [q, u, 0]."""
+        return np.column_stack([self.q, self.u, np.zeros(len(self.t))])
+
+    def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
+        """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
+
+        See `System.section_loads`. Raises DynamicsError where a state has no accelerations, NotImplementedError for a
+        scene with controllers, of whose loads a state by itself knows nothing.
+        """
+        system = self._making("a section's load").system
+        refuse_feedback(system.scene, "a section's load")
+        balance = SectionBalance(system, body, x)
+        loads = np.zeros((len(self.t), len(balance.x), 6))
+        for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
+            loads[i] = balance.at(float(t), y)
+        return balance.loads(loads)
+
+    def _making(self, wanted: str) -> Making:
+        made_by = self.made_by
+        if made_by is None or not np.array_equal(self.t, made_by.times[: len(self.t)]):
+            raise ValueError(
+                f"this trajectory is not one run as simulate made it, and {wanted} needs that: ask each run for itself"
+            )
+        return made_by
 
     @property
     def finished(self) -> bool:
         return self.status is Status.OK
+
+    @property
+    def last_state(self) -> State:
+        """The state at the last output time: `simulate(other, t_end, state=trajectory.last_state)` starts from it."""
+        return self.state_at(-1)
+
+    def state_at(self, sample: int) -> State:
+        """The state at an output time, by its number; negative ones count from the end. IndexError without it."""
+        return State(self.q[sample], self.u[sample], float(self.t[sample]))
+
+    def values_at(self, sample: int) -> dict[str, float]:
+        """The same by the names of coordinates and speeds, for a scene that shares some of them."""
+        values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
+        return {name: float(value) for (name, _), value in values}
+
+    def then(self, later: Trajectory) -> Trajectory:
+        """This run and a later one as one: output times of this one, as far as the later one does not have them.
+
+        Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
+        them lacks are zero there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        the last time of this one.
+        """
+        if len(later.t) and later.t[0] > self.stopped_at:
+            raise ValueError(
+                f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
+            )
+        return joined(self, later)
 
     @property
     def total_energy(self) -> Real:
@@ -120,16 +225,24 @@ class Trajectory:
                 yield f"{name}.quaternion.{axis}", "1", path.quaternion[:, i]
             yield from _spatial(name, ("angular_velocity", "velocity"), ("rad/s", "m/s"), path.velocity)
             yield from _spatial(name, ("angular_acceleration", "acceleration"), ("rad/s^2", "m/s^2"), path.acceleration)
-        for name, load in (self.loads | self.wheel_loads).items():
+        for name, load in (self.loads | self.wheel_loads | self.connectors).items():
             yield from _spatial(name, ("torque", "force"), ("N m", "N"), load)
         for name, drive in self.drives.items():
             for i in range(drive.shape[1]):
                 yield f"{name}.drive[{i}]", "N or N m", drive[:, i]
+        for name, force in self.hinge_forces.items():
+            yield f"{name}.hinge_force", "N or N m", force[:, 0]
         for kind, energy in self.energy.items():
             yield f"energy.{kind}", "J", energy
         yield "energy.total", "J", self.total_energy
         yield "work", "J", self.work
         yield from _spatial("momentum", ("angular", "linear"), ("N m s", "N s"), self.momentum)
+        for name, signals in self.signals.items():
+            for i in range(signals.shape[1]):
+                yield f"signal.{name}[{i}]", "", signals[:, i]
+        for name, power in self.power.items():
+            for i in range(power.shape[1]):
+                yield f"power.{name}[{i}]", "W", power[:, i]
 
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
@@ -183,6 +296,8 @@ def gathered(observation: Observation, rows: Real) -> dict[str, Any]:
         "drives": {name: found["drives"][:, places] for name, places in names.driven.items()},
         "energy": _by_name(ENERGIES, found["energy"]),
         "momentum": found["momentum"].copy(),
+        "connectors": _by_name(names.connectors, found["connectors"]),
+        "hinge_forces": _by_name(names.hinge_forces, found["hinge_forces"][:, :, None]),
     }
 
 

@@ -77,4 +77,15 @@ class Table(_Function, frozen=True, tag="table", kw_only=True):
     values: tuple[float, ...]
 
 
-Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table
+class ControlSignal(_Function, frozen=True, tag="signal", kw_only=True):
+    """`gain` times an output of a controller: feedback as torque of a hinge or wheel, or as force or torque of a load.
+
+    `source` names the controller, or one of several outputs: "attitude[2]". In a run it is what the controller says;
+    where a scene is looked at by itself, at one state or in a linear model, it is zero: the loop is open.
+    """
+
+    source: str
+    gain: float = 1.0
+
+
+Function = Constant | Ramp | Sine | SmoothStep | SpinUp | Pulse | Table | ControlSignal

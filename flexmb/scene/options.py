@@ -110,6 +110,97 @@ class ClosureFrames(TypedDict, total=False):
     quaternion_b: ArrayLike
 
 
+class SpringEnds(TypedDict, total=False):
+    """Where a spring's ends are: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
+
+    node_a: str
+    node_b: str
+    position_a: ArrayLike
+    position_b: ArrayLike
+
+
+class LoadLaw(TypedDict, total=False):
+    """How a spring resists a displacement x: `preload` + `stiffness` x + `stiffening`[0] x² ..., or `loads` over
+    `table`; and `damping`."""
+
+    preload: float
+    stiffness: float
+    stiffening: Sequence[float]
+    table: ArrayLike
+    loads: ArrayLike
+    damping: float
+
+
+class SpringOptions(SpringEnds, LoadLaw, total=False):
+    """Ends and law, the `free_length` (m) from which x counts, whether it `acts` in "tension" or "compression" only,
+    and an actuator's `force` (N) as a function of time: positive pushes the ends apart."""
+
+    free_length: float
+    acts: Literal["both", "tension", "compression"]
+    force: s.Function | None
+
+
+class HingeSpringOptions(LoadLaw, total=False):
+    """Which `coordinate` of the hinge, the law about `rest`, and stops at `lower` and `upper` (rad or m) with their
+    `stop_stiffness` and `stop_dissipation` (s/rad or s/m)."""
+
+    coordinate: str
+    rest: float
+    lower: float | None
+    upper: float | None
+    stop_stiffness: float
+    stop_dissipation: float
+
+
+class FrictionOptions(TypedDict, total=False):
+    """Which `coordinate` of the hinge, and static friction `static` (N m or N) with its `stribeck` speed."""
+
+    coordinate: str
+    static: float | None
+    stribeck: float | None
+
+
+class Sampling(TypedDict, total=False):
+    """When a controller acts: every `period` (s) from `offset` (s) on, its outputs changing `delay` (s) later; without
+    a period always."""
+
+    period: float | None
+    offset: float
+    delay: float
+
+
+class LinearLaw(Sampling, total=False):
+    """Matrices `A`, `B`, `C`, `D` and `initial` states of a linear controller."""
+
+    A: ArrayLike
+    B: ArrayLike
+    C: ArrayLike
+    D: ArrayLike
+    initial: ArrayLike
+
+
+class PidLaw(Sampling, total=False):
+    """Gains `kp`, `ki`, `kd`, constant `setpoint`, time constant `filter` (s) of the derivative, limits `lower` and
+    `upper`, time `tracking` (s) in which a limit takes back the integral."""
+
+    kp: float
+    ki: float
+    kd: float
+    setpoint: float
+    filter: float
+    lower: float | None
+    upper: float | None
+    tracking: float | None
+
+
+class OwnLaw(Sampling, total=False):
+    """Number of `outputs`, `initial` state and `parameters` of a function of one's own."""
+
+    outputs: int
+    initial: ArrayLike
+    parameters: ArrayLike
+
+
 class SectionShape(TypedDict, total=False):
     """A beam section's torsion constant `J` (m⁴), `shear_factor`, and station `x` (m)."""
 

@@ -1,8 +1,8 @@
-"""The problems of a scene: what is wrong, where, and what to write instead."""
+"""The problems of a scene: what is wrong or doubtful, where, and what to write instead."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from difflib import get_close_matches
 
@@ -38,6 +38,23 @@ class Defect:
         return f"{self.where}: {self.what}\n     -> {self.remedy}"
 
 
+@dataclass(frozen=True)
+class Doubt(Defect):
+    """What a sound scene may have, but few do: it runs as it is. `waiver` in the scene's `allow` says that it is meant.
+
+    An error of a factor of a thousand usually looks like this, and so does a scene in millimetres.
+    """
+
+    waiver: str
+
+    def __str__(self) -> str:
+        return f'{super().__str__()}; if it is meant, write allow = ["{self.waiver}"] in the scene'
+
+
+class SceneWarning(UserWarning):
+    """A scene that runs, of which something is doubtful; the message says where, and how to waive it."""
+
+
 class SceneError(ValueError):
     """A scene that cannot be simulated; `problems` lists every defect found."""
 
@@ -47,6 +64,16 @@ class SceneError(ValueError):
         count = f"{len(self.problems)} problem{'s' if len(self.problems) > 1 else ''}"
         lines = [f"{number:3d}. {problem}" for number, problem in enumerate(self.problems, 1)]
         super().__init__("\n".join([f'scene "{scene}" has {count}:', *lines]))
+
+
+def in_short(scene: str, doubts: Sequence[Doubt]) -> str:
+    """The text of a warning: the first doubt of each kind in full, of the others their number."""
+    kinds: dict[str, list[Doubt]] = {}
+    for doubt in doubts:
+        kinds.setdefault(doubt.waiver, []).append(doubt)
+    more = {kind: f" (and {len(alike) - 1} more like it)" if len(alike) > 1 else "" for kind, alike in kinds.items()}
+    lines = [f"{number:3d}. {alike[0]}{more[kind]}" for number, (kind, alike) in enumerate(kinds.items(), 1)]
+    return "\n".join([f'scene "{scene}" is doubtful:', *lines])
 
 
 def closest(word: str, known: Iterable[str]) -> str:

@@ -46,6 +46,13 @@ def quaternion_of(R: Real) -> Real:
     return np.where(first < 0.0, -found, found)
 
 
+def rotation_by(vector: ArrayLike) -> Real:
+    """R (...,3,3) of rotation vectors (...,3) in rad: a turn about each by its length."""
+    v = np.asarray(vector, dtype=float)
+    half = np.linalg.norm(v, axis=-1, keepdims=True) / 2.0
+    return rotation_matrix(np.concatenate([np.cos(half), 0.5 * np.sinc(half / np.pi) * v], axis=-1))
+
+
 def about(axis: str, angle: float) -> Real:
     """R (3,3) of a turn by `angle` (rad) about "x", "y" or "z"."""
     i = "xyz".index(axis)

@@ -6,7 +6,8 @@ indices; keys carry units. Frames, signs and orders: docs/notation.md.
 
 from __future__ import annotations
 
-from typing import Literal
+from collections.abc import Mapping
+from typing import Any, Literal
 
 from flexmb.scene.bodies import (
     ZERO,
@@ -28,7 +29,31 @@ from flexmb.scene.bodies import (
     TipMass,
     Vector,
 )
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.connectors import (
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    Connector,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+)
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    TimeSensor,
+    UserLaw,
+)
+from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release, SceneEvent
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.hinges import (
     AngularCoordinate,
     Closure,
@@ -44,6 +69,7 @@ from flexmb.scene.hinges import (
     Universal,
     Weld,
 )
+from flexmb.scene.values import with_values
 
 
 class Wheel(SceneStruct, frozen=True, kw_only=True):
@@ -113,26 +139,60 @@ class ModalState(SceneStruct, frozen=True, kw_only=True):
     rates: tuple[float, ...] = ()
 
 
+Waiver = Literal[
+    "wave_speed",
+    "thick_section",
+    "shear_stiffness",
+    "modal_frequency",
+    "negative_stiffness",
+    "negative_damping",
+]
+
+
 class Scene(SceneStruct, frozen=True, kw_only=True):
-    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it."""
+    """A multibody scene: bodies joined to a tree by hinges (base "ground"), plus what acts on it.
+
+    Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
+    meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
+    above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
+    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
+    dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
+    """
 
     name: str
     description: str = ""
+    allow: tuple[Waiver, ...] = ()
     gravity_m_s2: Vector = ZERO
     bodies: tuple[Body, ...]
     hinges: tuple[Hinge, ...]
     closures: tuple[Closure, ...] = ()
+    connectors: tuple[Connector, ...] = ()
     wheels: tuple[Wheel, ...] = ()
     point_masses: tuple[PointMass, ...] = ()
     loads: tuple[Load, ...] = ()
     markers: tuple[Marker, ...] = ()
     modal_states: tuple[ModalState, ...] = ()
+    sensors: tuple[Sensor, ...] = ()
+    controllers: tuple[Controller, ...] = ()
+    events: tuple[SceneEvent, ...] = ()
+
+    def with_values(self, values: Mapping[str, Any]) -> Scene:
+        """The scene with other values, for sweeps and stages: `scene.with_values({"rod.mass_kg": 2.0})`.
+
+        Paths go by keys, items by their name, number or `*` for all: see `flexmb.scene.values.with_values`. Raises
+        PathError, a ValueError, for a path that leads to nothing, and for a value of another kind.
+        """
+        return with_values(self, values)
 
 
 __all__ = [
-    "AngularCoordinate", "BeamBody", "BeamNode", "BeamStation", "Body", "Closure", "Constant", "Cylindrical", "Free",
-    "Function", "Gimbal", "Hinge", "InertiaPoint", "Level", "LinearCoordinate", "Load", "Marker", "Matrix3",
-    "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Planar", "PointMass", "Prismatic", "Pulse",
-    "Quaternion", "Ramp", "Revolute", "RigidBody", "Scene", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "Table", "TipMass", "Universal", "Vector", "Weld", "Wheel",
+    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation",
+    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller",
+    "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
+    "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
+    "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
+    "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",
+    "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
+    "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver",
+    "Weld", "Wheel",
 ]  # fmt: skip

@@ -6,8 +6,9 @@ from typing import NamedTuple
 
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
 from flexmb.scene.columns import struct_keys
+from flexmb.scene.connectors import AlongHinge, AngularFriction, AngularSpring
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
-from flexmb.scene.schema import PointMass, Scene
+from flexmb.scene.schema import PointMass, Scene, Wheel
 
 GROUND = "ground"
 
@@ -101,3 +102,49 @@ def coordinates(item: Hinge | PointMass) -> tuple[NamedCoordinate, ...]:
             case (AngularCoordinate() | LinearCoordinate(), *_) as several:
                 found.extend(NamedCoordinate(f"{key}[{i}]", each) for i, each in enumerate(several))
     return tuple(found)
+
+
+def scalar_paths(scene: Scene) -> dict[str, str]:
+    """Scalar coordinates as states name them, "<hinge>.<key>" and "<wheel>.angle", and the paths of their structs.
+
+    Paths are those of `Scene.with_values`.
+    """
+    found = {}
+    for collection in ("hinges", "point_masses"):
+        for item in getattr(scene, collection):
+            for name, _ in coordinates(item):
+                key = name.replace("[", ".").rstrip("]")
+                found[f"{item.name}.{name}"] = f"{collection}.{item.name}.{key}"
+    return found | {f"{wheel.name}.angle": f"wheels.{wheel.name}" for wheel in scene.wheels}
+
+
+def rate_name(coordinate: str, path: str) -> str:
+    """How states name the rate of a scalar coordinate, which has a path as of `scalar_paths`."""
+    if path.startswith("wheels."):
+        return f"{coordinate.removesuffix('.angle')}.speed"
+    return f"{coordinate}.rate"
+def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMass | Wheel, int]:
+    """The item along whose coordinate a connector acts, and the number of the coordinate among its scalar ones.
+
+    ValueError where there is none, or where the connector does not say which.
+    """
+    items = {item.name: item for item in (*scene.hinges, *scene.point_masses, *scene.wheels)}
+    angular = isinstance(connector, AngularSpring | AngularFriction)
+    sort = "angle" if angular else "displacement"
+    item = items.get(connector.hinge)
+    if item is None:
+        raise ValueError(f'there is no hinge, point mass or wheel "{connector.hinge}"')
+    if isinstance(item, Wheel):
+        if isinstance(connector, AngularFriction) and connector.coordinate in ("", "angle"):
+            return item, 0
+        raise ValueError(f'"{item.name}" is a wheel: of connectors along hinges only angular_friction acts on it')
+    names = {
+        name: n
+        for n, (name, each) in enumerate(coordinates(item))
+        if isinstance(each, AngularCoordinate) == angular and connector.coordinate in ("", name)
+    }
+    if len(names) == 1:
+        return item, next(iter(names.values()))
+    if names:
+        raise ValueError(f'"{item.name}" has more than one {sort}, {", ".join(names)}: say which coordinate is meant')
+    raise ValueError(f'"{item.name}" has no {sort} "{connector.coordinate}"'.replace(' ""', ""))

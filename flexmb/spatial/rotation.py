@@ -78,6 +78,30 @@ def rotation_vector(w, x, y, z):
 
 
 @helper
+def quaternion_of_matrix(R):
+    """Unit quaternion, scalar first, of a rotation matrix, by the largest of its components: no cancellation."""
+    d = 1.0 + R[0] + R[4] + R[8]  # rows of 4 q q', of which each is q but for a factor
+    q = d, R[7] - R[5], R[2] - R[6], R[3] - R[1]
+    d, q = _larger(d, q, 1.0 + R[0] - R[4] - R[8], (R[7] - R[5], 1.0 + R[0] - R[4] - R[8], R[1] + R[3], R[2] + R[6]))
+    d, q = _larger(d, q, 1.0 - R[0] + R[4] - R[8], (R[2] - R[6], R[1] + R[3], 1.0 - R[0] + R[4] - R[8], R[5] + R[7]))
+    d, q = _larger(d, q, 1.0 - R[0] - R[4] + R[8], (R[3] - R[1], R[2] + R[6], R[5] + R[7], 1.0 - R[0] - R[4] + R[8]))
+    s = 0.5 / sqrt(d)
+    return s * q[0], s * q[1], s * q[2], s * q[3]
+
+
+@helper
+def _larger(d, q, d2, q2):
+    """Of two diagonal elements with their rows, the larger one."""
+    second = d2.real > d.real
+    return select(second, d2, d), (
+        select(second, q2[0], q[0]),
+        select(second, q2[1], q[1]),
+        select(second, q2[2], q[2]),
+        select(second, q2[3], q[3]),
+    )
+
+
+@helper
 def _series(t2):
     """`exponential_coefficients` by series: the closed forms cancel at small angles.
 
@@ -173,6 +197,57 @@ def left_jacobian_times(theta, k, v):
     """J_l(theta) v = v + a2 theta x v + a3 theta x (theta x v)."""
     c = cross(theta, v)
     return add(add(v, scale(k[1], c)), scale(k[2], cross(theta, c)))
+
+
+@helper
+def _near(t2):
+    """1/12 + t^2/720 + ..., terms |B_2n|/(2n)! t^(2n-2): the first left out is below 1e-17 for t^2 < 1."""
+    b = 43867.0 / 5109094217170944000.0 + t2 * (174611.0 / 802857662698291200000.0)
+    b = 1.0 / 74724249600.0 + t2 * (3617.0 / 10670622842880000.0 + t2 * b)
+    b = 1.0 / 47900160.0 + t2 * (691.0 / 1307674368000.0 + t2 * b)
+    return 1.0 / 12.0 + t2 * (1.0 / 720.0 + t2 * (1.0 / 30240.0 + t2 * (1.0 / 1209600.0 + t2 * b)))
+
+
+@helper
+def _far(t2):
+    t = sqrt(t2)
+    s, c = sincos(t)
+    return (1.0 - 0.5 * t * s / (1.0 - c)) / t2
+
+
+@helper
+def _one_angle(t2):
+    if t2.real < 1.0:
+        return _near(t2)
+    return _far(t2)
+
+
+@helper
+def _angles(t2):
+    """Of lanes, each with the form that its angle asks for."""
+    small = t2 < 1.0
+    near = _near(t2)
+    if every(small):
+        return near
+    return select(small, near, _far(t2))
+
+
+# b = (1 - (t/2) cot(t/2))/t^2 from t^2: J_l^-1 = 1 - 1/2 skew(theta) + b skew(theta)^2, regular below a whole turn
+inverse_jacobian_coefficient = by_number(_one_angle, _angles)
+
+
+@helper
+def inverse_left_jacobian_times(theta, b, v):
+    """J_l(theta)^-1 v, b = inverse_jacobian_coefficient(theta . theta)."""
+    x = cross(theta, v)
+    return add(add(v, scale(-0.5, x)), scale(b, cross(theta, x)))
+
+
+@helper
+def inverse_right_jacobian_times(theta, b, v):
+    """J_r(theta)^-1 v, which is the transpose of J_l^-1 times v."""
+    x = cross(theta, v)
+    return add(add(v, scale(0.5, x)), scale(b, cross(theta, x)))
 
 
 @helper

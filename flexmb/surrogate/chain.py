@@ -9,6 +9,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from flexmb.modal import flexible_model
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import BeamBody, Body, Hinge, Scene
 
 
@@ -38,9 +39,9 @@ def in_pieces(
 ) -> Scene:
     """The scene with `pieces` and the `joints` between them in the place of `beam`.
 
-    `places`, by node of the beam, say where its hinges, wheels, point masses, loads, markers and closures go. The
-    joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state: pieces start
-    undeformed.
+    `places`, by node of the beam, say where its hinges, wheels, point masses, loads, markers, closures and connectors
+    go. The joints follow the beam's inboard hinge. Raises ValueError for a beam with an initial modal state: pieces
+    start undeformed.
     """
     if any(state.body == beam.name for state in scene.modal_states):
         raise ValueError(f'beam "{beam.name}": its pieces start undeformed; leave out its modal state')
@@ -61,11 +62,17 @@ def in_pieces(
     for each in scene.bodies:
         bodies += pieces if each is beam else [each]
     closures = tuple(moved(moved(each, "body_a", "node_a"), "body_b", "node_b") for each in scene.closures)
+    connectors = tuple(
+        moved(moved(each, "body_a", "node_a"), "body_b", "node_b") if isinstance(each, BetweenNodes) else each
+        for each in scene.connectors
+    )
     on_bodies = {
         key: tuple(moved(item, "body", "node") for item in getattr(scene, key))
         for key in ("wheels", "point_masses", "loads", "markers")
     }
-    return replace(scene, bodies=tuple(bodies), hinges=tuple(hinges), closures=closures, **on_bodies)
+    return replace(
+        scene, bodies=tuple(bodies), hinges=tuple(hinges), closures=closures, connectors=connectors, **on_bodies
+    )
 
 
 def piece_at(ends: Sequence[float], x: float) -> int:

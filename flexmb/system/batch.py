@@ -25,7 +25,7 @@ from flexmb.jit.bundle import broaden
 from flexmb.jit.direct import ADDRESS, address, addresses, settled
 from flexmb.jit.lanes import LANES
 from flexmb.jit.pointer import INDEX, MATRIX, NOTHING, STATUS, VECTOR, WHOLE
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
@@ -33,7 +33,7 @@ from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants
 from flexmb.tables.lane_tables import LaneWorkspace, lane_constants, lane_workspace, structural_difference
 from flexmb.tables.state import DynamicsError
-from flexmb.tables.status import NONFINITE, OK
+from flexmb.tables.status import NONFINITE, OK, Status
 from flexmb.typing import Index, Real
 
 _WORTH_A_THREAD = 512  # copies: fewer take no longer than a thread takes to start
@@ -63,6 +63,11 @@ class BatchAccelerations(NamedTuple):
 
     accelerations: Real
     status: Index
+
+    @property
+    def statuses(self) -> tuple[Status, ...]:
+        """The same by their names."""
+        return tuple(map(Status, self.status.tolist()))
 
     @property
     def failed(self) -> Index:
@@ -227,7 +232,7 @@ def compile_batch(scenes: Sequence[Scene]) -> Batch:
     """
     scenes = _listed("scenes", scenes)
     for scene in scenes:
-        check_scene(scene)
+        check_and_warn(scene)
     return Batch([assembled(scene, "explicit") for scene in scenes])
 
 

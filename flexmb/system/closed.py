@@ -20,12 +20,15 @@ from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
+from flexmb.system.load_axes import Axes, referred
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
+
+FAR = 1e-2  # in the size of a closure: a state that is given opens it by less
 
 
 class ClosedSystem(System):
@@ -38,6 +41,10 @@ class ClosedSystem(System):
         self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
         self._start: State | None = None
 
+    def anew(self) -> ClosedSystem:
+        """The same scene turned into other arrays."""
+        return ClosedSystem(self.scene)
+
     @property
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
@@ -49,6 +56,19 @@ class ClosedSystem(System):
             y = consistent(self.closures, 0.0, pack(super().initial_state))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
+
+    def admissible(self, t: float, y: Real) -> State:
+        """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
+        rough = super().admissible(t, y).y
+        self.closures.linearise(t, rough)
+        errors = self.closures.errors()
+        if not np.max(np.abs(errors), initial=0.0) <= FAR:
+            raise ClosureError(
+                f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
+                "it at least roughly, or leave those out that the closures determine"
+            )
+        y = consistent(self.closures, t, rough)
+        return self.layout.known(t, y)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.
@@ -70,14 +90,25 @@ class ClosedSystem(System):
         self._trust(t, y, self.closures)
         return found
 
-    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
-        """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b), World axes."""
+    def hinge_loads(
+        self,
+        state: State,
+        accelerations: Real | None = None,
+        *,
+        axes: Axes = "world",
+        about: tuple[str, str] | None = None,
+    ) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge and closure on the outboard body (body_b).
+
+        `axes` and `about` as of a tree; frames "inboard" and "outboard" of a closure are A and B.
+        """
         if accelerations is not None:
             raise NotImplementedError(
                 f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
                 "leave accelerations out, or prescribe coordinates"
             )
-        return self._evaluate(*self.layout.entering(state), "articulated").loads
+        loads = self._evaluate(*self.layout.entering(state), "articulated").loads
+        return referred(self, self._w, loads, axes, about)
 
     def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
         """With the closures' loads too."""

@@ -6,7 +6,7 @@ from typing import get_args
 
 from flexmb.jain.elimination import Elimination
 from flexmb.scene.bodies import SidBody
-from flexmb.scene.check import check_scene
+from flexmb.scene.check import check_and_warn, check_scene
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
@@ -21,11 +21,11 @@ def compile(scene: Scene, elimination: Elimination = "fastest") -> System:  # no
     All give the same accelerations; "fastest" chooses by body, and `System.elimination` says what was chosen. Scenes
     with closures factorise D_f whatever is asked for.
 
-    SID bodies are read from their files here. Raises SceneError for a scene that is wrong, SidError or OSError for a
-    SID file that cannot be used, ValueError for an elimination that does not exist, NotImplementedError for a scene
-    that is right but needs what is not supported yet.
+    SID bodies are read from their files here. Warns (`SceneWarning`) of what is doubtful. Raises SceneError for a scene
+    that is wrong, SidError or OSError for a SID file that cannot be used, ValueError for an elimination that does not
+    exist, NotImplementedError for a scene that is right but needs what is not supported yet.
     """
-    check_scene(scene)
+    check_and_warn(scene)
     return assembled(scene, elimination)
 
 

@@ -45,7 +45,7 @@ class Precision(NamedTuple):
     the body that costs most digits.
     """
 
-    status: int
+    status: Status
     fault: int
     body: str
     digits: float
@@ -293,11 +293,11 @@ class Mechanics:
 
     def _precision(self, factors: MassMatrixFactors) -> Precision:
         if factors.status != OK:
-            return Precision(factors.status, factors.fault, self.body_names[factors.fault], 0.0)
+            return Precision(Status(factors.status), factors.fault, self.body_names[factors.fault], 0.0)
         condition = factors.condition
         status = Status.NOT_POSITIVE_DEFINITE if condition.is_singular else Status.OK
         owner = _owner(self.constants, condition.speed)
-        return Precision(int(status), owner, self.body_names[owner], condition.digits)
+        return Precision(status, owner, self.body_names[owner], condition.digits)
 
     def _check(self, status: int, fault: int | None = None) -> None:
         """DynamicsError unless a status code is OK; `fault`: the body, by default the recursion's."""

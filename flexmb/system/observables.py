@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
+from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.tables.state import finite_result
 from flexmb.typing import Index, Real
@@ -29,6 +30,10 @@ class MarkerMotion:
         """Scalar first, unit."""
         return quaternion_of(self.rotation)
 
+    def angles(self, sequence: str = "zyx") -> Angles:
+        """Angles (3,) rad of a gimbal's `sequence` of axes: see `flexmb.scene.angles.angles_of`."""
+        return angles_of(self.quaternion, sequence)
+
 
 @dataclass(frozen=True)
 class Evaluation:
@@ -36,7 +41,8 @@ class Evaluation:
 
     accelerations (nu,); markers by name; loads by hinge (6,) [torque; force] on the outboard body about the outboard
     hinge point, World axes; wheel_loads by wheel (6,) about its centre; drives by hinge, point mass or wheel (k,), one
-    for each prescribed coordinate; energy by kind (J); momentum (6,) [angular about the World origin; linear].
+    for each prescribed coordinate; energy by kind (J); momentum (6,) [angular about the World origin; linear];
+    connectors by name (6,) [torque; force] on body_b about B, World axes; hinge_forces (1,) of connectors along hinges.
     """
 
     accelerations: Real
@@ -46,24 +52,32 @@ class Evaluation:
     drives: dict[str, Real]
     energy: dict[str, float]
     momentum: Real
+    connectors: dict[str, Real] = field(default_factory=dict)
+    hinge_forces: dict[str, Real] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Names:
-    """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven."""
+    """Of what is observed: (body, port) of markers; hinges, wheels, closures in order; places in u of the driven.
+
+    connectors: between nodes; hinge_forces: springs along hinges, then friction.
+    """
 
     markers: dict[str, tuple[int, int]]
     hinges: Sequence[str]
     wheels: Sequence[str]
     closures: Sequence[str]
     driven: dict[str, Index]
+    connectors: Sequence[str] = ()
+    hinge_forces: Sequence[str] = ()
 
 
 class Observation:
     """The arrays that kernels fill at one state, `out`, and an `Evaluation` made of them."""
 
     def __init__(self, names: Names, speeds: int) -> None:
-        of = shapes(speeds, len(names.markers), len(names.hinges), len(names.wheels))
+        counts = map(len, (names.markers, names.hinges, names.wheels, names.connectors, names.hinge_forces))
+        of = shapes(speeds, *counts)
         at = np.array(list(names.markers.values()), dtype=np.int64).reshape(-1, 2)
         self.names, self._shapes, self._at = names, of, (at[:, 0].copy(), at[:, 1].copy())
         self._places = places(of)
@@ -105,4 +119,6 @@ class Observation:
             drives={name: self.out.drives[places] for name, places in names.driven.items()},
             energy=dict(zip(ENERGIES, found["energy"].tolist(), strict=True)),
             momentum=found["momentum"],
+            connectors=dict(zip(names.connectors, found["connectors"], strict=True)),
+            hinge_forces=dict(zip(names.hinge_forces, found["hinge_forces"][:, None], strict=True)),
         )

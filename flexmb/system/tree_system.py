@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flexmb.building.assemble import assemble
+from flexmb.building.connector_arrays import between_nodes
 from flexmb.building.links import links
 from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
@@ -26,15 +27,19 @@ from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
 from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
+from flexmb.scene.connectors import HingeFriction, HingeSpring
 from flexmb.system import algorithms, labels
 from flexmb.system.algorithm import Algorithm, Route
 from flexmb.system.evaluator import Evaluator
+from flexmb.system.load_axes import Axes, referred
+from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
+from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
-from flexmb.tables.status import OK
+from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -51,11 +56,14 @@ class System(Mechanics):
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
         super().__init__()
         self.scene = scene
+        self._asked: Elimination = elimination
         self._links = links(scene)
         self._wheels = wheels_by_body(scene)
         self._numbering = Numbering(self._links, self._wheels)
         assembled = assemble(scene, self._links, self._numbering)
         self.constants, markers, self._closure_ports = assembled.constants, assembled.markers, assembled.closures
+        self.signals = assembled.signals
+        """By number among the functions of time, those that controllers drive in a run; zero outside of one."""
         self.layout = self._numbering.layout
         self.nq, self.nu = self.layout.nq, self.layout.nu
         self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)
@@ -65,6 +73,10 @@ class System(Mechanics):
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
+
+    def anew(self) -> System:
+        """The same scene turned into other arrays."""
+        return System(self.scene, self._asked)
 
     @cached_property
     def _w(self) -> Workspace:  # type: ignore[override]
@@ -78,7 +90,8 @@ class System(Mechanics):
     def _observation(self) -> Observation:
         hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
         closures, driven = [closure.name for closure in self.scene.closures], self._driven([*hinges, *wheels])
-        return Observation(Names(self._markers, hinges, wheels, closures, driven), self.nu)
+        connectors = [each.name for each in between_nodes(self.scene)], [*_along_hinges(self.scene)]
+        return Observation(Names(self._markers, hinges, wheels, closures, driven, *connectors), self.nu)
 
     @cached_property
     def _out(self) -> Outputs:  # type: ignore[override]
@@ -114,6 +127,21 @@ class System(Mechanics):
     def initial_state(self) -> State:
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         return self.layout.known(0.0, self._at_start.copy())
+
+    def admissible(self, t: float, y: Real) -> State:
+        """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
+
+        Of closed chains the nearest one that closes all closures; ClosureError where that is far.
+        """
+        y = np.r_[y[:-1], 0.0]
+        self.project(t, y, self.constants)
+        return self.layout.known(t, y)
+
+    def scene_state(self, t: float) -> Real:
+        """(nq+nu+1,) [q, u, 0] of the scene's initial values, with prescribed motions as they are at time t (s)."""
+        y: Real = self._at_start.copy()
+        self.project(t, y, self.constants)
+        return y
 
     @cached_property
     def _at_start(self) -> Real:
@@ -221,14 +249,18 @@ class System(Mechanics):
 
     @cached_property
     def start_precision(self) -> Precision | None:
-        """`precision` of the initial state, found once; None where no pivot there is so small that it may be rounding.
+        """`precision_if_doubtful` of the initial state, found once."""
+        return self.precision_if_doubtful(self.initial_state)
+
+    def precision_if_doubtful(self, state: State) -> Precision | None:
+        """`precision` of a state, None where no pivot there is so small that it may be rounding.
 
         Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.
         """
-        initial, w = self.initial_state, self._recursion_w
-        t, y = self.layout.entering(initial)
+        w = self._recursion_w
+        t, y = self.layout.entering(state)
         status = self._recur(t, y, np.empty_like(y))
-        return None if status == OK and not w.doubt[0] else self.precision(initial)
+        return None if status == OK and not w.doubt[0] else self.precision(state)
 
     @cached_property
     def state_names(self) -> tuple[labels.Names, labels.Names]:
@@ -246,16 +278,66 @@ class System(Mechanics):
         assert made is not None  # of those that run
         return made(self)
 
-    def hinge_loads(self, state: State, accelerations: Real | None = None) -> dict[str, Real]:
-        """Total load (6,) [torque; force] across each hinge on the outboard body about the outboard hinge point, World.
+    def hinge_loads(
+        self,
+        state: State,
+        accelerations: Real | None = None,
+        *,
+        axes: Axes = "world",
+        about: tuple[str, str] | None = None,
+    ) -> dict[str, Real]:
+        """Total load (6,) [torque; force] across each hinge on the outboard body.
 
         Of the free motion; with `accelerations` (nu,) what hinges transmit if these are forced, Jain & Rodriguez (44).
+        axes: "world", or those of each hinge's own frame "inboard" or "outboard". about: (body, node), a point that
+        moves with the deformation, "ground" with "origin"; by default each hinge's outboard point. ValueError for axes
+        or a node that there are not.
         """
         t, y = self.layout.entering(state)
         if accelerations is None:
-            return self._by_hinge(finite_result(self._free_loads(t, y), t))
-        rates = self.layout.rates("accelerations", accelerations)
-        return self._by_hinge(finite_result(self._inverse(t, y, rates)[1], t))
+            loads, w = finite_result(self._free_loads(t, y), t), self._recursion_w
+        else:
+            rates = self.layout.rates("accelerations", accelerations)
+            loads, w = finite_result(self._inverse(t, y, rates)[1], t), self._w
+        return referred(self, w, self._by_hinge(loads), axes, about)
+
+    def _loads_in(
+        self, t: float, y: Real, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    ) -> dict[str, Real]:
+        """Loads of hinges and closures that were found at this state, World axes, in other axes about a node."""
+        self._inverse(t, y, np.zeros(self.nu))  # leaves poses as the equations of motion see them
+        return referred(self, self._w, loads, axes, about)
+
+    def section_loads(self, state: State, body: str, x: Any) -> SectionLoads:
+        """Axial force, shear, bending and torsion across the sections of a beam at x (X,) m, of the free motion.
+
+        By the momentum balance of the part beyond each section, not by the modes' curvature. A body of level `linear`
+        is taken as `full`; at level `stiffened` the balance differs from the dynamics in the fourth order of the
+        deformation. ValueError for anything but a beam, and positions off it.
+        """
+        t, y = self.layout.entering(state)
+        balance = SectionBalance(self, body, x)
+        return balance.loads(finite_result(balance.at(t, y), t))
+
+    def _all_loads(self, t: float, y: Real) -> Evaluation:
+        """With loads of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
+        found = self._evaluate(t, y, "articulated")
+        self._inverse(t, y, found.accelerations)
+        return found
+
+    def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
+        """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.
+
+        Everything counts as if it were rigid where it is; a ruthless body, and where it holds others, at its rest
+        shape, as momentum has it. ValueError for a body that there is not.
+        """
+        t, y = self.layout.entering(state)
+        self._out.rates[:] = 0.0
+        self._observe_motion(t, y)
+        inertias = self._w.body["inertia"].copy()
+        if any(link.level.at_rest for link in self._links):
+            self._inverse(t, y, self._out.rates)  # leaves poses by rest shapes
+        return mass_properties(self, self._w, inertias, body)
 
     def _free_loads(self, t: float, y: Real) -> Real:
         """(N,6) of the free motion, World axes."""
@@ -299,6 +381,12 @@ class System(Mechanics):
         algorithms.chosen(algorithm).observe(self, t, y)
         self._observation.fill(row, t, _NO_CLOSURES)
 
+    def fault_name(self, status: int, fault: int) -> str:
+        """Name of the body or connector that the number of a failure stands for."""
+        if status == Status.CONNECTOR_OVERTURNED:
+            return between_nodes(self.scene)[fault].name
+        return super().fault_name(status, fault)
+
     def _wheel_names(self) -> Iterator[str]:
         yield from (wheel.name for link in self._links for wheel in self._wheels.get(link.name, ()))
 
@@ -309,6 +397,12 @@ class System(Mechanics):
             return {}
         places = ((name, self.speed(name)) for name in names)
         return {name: at.start + np.flatnonzero(driven[at]) for name, at in places if np.any(driven[at])}
+
+
+def _along_hinges(scene: s.Scene) -> Iterator[str]:
+    """Springs along hinges, then friction, as the tables have them."""
+    for kind in (HingeSpring, HingeFriction):
+        yield from (each.name for each in scene.connectors if isinstance(each, kind))
 
 
 def _find(places: dict[str, slice], name: str) -> slice:

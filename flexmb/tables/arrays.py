@@ -1,8 +1,8 @@
 """The arrays kernels work on: one table of names, shapes and units.
 
 N bodies (point masses included, as bodies without rotary inertia), numbered base to tip; P ports; S summed points;
-W wheels; L loads; F functions of time; m the largest number of modes, as whole strips (`flexmb.jit.strips`): what is
-beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
+W wheels; L loads; C connectors between two ports; F functions of time; m the largest number of modes, as whole strips
+(`flexmb.jit.strips`): what is beyond the modes of a body is zero; nq, nu lengths of q and u. Everything about a
 body is in its frame: that of its hinge's outboard frame O where O does not deform relative to it, else the modal
 frame. Angular components come first. Units are SI. Every table is an array of records, so that code reads like
 ``c.body[k].parent``.
@@ -22,6 +22,9 @@ EXPLICIT, WOODBURY, CONDENSED = range(3)
 ANGULAR_Z, LINEAR_Z, NO_AXIS = 2, 5, -1
 FORCE, TORQUE = range(2)
 WORLD_AXES, NODE_AXES = range(2)
+ALONG_LINE, BUSHING = range(2)
+BOTH, TENSION, COMPRESSION = range(3)
+ON_GROUND = -1  # body of an end that is fixed in World
 
 _F, _I = np.float64, np.int64
 
@@ -108,6 +111,42 @@ LOAD = _record(
     ("function", _I),
     ("direction", _F, (3,)),
 )
+CONNECTOR = _record(
+    ("kind", _I),  # ALONG_LINE or BUSHING
+    ("acts", _I),  # BOTH, TENSION or COMPRESSION
+    ("function", _I),  # of the actuator, -1 for none
+    ("start", _I),  # its rows of `law`
+    ("stop", _I),
+    ("row", _I),  # of `bushing`
+    ("free_length", _F),
+    ("smoothing", _F),  # length below which a line loses its direction
+    ("damping", _F),
+)
+END = _record(
+    ("body", _I),  # ON_GROUND for an end there
+    ("port", _I),
+    ("position", _F, (3,)),  # World, on the ground only
+    ("rotation", _F, (9,)),  # R_World_port, on the ground only
+)
+BUSHING_MATRIX = _record(("stiffness", _F, (6, 6)), ("damping", _F, (6, 6)))
+HINGE_SPRING = _record(
+    ("speed", _I),  # of the coordinate, place in u
+    ("start", _I),  # its rows of `law`
+    ("stop", _I),
+    ("rest", _F),
+    ("damping", _F),
+    ("lower", _F),  # stops; beyond all coordinates where there is none
+    ("upper", _F),
+    ("stop_stiffness", _F),
+    ("stop_dissipation", _F),
+)
+FRICTION = _record(
+    ("speed", _I),  # place in u
+    ("sliding", _F),
+    ("static", _F),
+    ("stribeck", _F),
+    ("smoothing", _F),
+)
 SPEED = _record(
     ("coordinate", _I),  # its scalar coordinate's place in q; -1 for speeds of a quaternion or of a mode
     ("motor", _I),  # function, -1 for none
@@ -147,6 +186,14 @@ class Constants:
     second_shape: Record  # (their ports and summed points,m,m) SHAPE: the second-order field G_ni
     wheel: Record  # (W,) WHEEL
     load: Record  # (L,) LOAD
+    connector: Record  # (C,) CONNECTOR
+    end: Record  # (C,2) END, A then B
+    bushing: Record  # (connectors that are bushings,) BUSHING_MATRIX
+    hinge_spring: Record  # (springs along coordinates,) HINGE_SPRING
+    friction: Record  # (speeds with friction,) FRICTION
+    # (pieces,8) of load laws: left end, energy there, then coefficients, highest power first; the first piece of a law
+    # goes on below its left end
+    law: Real
     speed: Record  # (nu,) SPEED
     function: Record  # (F,) FUNCTION
     table: Real  # (T,7) spline pieces: left end of the interval, then six coefficients, highest power first
@@ -213,6 +260,18 @@ PORT_STATE = _record(
     ("v", _F, (6,)),  # velocity relative to the body
     ("a", _F, (6,)),  # acceleration relative to the body at etaddot = 0
 )
+CONNECTOR_STATE = _record(
+    ("load", _F, (6,)),  # [torque; force] on B about B, World axes
+    ("arm", _F, (3,)),  # from A to B, World axes
+    ("upright", _F),  # of a bushing, square of the cosine of half its rotation
+    ("energy", _F),
+    ("power", _F),  # of all that is not elastic
+)
+ALONG_HINGE_STATE = _record(
+    ("load", _F),  # along the coordinate
+    ("energy", _F),
+    ("power", _F),  # of all that is not elastic
+)
 SPEED_STATE = _record(
     ("acceleration", _F),  # udot
     ("applied", _F),  # spring + damper + motor
@@ -246,6 +305,9 @@ class Workspace:
     port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
     point_mode: Real  # (6,m) likewise of one summed point; scratch
     speed: Record  # (nu,) SPEED_STATE
+    connector: Record  # (C,) CONNECTOR_STATE
+    hinge_spring: Record  # ALONG_HINGE_STATE
+    friction: Record  # ALONG_HINGE_STATE
     function: Real  # (F,3) value, rate, acceleration
     fault: Index  # (1,) body where an evaluation failed
     doubt: Index  # (1,) whether an evaluation met a pivot that may be rounding

@@ -30,6 +30,12 @@ COUPLED_MODES = "coupled modes"  # modal stiffness or damping is not diagonal
 SECOND_ORDER = "second order"  # shapes of ports and summed points change with the deformation
 WHEELS = "wheels"
 LOADS = "loads"
+CONNECTORS = "connectors"  # between two nodes
+ONE_SIDED = "one-sided connectors"
+ACTUATORS = "actuators"
+BUSHINGS = "bushings"
+HINGE_SPRINGS = "hinge springs"
+FRICTION = "friction"
 FUNCTIONS = "functions"
 MOTORS = "motors"
 PRESCRIBED = "prescribed"
@@ -60,6 +66,12 @@ def features(c: Constants) -> frozenset[str]:
         SECOND_ORDER: len(c.second_shape) > 0,
         WHEELS: len(c.wheel) > 0,
         LOADS: len(c.load) > 0,
+        CONNECTORS: len(c.connector) > 0,
+        ONE_SIDED: np.any(c.connector["acts"] != 0),
+        ACTUATORS: np.any(c.connector["function"] >= 0),
+        BUSHINGS: len(c.bushing) > 0,
+        HINGE_SPRINGS: len(c.hinge_spring) > 0,
+        FRICTION: len(c.friction) > 0,
         FUNCTIONS: len(c.function) > 0,
         MOTORS: np.any(speed["motor"] >= 0),
         PRESCRIBED: np.any(speed["prescribed"] >= 0),

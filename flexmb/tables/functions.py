@@ -9,7 +9,7 @@ import numpy as np
 
 from flexmb.jit.kernel import by_number, helper
 from flexmb.jit.lanes import every, select, some
-from flexmb.scene.functions import Constant, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Constant, ControlSignal, Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.spatial.scalar import cos, sin
 from flexmb.tables.arrays import FUNCTION
 from flexmb.typing import Real, Record
@@ -26,6 +26,8 @@ def pack(functions: Sequence[Function]) -> tuple[Record, Real]:
         match function:
             case Constant(value=value):
                 row["kind"], row["data"] = _CONSTANT, (value, 0.0, 0.0, 0.0)
+            case ControlSignal():  # a run with feedback writes what its controllers say in here
+                row["kind"] = _CONSTANT
             case Ramp(value=value, rate=rate, start_s=begin):
                 row["kind"], row["data"] = _RAMP, (value, rate, begin, 0.0)
             case Sine(amplitude=a, angular_frequency_rad_s=w, phase_rad=phase, offset=offset):

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flexmb.scene.problems import SceneWarning
 from flexmb.tables import arguments
 from flexmb.tables.soundness import LONGEST, SHORTEST, unsound
 from flexmb.tables.status import Status
@@ -31,7 +32,7 @@ class NotFiniteError(DynamicsError):
     status = Status.NONFINITE
 
 
-class PrecisionWarning(UserWarning):
+class PrecisionWarning(SceneWarning):
     """Rounding leaves few digits of the accelerations at this state; the message says how many, and why."""
 
 

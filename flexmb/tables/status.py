@@ -19,6 +19,15 @@ class Status(IntEnum):
     NOT_CONVERGED = 8
     INTERRUPTED = 9
     BRANCH_UNKNOWN = 10
+    CHATTERING = 11
+    CONNECTOR_OVERTURNED = 16
+
+    def __str__(self) -> str:
+        return self.name
+
+    def __format__(self, spec: str) -> str:
+        """Its name; its number for formats of integers."""
+        return format(int(self), spec) if spec.endswith(tuple("bcdoxXn")) else format(self.name, spec)
 
     @property
     def advice(self) -> str:
@@ -58,9 +67,17 @@ _ADVICE = {
         "closure {body} went close to a singular position in too long a step: branches of the motion nearly meet "
         'there, and which one the mechanism takes is not known; use a shorter step, or "dop853"'
     ),
+    Status.CONNECTOR_OVERTURNED: (
+        "bushing {body} is turned by more than 170 degrees: close to half a turn its rotation vector jumps, and its "
+        "load with it; turn one of its frames so that it is near rest, or use a hinge with springs"
+    ),
     Status.NOT_CONVERGED: (
         "the implicit equations of a step were not solved by Newton's method: use a smaller step, or a method that "
         'adapts its step, "radau5"'
+    ),
+    Status.CHATTERING: (
+        "events follow each other faster and faster without end: let an `Impact` with little rebound become a `Latch`, "
+        "or take a stiff spring with a damper in place of the stop"
     ),
     Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
@@ -77,3 +94,4 @@ CLOSURE_OPEN = int(Status.CLOSURE_OPEN)
 NOT_CONVERGED = int(Status.NOT_CONVERGED)
 INTERRUPTED = int(Status.INTERRUPTED)
 BRANCH_UNKNOWN = int(Status.BRANCH_UNKNOWN)
+CONNECTOR_OVERTURNED = int(Status.CONNECTOR_OVERTURNED)

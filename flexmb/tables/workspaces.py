@@ -34,12 +34,22 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "port_mode": strip_zeros((len(c.port), 6, m)),
         "point_mode": strip_zeros((6, m)),
         "speed": np.zeros(nu, a.SPEED_STATE),
+        **connector_states(c),
         "function": np.zeros((len(c.function), 3)),
         "fault": np.zeros(1, np.int64),
         "doubt": np.zeros(1, np.int64),
         "displaced": np.ones(1, np.int64),
     }
     return _reduced(c, fields) if isinstance(c, a.ReducedConstants) else a.Workspace(**fields)
+
+
+def connector_states(c: a.Constants) -> dict[str, Record]:
+    """What an evaluation of connectors writes."""
+    return {
+        "connector": np.zeros(len(c.connector), a.CONNECTOR_STATE),
+        "hinge_spring": np.zeros(len(c.hinge_spring), a.ALONG_HINGE_STATE),
+        "friction": np.zeros(len(c.friction), a.ALONG_HINGE_STATE),
+    }
 
 
 def ports_at_rest(c: a.Constants) -> Record:

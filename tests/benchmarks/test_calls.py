@@ -59,7 +59,7 @@ def test_a_run_besides_its_steps(benchmark, method, samples):
     system, settings = fm.compile(rigid_chain(10)), Settings(method, step=1.0 if method == "rk4" else None)
     times, accuracy = np.linspace(0.0, 1e-6, samples), settings.accuracy(system.nq, system.nu)
     out, counts = np.empty((samples, system.nq + system.nu + 1)), np.zeros(16, np.int64)
-    options = {"step": 1.0} if method == "rk4" else {}
+    options, memory = {"step": 1.0} if method == "rk4" else {}, settings.integrator.memory(len(out[0]))
 
     def whole() -> None:
         fm.simulate(system, 1e-6, method, samples=samples, **options)
@@ -68,7 +68,7 @@ def test_a_run_besides_its_steps(benchmark, method, samples):
 
         def steps() -> None:
             counts[:] = 0
-            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts)
+            solve(system.initial_state.y, Clock(times, times[-1:]), accuracy, out, counts, memory, None)
 
         found = np.array([[_wall(whole), _wall(steps)] for _ in range(100)])
     besides = float(np.percentile(found[:, 0] - found[:, 1], 20))

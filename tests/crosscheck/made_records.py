@@ -13,7 +13,7 @@ from crosscheck.judging.results import collect
 from crosscheck.judging.verdict import Verdict
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import RunFile
-from crosscheck.library.selection import select
+from crosscheck.library.selection import joining, select
 from crosscheck.records.kinds import CaseRecord, RunRecord, VariantInfo
 from crosscheck.records.packing import pack
 from flexmb.typing import Real
@@ -78,12 +78,21 @@ def ended(run: RunRecord, status: str, message: str = "for a reason", **changes:
 
 
 def judged(
-    text: str, runs: Iterable[RunRecord], accepted: Accepted | None = None, strict: bool = False
+    text: str,
+    runs: Iterable[RunRecord],
+    accepted: Accepted | None = None,
+    strict: bool = False,
+    asked: tuple[str, ...] = (),
+    **others: object,
 ) -> SessionOutcome:
-    """The outcome of a session that left these runs."""
-    run = select(run_file(text), ())
+    """The outcome of a session that left these runs; `others` are more of its case's record."""
+    whole = run_file(text)
+    run = select(whole, asked)
     infos = {variant.name: VariantInfo(level="rigid", drawing=None) for variant in run.variants}
-    case = CaseRecord(case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {})
+    case = CaseRecord(
+        case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {}, asked=asked,
+        joined=joining(whole, asked), **others,
+    )  # fmt: skip
     return conclude(collect([case, *runs]), strict)
 
 

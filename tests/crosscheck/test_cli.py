@@ -264,3 +264,15 @@ def test_a_coarse_csv_has_every_channel(runner: CliRunner, tmp_path: Path) -> No
     rough.write_text("\n".join(map(",".join, lines)) + "\n", encoding="utf-8")
     code, output = verify(runner, str(fine), "--coarse", str(rough))
     assert (code, "lacks load:pivot.force" in output) == (2, True), output
+
+
+@pytest.mark.parametrize(
+    "command", [("regenerate", "pendulums/point_mass"), ("verify", "pendulums/point_mass", "my.csv")]
+)
+def test_a_scheduler_that_does_not_answer_ends_the_command_before_anything_runs(
+    runner: CliRunner, command: tuple[str, ...]
+) -> None:
+    pytest.importorskip("distributed")
+    result = runner.invoke(cli.app, [*command, "--scheduler", "tcp://127.0.0.1:1"])
+    assert result.exit_code == 2
+    assert "no Dask scheduler answers at tcp://127.0.0.1:1" in " ".join(result.output.split())

@@ -14,6 +14,7 @@ from crosscheck.biting.invariances.counterpart import (
     vector,
     with_energy,
 )
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Free, Hinge
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
@@ -27,7 +28,8 @@ def _boosted(scene: Scene) -> Counterpart:
     """The angular momentum about the World's origin, which the bodies fly away from, is left out; so is the work of
     forces, which depends on how fast their points move."""
     held = [hinge.name for hinge in scene.hinges if hinge.parent == GROUND and not isinstance(hinge, Free)]
-    held += [each.name for each in scene.closures if GROUND in (each.body_a, each.body_b)]
+    pairs = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
+    held += [each.name for each in pairs if GROUND in (each.body_a, each.body_b)]
     if held:
         raise NotApplicable(f"it stands on the ground by {', '.join(held)}")
     mass, gravity = total_mass(scene), np.asarray(scene.gravity_m_s2)

@@ -41,6 +41,12 @@ class Invariance:
     of: Callable[[Scene], Counterpart]
 
 
+def without_events(scene: Scene) -> None:
+    """`NotApplicable` for a scene with events, whose levels the invariance would have to tell in its own terms."""
+    if scene.events:
+        raise NotApplicable(f'event "{scene.events[0].name}" has a level, which is not told in other terms')
+
+
 def by_kind(
     channels: Channels,
     polar: Callable[[Real], Real],
@@ -50,7 +56,7 @@ def by_kind(
     """Channels with their vectors and quaternions mapped, each after its kind; numbers as they are."""
 
     def mapped(name: str, values: Real) -> Real:
-        if name.startswith("drive:"):  # whatever it is called
+        if name.startswith(("drive:", "hinge_force:")):  # whatever it is called
             return values
         if name.endswith(".orientation"):
             return orientation(values)

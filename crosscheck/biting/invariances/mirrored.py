@@ -18,9 +18,11 @@ from crosscheck.biting.invariances.counterpart import (
     NotApplicable,
     by_kind,
     is_prescribed,
+    without_events,
 )
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
+from flexmb.scene.connectors import BetweenNodes, Bushing
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import (
     WITH_AXIS,
@@ -35,7 +37,7 @@ from flexmb.scene.hinges import (
     Universal,
 )
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
-from flexmb.scene.tree import coordinates
+from flexmb.scene.tree import coordinate_of, coordinates
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
@@ -52,9 +54,14 @@ QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quate
 
 
 def _mirrored(scene: Scene) -> Counterpart:
+    without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
+    for connector in scene.connectors:
+        item = None if isinstance(connector, BetweenNodes) else coordinate_of(scene, connector)[0]
+        if isinstance(item, Cylindrical | Universal | Gimbal | PointMass):
+            raise NotApplicable(f'the coordinate of connector "{connector.name}" may count the other way in a mirror')
     if scene.modal_states:  # which of a beam's modes are odd in z is known when the model is made
         scene = modal_points(scene)
     polar, axial, quaternion = (np.array(signs) for signs in (POLAR_SIGNS, AXIAL_SIGNS, QUATERNION_SIGNS))
@@ -106,6 +113,11 @@ def _reflected(item: Any) -> Any:
         case ModalNode():
             force = tuple(_times(m, s) for m, s in zip(item.force_stiffness, POLAR_SIGNS, strict=False))
             return msgspec.structs.replace(item, force_stiffness=force)
+        case Bushing():
+            both = np.outer(*(2 * (AXIAL_SIGNS + POLAR_SIGNS,)))
+            matrices = (np.array(item.stiffness) * both + 0.0, np.array(item.damping) * both + 0.0)
+            K, D = (tuple(map(tuple, each.tolist())) for each in matrices)
+            return msgspec.structs.replace(item, stiffness=K, damping=D)
         case Closure() if item.type in WITH_AXIS:  # which has no sense of rotation
             return msgspec.structs.replace(item, axis=_signed(item.axis, POLAR_SIGNS))
     return item

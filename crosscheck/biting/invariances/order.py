@@ -7,7 +7,9 @@ import msgspec
 from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
 from flexmb.scene.schema import Scene
 
-COLLECTIONS = ("bodies", "hinges", "closures", "wheels", "point_masses", "loads", "markers", "modal_states")
+COLLECTIONS = (
+    "bodies", "hinges", "closures", "connectors", "wheels", "point_masses", "loads", "markers", "modal_states",
+)  # fmt: skip
 
 
 def _reordered(scene: Scene) -> Counterpart:

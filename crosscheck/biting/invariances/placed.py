@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from typing import Any
 
 import msgspec
 import numpy as np
@@ -18,7 +19,9 @@ from crosscheck.biting.invariances.counterpart import (
     vector,
     with_energy,
 )
-from flexmb.scene.bodies import Quaternion, Vector
+from flexmb.scene.bodies import IDENTITY, Quaternion, Vector
+from flexmb.scene.connectors import Connector
+from flexmb.scene.hinges import Closure
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import GROUND
@@ -70,23 +73,29 @@ def _moved(scene: Scene) -> Counterpart:
 
 
 def on_ground(scene: Scene, placed: Placed) -> Scene:
-    """The scene with the ends of hinges and closures on the ground placed elsewhere."""
+    """The scene with the ends of hinges, closures and connectors on the ground placed elsewhere."""
     hinges = []
     for hinge in scene.hinges:
         if hinge.parent == GROUND:
             position, orientation = placed(hinge.parent_position_m, hinge.parent_quaternion)
             hinge = msgspec.structs.replace(hinge, parent_position_m=position, parent_quaternion=orientation)
         hinges.append(hinge)
-    closures = []
-    for closure in scene.closures:
-        if closure.body_a == GROUND:
-            position, orientation = placed(closure.position_a_m, closure.quaternion_a)
-            closure = msgspec.structs.replace(closure, position_a_m=position, quaternion_a=orientation)
-        if closure.body_b == GROUND:
-            position, orientation = placed(closure.position_b_m, closure.quaternion_b)
-            closure = msgspec.structs.replace(closure, position_b_m=position, quaternion_b=orientation)
-        closures.append(closure)
-    return msgspec.structs.replace(scene, hinges=tuple(hinges), closures=tuple(closures))
+
+    def two_ended(item: Closure | Connector) -> Any:
+        for side in "ab":
+            if getattr(item, f"body_{side}", "") == GROUND:
+                frame = f"position_{side}_m", f"quaternion_{side}"
+                at = placed(getattr(item, frame[0]), getattr(item, frame[1], IDENTITY))
+                known = {key: value for key, value in zip(frame, at, strict=True) if hasattr(item, key)}
+                item = msgspec.structs.replace(item, **known)
+        return item
+
+    return msgspec.structs.replace(
+        scene,
+        hinges=tuple(hinges),
+        closures=tuple(map(two_ended, scene.closures)),
+        connectors=tuple(map(two_ended, scene.connectors)),
+    )
 
 
 TURNED = Invariance("turned", "the World turned, gravity and loads with it", _turned)

@@ -2,24 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
+from crosscheck.biting.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    NotApplicable,
+    is_prescribed,
+    without_events,
+)
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
+from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
-from flexmb.scene.schema import Load, ModalState, Scene
+from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
-# Speeds, accelerations, forces, energies and all else have another factor than 1, and speeds one that leaves a material
-# one that exists, as the checks of a scene demand.
+# Speeds, accelerations, forces, energies and all else have another factor than 1.
 LENGTH, MASS, TIME = 0.5, 8.0, 0.25
+UNUSUAL = get_args(Waiver)  # a scene in other units than SI says that its numbers are meant
 
 
 class Dimension(NamedTuple):
@@ -42,7 +50,7 @@ OF_UNIT = {
     "N": FORCE, "N m": ENERGY, "N m²": Dimension(3, 1, -2), "m/s": Dimension(1, 0, -1),
     "m/s²": Dimension(1, 0, -2), "rad/s": Dimension(time=-1), "kg/m": Dimension(-1, 1), "kg m": Dimension(1, 1),
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
-    "N m s/rad": Dimension(2, 1, -1),
+    "N m s/rad": Dimension(2, 1, -1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
 # Of raw modal bodies, whose modal coordinates are numbers without unit.
 OF_MODES = {
@@ -57,9 +65,13 @@ OF_CHANNEL = {
 
 
 def _rescaled(scene: Scene) -> Counterpart:
+    without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
+    for connector in scene.connectors:
+        if isinstance(connector, Bushing) or by_stem(connector).get("stiffening"):
+            raise NotApplicable(f'connector "{connector.name}" has numbers whose keys do not tell their units')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)
     drives = _drives(scene)
@@ -67,11 +79,11 @@ def _rescaled(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items()}
 
-    return Counterpart(_in_units(scene), back, clock=TIME)
+    return Counterpart(msgspec.structs.replace(_in_units(scene), allow=UNUSUAL), back, clock=TIME)
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:
-    if channel.startswith("drive:"):
+    if channel.startswith(("drive:", "hinge_force:")):
         return drives[channel.partition(":")[2]]
     if channel.startswith(("energy.", "work")):
         return ENERGY.factor
@@ -79,7 +91,7 @@ def _factor(channel: str, drives: dict[str, float]) -> float:
 
 
 def _drives(scene: Scene) -> dict[str, Any]:
-    """Of each hinge and wheel with prescribed motion, the factors of its drive loads."""
+    """Of each hinge and wheel with prescribed motion, the factors of its drive loads; of connectors, of their loads."""
     found: dict[str, Any] = {wheel.name: ENERGY.factor for wheel in scene.wheels}
     for hinge in scene.hinges:
         prescribed = [each for _, each in coordinates(hinge) if is_prescribed(each)]
@@ -87,6 +99,9 @@ def _drives(scene: Scene) -> dict[str, Any]:
             found[hinge.name] = [
                 (FORCE if isinstance(each, LinearCoordinate) else ENERGY).factor for each in prescribed
             ]
+    for connector in scene.connectors:
+        linear = isinstance(connector, LinearSpring | LinearFriction)
+        found[connector.name] = (FORCE if linear else ENERGY).factor
     return found
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from crosscheck.engines.connections import tension_of
 from crosscheck.engines.conventions import Frame, frame, rotation_matrix
 from crosscheck.engines.exudyn import joints
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
@@ -15,6 +16,8 @@ from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
 from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quaternion
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import axes
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.connectors import Connector, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical, Weld
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
@@ -89,7 +92,7 @@ class Assembly:
 def unconstrained(scene: Scene) -> bool:
     """Whether the scene is one free-flying body: the case for Exudyn's explicit integrators, which take no joints."""
     single = len(scene.bodies) == 1 and isinstance(scene.hinges[0], Free)
-    return single and not scene.wheels and not scene.point_masses
+    return single and not scene.wheels and not scene.point_masses and not scene.connectors
 
 
 def flexible(body: Body) -> bool:
@@ -120,6 +123,8 @@ def assemble(scene: Scene) -> Assembly:
         guides[mass.name], carrier = _point_mass(shop, placed[mass.body], mass)
         carriers.append(carrier)
     closures = {closure.name: _closure(shop, placed, closure) for closure in scene.closures}
+    for connector in scene.connectors:
+        _spring(shop, placed, connector)
     for load in scene.loads:
         _load(shop, placed[load.body], load)
     sampler = shop.mbs.AddSensor(shop.items.SensorUserFunction(sensorUserFunction=_nothing, storeInternal=True))
@@ -140,6 +145,9 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
     ends = [(each.body_a, each.node_a) for each in scene.closures]
     ends += [(each.body_b, each.node_b) for each in scene.closures]
+    for each in scene.connectors:
+        if isinstance(each, SpringDamper):
+            ends += [(each.body_a, each.node_a), (each.body_b, each.node_b)]
     users += [(body, node) for body, node in ends if body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
@@ -270,6 +278,25 @@ def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> Exu
         else:
             ports.append(_port(shop, placed[body], node, own))
     return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
+
+
+def _spring(shop: Workshop, placed: dict[str, Placed], connector: Connector) -> None:
+    """A spring-damper between two points that exist already, with the scene's law as a user function."""
+    assert isinstance(connector, SpringDamper)
+    markers, tension = [], tension_of(connector)
+    for side in "ab":
+        body, own = getattr(connector, f"body_{side}"), frame(getattr(connector, f"position_{side}_m"), IDENTITY)
+        if body == GROUND:
+            markers.append(shop.marker(shop.ground, own.position))
+        else:
+            port = _port(shop, placed[body], getattr(connector, f"node_{side}"), own)
+            markers.append(shop.marker(port.carrier, port.position))
+    shop.mbs.AddObject(
+        shop.items.SpringDamper(
+            markerNumbers=markers, referenceLength=connector.free_length_m, stiffness=0.0, damping=0.0,
+            springForceUserFunction=lambda mbs, t, item, x, rate, k, d, f: tension(t, x, rate).load,
+        )
+    )  # fmt: skip
 
 
 def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[ExudynLink, Carrier]:

@@ -26,6 +26,13 @@ class ExudynBeamEngine:
 
     name = "exudyn-beam"
     summary = "one planar beam of finite deflection, by beam elements"
+    algorithm = "beam elements in redundant coordinates"
+    settings = (
+        "As many planar cable elements (shear-flexible ones where the scene's beam is) as the scene's beam has, in "
+        "Exudyn's own C++ loop by generalised alpha, with a sensor in Python that takes the state at every sample. "
+        "Fixed steps follow the bending; the method damps the axial vibrations that they step over. It is another and "
+        "richer model than modes, so its error contains the distance of the models."
+    )
 
     def version(self) -> str:
         """Version of the library; raises EngineMissing where it is not installed."""
@@ -51,8 +58,8 @@ def _refusals(scene: Scene) -> Iterator[str]:
         yield "it takes scenes with one beam and nothing else"
         return
     beam, hinge = scene.bodies[0], scene.hinges[0]
-    if scene.wheels or scene.point_masses or scene.closures or beam.tip_masses:
-        yield "it takes a bare beam: no wheels, point masses, tip masses or closures"
+    if scene.wheels or scene.point_masses or scene.closures or scene.connectors or beam.tip_masses:
+        yield "it takes a bare beam: no wheels, point masses, tip masses, closures or connectors"
     for load in scene.loads:
         if load.frame != "world":
             yield f'load "{load.name}" turns with its node: it takes loads in World axes'

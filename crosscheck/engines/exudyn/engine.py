@@ -23,6 +23,7 @@ class ExudynEngine:
     """Exudyn behind the engine contract."""
 
     name = "exudyn"
+    takes = ("connectors",)
     summary = "rigid bodies and floating frames in redundant coordinates"
     algorithm = "redundant coordinates, Lagrange multipliers"
     settings = (

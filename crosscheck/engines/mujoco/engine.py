@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Link, links, obstacle
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Connector, Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.model import MujocoModel
@@ -24,6 +24,7 @@ class MujocoEngine:
     """Rigid trees with RK4, exact but for two artifices whose errors are at round-off (see `mujoco.tree`)."""
 
     name = "mujoco"
+    takes = ("connectors",)
     summary = "rigid trees in minimal coordinates, fixed steps"
     algorithm = "composite bodies, sparse factors"
     settings = (
@@ -40,7 +41,7 @@ class MujocoEngine:
         return mujoco.__version__
 
     def supports(self, scene: Scene) -> Support:
-        reason = obstacle(scene, "MuJoCo", ("spherical",))
+        reason = obstacle(scene, "MuJoCo", ("spherical",), get_args(Connector))
         if not reason:
             reason = next(filter(None, map(_refusal, links(scene))), "")
         if reason:

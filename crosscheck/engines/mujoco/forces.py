@@ -11,6 +11,7 @@ import numpy as np
 from crosscheck.engines.conventions import cross, rotation_vector
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Attachment, Ball, Scalar, attachment
+from crosscheck.engines.mujoco.connections import MujocoConnections
 from crosscheck.engines.mujoco.tree import ARMATURE, MujocoSlot, MujocoTree
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
@@ -30,11 +31,12 @@ class Forces:
         self._motions = [(slot.q, slot.v, profile(slot.freedom.prescribed)) for slot in self.driven]
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
         self._loads = [_BodyWrench(tree, attachment(scene, tree.links, load), load) for load in scene.loads]
+        self.connections = MujocoConnections(tree, scene)
         self.before_end = np.inf
 
     @contextmanager
     def active(self) -> Iterator[None]:
-        if not (self._motions or self._motors or self._loads):
+        if not (self._motions or self._motors or self._loads or self.connections):
             yield
             return
         mujoco.set_mjcb_control(self._apply)
@@ -61,14 +63,17 @@ class Forces:
 
     def _apply(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         t = min(data.time, self.before_end)
+        if self.connections:
+            data.qfrc_applied[:] = 0.0
         for index, motor in self._motors:
             data.qfrc_applied[index] = motor(t).value
         for _, v, motion in self._motions:
             data.qfrc_applied[v] = ARMATURE * motion(t).acceleration
-        if self._loads:
+        if self._loads or self.connections:
             data.xfrc_applied[:] = 0.0
             for load in self._loads:
                 load.add(t, data)
+            self.connections.add(t, data)
 
 
 class _BodyWrench:

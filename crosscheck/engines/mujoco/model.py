@@ -13,6 +13,7 @@ import mujoco
 import numpy as np
 from scipy.linalg import eigh
 
+from crosscheck.engines.connections import stiffest
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
 from crosscheck.engines.functions_of_time import breaks_between, fastest_rate, scene_functions
 from crosscheck.engines.links import Ball, Floating, Scalar, closed_frames, links
@@ -48,6 +49,7 @@ class MujocoModel:
         self._forces = Forces(self._tree, scene)
         self._observer = MujocoObserver(self._tree, self._forces, scene, closures)
         self._functions = scene_functions(scene)
+        self._connected = stiffest(scene, chain)
 
     def warm_up(self) -> None:
         """Nothing is compiled; touch the code once so that first-call costs are not timed."""
@@ -100,7 +102,7 @@ class MujocoModel:
         M = M[np.ix_(free, free)]
         elastic = np.sqrt(eigh(np.diag(K[free]), M, eigvals_only=True).max(initial=0.0))
         damped = eigh(np.diag(C[free]), M, eigvals_only=True).max(initial=0.0)
-        return Fastest(max(rates), float(max(elastic, damped)))
+        return Fastest(max(rates), float(max(elastic, damped, self._connected)))
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)

@@ -40,7 +40,7 @@ class MujocoObserver:
         mujoco.mj_rnePostConstraint(model, data)
         loads = dict(zip(self._names, self._loads(data), strict=True))
         kinetic, momentum = self._motion(data)
-        mass = model.body_mass
+        mass, connections = model.body_mass, self._forces.connections
         return Snapshot(
             markers={name: self._marker(at, data) for name, at in self._markers.items()},
             loads={name: load for (kind, name), load in loads.items() if kind == "body"} | self._closed(data),
@@ -49,10 +49,12 @@ class MujocoObserver:
             energy={
                 "kinetic": kinetic,
                 "strain": 0.0,
-                "spring": self._forces.spring_energy(data.qpos),
+                "spring": self._forces.spring_energy(data.qpos) + connections.energy(data.time, data),
                 "gravity": -float(mass @ data.xipos @ self._gravity),
             },
             momentum=momentum,
+            connectors={name: each.on_b for name, each in connections.exerted(data.time, data).items()},
+            hinge_forces={name: np.array([held.load]) for name, (_, held) in connections.along(data).items()},
         )
 
     def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Real:
@@ -111,5 +113,6 @@ class MujocoObserver:
             half = about_axis[:3] if slot.freedom.angular else about_axis[3:]
             freedom = slot.freedom
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
+            passive += sum(held.load for v, held in self._forces.connections.along(data).values() if v == slot.v)
             named.setdefault(slot.link.joint, []).append(float(half @ data.xaxis[slot.joint] - passive))
         return {name: np.array(values) for name, values in named.items()}

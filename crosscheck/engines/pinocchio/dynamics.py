@@ -16,6 +16,7 @@ from crosscheck.engines.conventions import quaternion_rate, scalar_first, scalar
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.links import Ball, Floating, Scalar
 from crosscheck.engines.pinocchio.closures import PinocchioClosures
+from crosscheck.engines.pinocchio.connections import PinocchioConnections
 from crosscheck.engines.pinocchio.forces import JointForces, PlacedLoads
 from crosscheck.engines.pinocchio.tree import PinocchioSlot, PinocchioTree, initial_state
 from flexmb.scene.schema import Scene
@@ -48,6 +49,7 @@ class Dynamics:
         self.forces = JointForces(tree)
         self.loads = PlacedLoads(tree, scene)
         self.closures = PinocchioClosures(tree, scene)
+        self.connections = PinocchioConnections(tree, scene)
         self.driven: list[PinocchioSlot] = [slot for slot in tree.slots if _is_driven(slot)]
         self._motions = [profile(slot.freedom.prescribed) for slot in self.driven]
         self._driven_q = np.array([slot.q for slot in self.driven], dtype=np.intp)
@@ -87,6 +89,9 @@ class Dynamics:
         """
         lost = self.forces.dampers_and_motors(t, state.v)
         tau = self.forces.springs(state.q) + lost
+        held = self.connections.along(state.q, state.v).values()
+        for speed, each in held:
+            tau[speed] += each.load
         if self.closures:
             a = self.closures.solve(state.q, state.v, tau)
             return PinocchioSolution(a, np.zeros(0), float(lost @ state.v))
@@ -100,6 +105,9 @@ class Dynamics:
         power = lost @ state.v + drive @ state.v[D]
         if self.loads:
             power += self.loads.power(t, self.data)
+        power += sum(each.power for _, each in held)
+        if self.connections:
+            power += self.connections.power(t, self.data)
         return PinocchioSolution(a, drive, float(power))
 
     def inverse(self, state: PinocchioState, acceleration: Real, wrenches: pin.StdVec_Force | None) -> Real:
@@ -134,10 +142,12 @@ class Dynamics:
         qdot[start : start + 4] = scalar_last(quaternion_rate(scalar_first(own), omega))
 
     def _wrenches(self, t: float, state: PinocchioState) -> pin.StdVec_Force | None:
-        if not self.loads:
+        if not (self.loads or self.connections):
             return None
         pin.forwardKinematics(self.tree.model, self.data, state.q, state.v)
-        return self.loads.wrenches(t, self.data)
+        wrenches = self.loads.wrenches(t, self.data)
+        self.connections.add(t, self.data, wrenches)
+        return wrenches
 
 
 def _is_driven(slot: PinocchioSlot) -> bool:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Scalar, links, obstacle
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Connector, Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.pinocchio.model import PinocchioModel
@@ -19,6 +19,7 @@ class PinocchioEngine:
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
+    takes = ("connectors",)
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
@@ -37,7 +38,8 @@ class PinocchioEngine:
     def supports(self, scene: Scene) -> Support:
         if len(scene.hinges) > MOST_JOINTS:
             return Support("no", f"{len(scene.hinges)} hinges are too many: {WHY_NOT_MORE}")
-        reason = obstacle(scene, "Pinocchio", ("weld", "spherical")) or (scene.closures and _beside_closures(scene))
+        reason = obstacle(scene, "Pinocchio", ("weld", "spherical"), get_args(Connector))
+        reason = reason or (scene.closures and _beside_closures(scene))
         return Support("no", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
@@ -55,6 +57,8 @@ class PinocchioEngine:
 
 def _beside_closures(scene: Scene) -> str:
     """What this adapter does not combine with closed loops, "" if there is nothing."""
+    if scene.connectors:
+        return f'connector "{scene.connectors[0].name}": Pinocchio\'s constrained dynamics takes none'
     if scene.loads:
         return f'load "{scene.loads[0].name}": Pinocchio\'s constrained dynamics takes none'
     for link in links(scene):

@@ -39,6 +39,8 @@ class PinocchioObserver:
         for link, joint in zip(links, dynamics.tree.joints, strict=True):
             local = angular_first(data.f[joint].vector)
             wrench[link.kind, link.joint] = rotate_spatial(data.oMi[joint].rotation, local)
+        exerted, held = dynamics.connections.exerted(t, data), dynamics.connections.along(state.q, state.v)
+        stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
         pin.updateFramePlacements(model, data)
         markers = {name: self._marker(frame) for name, frame in self._frames.items()}
         pin.computeCentroidalMomentum(model, data, state.q, state.v)
@@ -51,10 +53,12 @@ class PinocchioObserver:
             energy={
                 "kinetic": pin.computeKineticEnergy(model, data, state.q, state.v),
                 "strain": 0.0,
-                "spring": dynamics.forces.spring_energy(state.q),
+                "spring": dynamics.forces.spring_energy(state.q) + stored,
                 "gravity": pin.computePotentialEnergy(model, data, state.q),
             },
             momentum=np.concatenate([about_com + cross(com, linear), linear]),
+            connectors={name: each.on_b for name, each in exerted.items()},
+            hinge_forces={name: np.array([each.load]) for name, (_, each) in held.items()},
         )
 
     def _marker(self, frame: int) -> MarkerSnapshot:

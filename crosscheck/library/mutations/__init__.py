@@ -7,13 +7,23 @@ leaves the scene as it was is refused, since a control that changes nothing cann
 from __future__ import annotations
 
 from crosscheck.library.case import CaseError, MutationKind
-from crosscheck.library.mutations import frames, gravity, hinges, inertia, loads, modes, time_courses, wheels
+from crosscheck.library.mutations import (
+    connectors,
+    frames,
+    gravity,
+    hinges,
+    inertia,
+    loads,
+    modes,
+    time_courses,
+    wheels,
+)
 from crosscheck.library.mutations.mutation import Mutation, MutationTarget
 from flexmb.scene.schema import Scene
 
 CATALOGUE: dict[MutationKind, Mutation] = {
     each.name: each
-    for room in (inertia, frames, hinges, wheels, gravity, loads, modes, time_courses)
+    for room in (inertia, frames, hinges, connectors, wheels, gravity, loads, modes, time_courses)
     for each in room.MUTATIONS
 }
 

@@ -10,12 +10,13 @@ import msgspec
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.mutation import FACTOR, MutationTarget
 from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
+from flexmb.scene.connectors import Connector
 from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
 AnyNode = Node | BeamNode | ModalNode
-Named = TypeVar("Named", Body, Hinge, Wheel, Load, Closure, PointMass)
+Named = TypeVar("Named", Body, Hinge, Wheel, Load, Closure, Connector, PointMass)
 
 
 def on_body(scene: Scene, target: str, change: Callable[[Body], Body]) -> Scene:

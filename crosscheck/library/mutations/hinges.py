@@ -31,6 +31,7 @@ from flexmb.scene.tree import Coordinate, coordinates
 
 OPPOSITE, DROPPED = -1.0, 0.0
 DEGREE = math.pi / 180.0
+ROUNDING = 1e-15
 
 
 def _hinge_axis(scene: Scene, target: str) -> Scene:
@@ -45,15 +46,22 @@ def _hinge_axis(scene: Scene, target: str) -> Scene:
 def _reversal_is_a_name(scene: Scene, target: str) -> str:
     """Without anything that has a sign of its own, the sign of a coordinate is a name."""
     hinge = next(hinge for hinge in scene.hinges if hinge.name == target)
+    if any(getattr(each, "hinge", "") == target for each in scene.connectors):
+        return ""
     for _, coordinate in coordinates(hinge):
         functions = (getattr(coordinate, motor_key(coordinate)), getattr(coordinate, key_of(coordinate, "prescribed")))
-        values = [
-            getattr(coordinate, key)
-            for key in (place_key(coordinate), *(key_of(coordinate, k) for k in ("rate", "rest")))
-        ]
-        if any(function is not None for function in functions) or any(values):
+        values = [getattr(coordinate, key_of(coordinate, k)) for k in ("rate", "rest")]
+        if any(function is not None for function in functions) or any(values) or _has_a_side(coordinate):
             return ""
     return "it starts at rest at zero, its spring too, without motor: the sign of the axis only names the coordinate"
+
+
+def _has_a_side(coordinate: Coordinate) -> bool:
+    """Whether the initial place is another on the opposite axis: a half-turn is not, but for a spring."""
+    place = getattr(coordinate, place_key(coordinate))
+    if isinstance(coordinate, AngularCoordinate) and not coordinate.stiffness_Nm_rad:
+        return abs(math.sin(place)) > ROUNDING
+    return place != 0.0
 
 
 def _gimbal_order(scene: Scene, target: str) -> Scene:

@@ -10,6 +10,7 @@ import numpy as np
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import bodies, on_body, opposite, point_masses, replaced, scaled
 from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.resting import rests
 from crosscheck.library.mutations.turning import EPS, only_axis
 from flexmb.scene.bodies import BeamBody, Body, Matrix3, ModalBody, RigidBody
 from flexmb.scene.schema import PointMass, Scene
@@ -39,7 +40,7 @@ def _inertia(scene: Scene, target: str) -> Scene:
     def stiffer_to_turn(body: Body) -> Body:
         match body:
             case RigidBody():
-                return msgspec.structs.replace(body, inertia_kg_m2=scaled(body.inertia_kg_m2))
+                return _more_inertia(body)
             case BeamBody():
                 return _scaled_stations(body, ("rotary_y_kg_m", "rotary_z_kg_m"))
         raise CaseError(f'control "inertia" changes rigid bodies and beams, not "{body.name}"')
@@ -63,6 +64,10 @@ def _of_rigid(name: str, change: Callable[[RigidBody], RigidBody]) -> Callable[[
         raise CaseError(f'control "{name}" changes rigid bodies, not "{body.name}"')
 
     return lambda scene, target: on_body(scene, target, changed)
+
+
+def _more_inertia(body: RigidBody) -> RigidBody:
+    return msgspec.structs.replace(body, inertia_kg_m2=scaled(body.inertia_kg_m2))
 
 
 def _com(body: RigidBody) -> RigidBody:
@@ -117,6 +122,8 @@ def _same_about_its_axis(change: Callable[[RigidBody], RigidBody]) -> Callable[[
             return ""
         J, other = np.asarray(body.inertia_kg_m2), np.asarray(change(body).inertia_kg_m2)
         same = np.max(np.abs((other - J) @ axis)) <= EPS * np.max(np.abs(J))
+        if same and not np.any(axis):
+            return "the body does not turn"
         return "the body turns about one axis only, and the inertia about that is the same" if same else ""
 
     return idle
@@ -137,9 +144,21 @@ def _scaled_points(body: ModalBody) -> ModalBody:
 
 MUTATIONS = (
     Mutation(
-        "mass", "+1 % mass of a body, its inertia as it was", "a wrong figure, or a lump forgotten", bodies, _mass
+        "mass",
+        "+1 % mass of a body, its inertia as it was",
+        "a wrong figure, or a lump forgotten",
+        bodies,
+        _mass,
+        rests,
     ),
-    Mutation("inertia", "+1 % inertia about the mass centre", "a wrong figure", bodies, _inertia),
+    Mutation(
+        "inertia",
+        "+1 % inertia about the mass centre",
+        "a wrong figure",
+        bodies,
+        _inertia,
+        _same_about_its_axis(_more_inertia),
+    ),
     Mutation(
         "inertia_swapped",
         "x and z exchanged in the inertia of a rigid body",

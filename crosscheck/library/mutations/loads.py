@@ -8,7 +8,9 @@ import msgspec
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import loads, on_load, opposite
+from crosscheck.library.mutations.mirror import X, along, mirrors
 from crosscheck.library.mutations.mutation import Mutation
+from crosscheck.library.mutations.resting import is_clamped_along_world, twists_only
 from flexmb.scene.bodies import SidBody
 from flexmb.scene.schema import Load, Scene
 from flexmb.scene.tree import rest_frames
@@ -43,6 +45,17 @@ def _point(scene: Scene, target: str) -> Scene:
     return on_load(scene, target, moved)
 
 
+def _turns_about_it(scene: Scene, target: str) -> str:
+    """A torque about the only axis that its body turns about: by symmetry, or as a clamped bar that only twists."""
+    load = next(load for load in scene.loads if load.name == target)
+    body = next(body for body in scene.bodies if body.name == load.body)
+    twisted = twists_only(body) and is_clamped_along_world(scene, body.name) and along(load.direction, X)
+    mirrored = any(along(load.direction, axis) for axis in mirrors(scene))
+    if load.type == "torque" and (mirrored or twisted):
+        return "the body turns about the torque's axis only, which is the same in World and in the node's axes"
+    return ""
+
+
 MUTATIONS = (
     Mutation("load_sign", "opposite load", "action taken for reaction", loads, _of_load(_sign)),
     Mutation("load_point", "force at another point of its body", "another reference point", loads, _point),
@@ -52,5 +65,6 @@ MUTATIONS = (
         "dead load taken for follower load",
         loads,
         _of_load(_frame),
+        _turns_about_it,
     ),
 )

@@ -5,13 +5,18 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import msgspec
+import numpy as np
 
 from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import bodies, on_body, whole
+from crosscheck.library.mutations.mirror import along, mirrors, within
 from crosscheck.library.mutations.mutation import Mutation
+from crosscheck.library.mutations.resting import rests, twists_only
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, ModalNode, RigidBody
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
+
+ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes
 
 
 def _unstiffened(scene: Scene, target: str) -> Scene:
@@ -34,19 +39,45 @@ def _undeformed(scene: Scene, target: str) -> Scene:
     return on_body(scene, target, changed)
 
 
+def _twists_in_place(scene: Scene, target: str) -> str:
+    """Of a clamped bar that only twists, the frame is at rest and every section stays balanced on its axis."""
+    body = next(body for body in scene.bodies if body.name == target)
+    if twists_only(body) and rests(scene, target):
+        return "the bar is clamped and only twists, which moves no mass centre"
+    return ""
+
+
 def _of_modes(name: str, change: Callable[[ModalBody], ModalBody]) -> Callable[[Scene, str], Scene]:
     """A change of the modes of one body; a beam is made the points and modes that it stands for."""
 
     def changed(scene: Scene, target: str) -> Scene:
-        alone = next((body for body in scene.bodies if body.name == target), None)
-        if isinstance(alone, BeamBody):
-            alone = modal_points(msgspec.structs.replace(scene, bodies=(alone,))).bodies[0]
+        alone = _in_modes(scene, target)
         if not isinstance(alone, ModalBody) or not alone.points:
             raise CaseError(f'control "{name}" changes beams and inline modal bodies, not "{target}"')
         spoilt = change(alone)
         return on_body(scene, target, lambda body: spoilt)
 
     return changed
+
+
+def _in_modes(scene: Scene, target: str) -> Body | None:
+    """The body called `target`, a beam as the points and modes that it stands for."""
+    alone = next((body for body in scene.bodies if body.name == target), None)
+    if isinstance(alone, BeamBody):
+        return modal_points(msgspec.structs.replace(scene, bodies=(alone,))).bodies[0]
+    return alone
+
+
+def _out_of_the_plane(scene: Scene, target: str) -> str:
+    """Of a scene that is its own image in a mirror, modes along the mirror's normal are never excited."""
+    body = _in_modes(scene, target)
+    first = [node for node in body.nodes if node.translation_modes] if isinstance(body, ModalBody) else []
+    for axis in mirrors(scene):
+        moves = all(along(node.translation_modes[0], axis) for node in first)
+        turns = all(within(node.rotation_modes[0], axis) for node in first if node.rotation_modes)
+        if first and moves and turns:
+            return "the first mode is normal to the plane in which everything moves, by symmetry"
+    return ""
 
 
 def _sign(body: ModalBody) -> ModalBody:
@@ -73,6 +104,16 @@ def _order(body: ModalBody) -> ModalBody:
     order = [1, 0, *range(2, len(body.stiffness))]
     stiffness = tuple(tuple(body.stiffness[i][j] for j in order) for i in order)
     return msgspec.structs.replace(body, stiffness=stiffness)
+
+
+def _equally_stiff(scene: Scene, target: str) -> str:
+    """Of two modes that are equally stiff and coupled alike the order is a name, say those of a round section."""
+    body = _in_modes(scene, target)
+    if not isinstance(body, ModalBody):
+        return ""
+    right, wrong = (np.asarray(each.stiffness) for each in (body, _order(body)))
+    same = np.max(np.abs(wrong - right)) <= ROUNDING * np.max(np.abs(right[:2, :2]))
+    return "the first two modes are equally stiff: exchanged, their stiffness is the same" if same else ""
 
 
 def _no_rotation(body: ModalBody) -> ModalBody:
@@ -110,6 +151,7 @@ MUTATIONS = (
         "Coriolis, centrifugal and inertia terms of the deformation left out",
         bodies,
         _undeformed,
+        _twists_in_place,
     ),
     Mutation(
         "mode_sign",
@@ -117,6 +159,7 @@ MUTATIONS = (
         "modes of two analyses mixed: the sign of an eigenvector is arbitrary",
         bodies,
         _of_modes("mode_sign", _sign),
+        _out_of_the_plane,
     ),
     Mutation(
         "mode_order",
@@ -124,6 +167,7 @@ MUTATIONS = (
         "modes sorted in one file and not in the other",
         bodies,
         _of_modes("mode_order", _order),
+        _equally_stiff,
     ),
     Mutation(
         "mode_rotation",

@@ -1,4 +1,4 @@
-"""Bodies that can turn about one axis only, because all hinges that carry them are parallel.
+"""Bodies that turn about one axis only, because all hinges that carry them are parallel, or by a mirror's symmetry.
 
 Of the inertia of such a body only J e matters, e its axis: moments are J e alpha + e x J e w^2. A torque along e is the
 same in World and in body axes.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from crosscheck.library.mutations.mirror import mirrors
 from flexmb.scene.bodies import Body, RigidBody
 from flexmb.scene.hinges import Cylindrical, Hinge, Planar, Prismatic, Revolute, Weld
 from flexmb.scene.quaternions import rotation_matrix
@@ -22,8 +23,12 @@ def only_axis(scene: Scene, name: str) -> Real | None:
     """The axis (3,) in body axes that body `name` can only turn about, zero if it cannot turn; None if there is none.
 
     The body itself may be flexible, where it is carried at its frame; those that carry it are rigid. Closures, which
-    take more freedom, are not looked at.
+    take more freedom, are not looked at but for symmetry: a scene that is its own image in a mirror turns about the
+    mirror's normal only, in two mirrors not at all.
     """
+    symmetric = mirrors(scene)
+    if symmetric:
+        return np.eye(3)[symmetric[0]] if len(symmetric) == 1 else np.zeros(3)
     axes: dict[str, Real | None] = {GROUND: np.zeros(3)}
     bodies: dict[str, Body] = {}
     for body, hinge in ordered(scene):

@@ -17,6 +17,7 @@ from flexmb.modal.cross import cross_matrix
 from flexmb.modal.flexible import flexible_model
 from flexmb.modal.flexible_model import FlexibleModel
 from flexmb.scene.bodies import BeamBody, RigidBody, SidBody
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -158,6 +159,8 @@ def _check_limb_end(scene: Scene, body: str) -> None:
     attached += [f'point mass "{mass.name}"' for mass in scene.point_masses if mass.body == body]
     attached += [f'wheel "{wheel.name}"' for wheel in scene.wheels if wheel.body == body]
     attached += [f'closure "{closure.name}"' for closure in scene.closures if body in (closure.body_a, closure.body_b)]
+    ends = [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+    attached += [f'connector "{each.name}"' for each in ends if body in (each.body_a, each.body_b)]
     if attached:
         raise ValueError(
             f'body "{body}" is not at a limb end ({", ".join(attached)}): a hinge cannot stand for its modes, since '

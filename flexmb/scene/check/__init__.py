@@ -1,11 +1,15 @@
-"""Can this scene be simulated? Every defect is found before anything runs, with its place and its remedy."""
+"""Can this scene be simulated? Every defect and doubt is found before anything runs, with its place and its remedy."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from math import isfinite
 
 from flexmb.scene.check.beams import beams
+from flexmb.scene.check.connectors import connectors
+from flexmb.scene.check.control import control
+from flexmb.scene.check.events import events
 from flexmb.scene.check.hinges import closures, hinges, point_masses, wheels
 from flexmb.scene.check.inertia import rigid_bodies
 from flexmb.scene.check.modal import modal_bodies, modal_states
@@ -16,47 +20,65 @@ from flexmb.scene.check.topology import tree
 from flexmb.scene.check.walk import finite_numbers, unit_quaternions, unit_vectors
 from flexmb.scene.convert import refuse_wrong_types
 from flexmb.scene.garbage import collector_paused
-from flexmb.scene.problems import Defect, SceneError
+from flexmb.scene.problems import Defect, Doubt, SceneError, SceneWarning, in_short
 from flexmb.scene.schema import Scene
 
 EVERYWHERE = (finite_numbers, unit_vectors, unit_quaternions)
 STRUCTURE = (unique_names, references, tree)
-PHYSICS = (rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses)
+PHYSICS = (
+    rigid_bodies, beams, modal_bodies, modal_states, hinges, closures, wheels, point_masses, connectors, control,
+    events,
+)  # fmt: skip
 
 
-def check_scene(scene: Scene, t_end: float | None = None) -> None:
-    """Raise SceneError with all problems of a scene, or return. With `t_end` (s) profiles must cover the run.
+def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> tuple[Doubt, ...]:
+    """Raise SceneError with all problems of a scene; return what is doubtful. Profiles must cover t_start (s), with
+    `t_end` (s) the run from there.
 
-    SID bodies and every fidelity level pass: `compile` decides whether they can be run. Raises TypeError for anything
-    but a Scene.
+    A doubtful scene runs; what its `allow` lists is not returned. `compile`, `simulate` and the command lines show the
+    same doubts as a `SceneWarning`, which `python -W error::flexmb.SceneWarning` and the option `--strict` turn into an
+    error. SID bodies and every fidelity level pass: `compile` decides whether they can be run. Raises TypeError for
+    anything but a Scene.
     """
     if not isinstance(scene, Scene):
         raise TypeError(f"a Scene is needed, not {type(scene).__name__}: load_scene reads one, SceneBuilder makes one")
     with collector_paused():
-        problems = _problems(scene, t_end)
-    if problems:
-        raise SceneError(scene.name, problems)
+        problems = _problems(scene, t_end, t_start)
+    defects = [problem for problem in problems if not isinstance(problem, Doubt)]
+    if defects:
+        raise SceneError(scene.name, defects)
+    return tuple(doubt for doubt in problems if isinstance(doubt, Doubt) and doubt.waiver not in scene.allow)
 
 
-def _problems(scene: Scene, t_end: float | None) -> list[Defect]:
+def check_and_warn(scene: Scene, t_end: float | None = None, t_start: float = 0.0) -> None:
+    """The same with all doubts as one SceneWarning, at the place that called the caller."""
+    doubts = check_scene(scene, t_end, t_start)
+    if doubts:
+        warnings.warn(in_short(scene.name, doubts), SceneWarning, stacklevel=3)
+
+
+def _problems(scene: Scene, t_end: float | None, t_start: float) -> list[Defect]:
     refuse_wrong_types(scene)  # a struct built by hand may hold values of any type
-    problems = [*_run_time(t_end), *(problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene))]
-    problems += functions(scene, t_end)
-    if not problems:  # needs sound numbers, names and a tree to stand on
+    problems = [*_run_time(t_end, t_start)]
+    problems += [problem for check in EVERYWHERE + STRUCTURE + PHYSICS for problem in check(scene)]
+    problems += functions(scene, t_end, t_start)
+    if all(isinstance(each, Doubt) for each in problems):  # needs sound numbers, names and a tree to stand on
         problems += moved_inertia(scene)
     return problems
 
 
-def check_run(scene: Scene, t_end: float) -> None:
-    """Raise SceneError unless a scene that was checked before can be run to `t_end` (s): its profiles cover the run."""
-    problems = [*_run_time(t_end), *functions(scene, t_end)]
+def check_run(scene: Scene, t_end: float, t_start: float = 0.0) -> None:
+    """Raise SceneError unless a scene that was checked before can be run from `t_start` to `t_end` (s), which its
+    profiles have to cover."""
+    problems = [*_run_time(t_end, t_start), *functions(scene, t_end, t_start)]
     if problems:
         raise SceneError(scene.name, problems)
 
 
-def _run_time(t_end: float | None) -> Iterator[Defect]:
-    if t_end is not None and not (isfinite(t_end) and t_end > 0.0):
-        yield Defect("t_end", f"the run ends at {t_end} s", "give a positive, finite time")
+def _run_time(t_end: float | None, t_start: float) -> Iterator[Defect]:
+    if t_end is not None and not (isfinite(t_end) and t_end > t_start):
+        remedy = f"give a finite time after its start at {t_start:g} s" if t_start else "give a positive, finite time"
+        yield Defect("t_end", f"the run ends at {t_end} s", remedy)
 
 
-__all__ = ["Defect", "SceneError", "check_run", "check_scene"]
+__all__ = ["Defect", "Doubt", "SceneError", "SceneWarning", "check_and_warn", "check_run", "check_scene"]

@@ -8,7 +8,7 @@ from math import sqrt
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes
 from flexmb.scene.check import inertia
 from flexmb.scene.check.walk import sound
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
 
 # Axial wave speed sqrt(EA / mass per length): soft rubber has some 50 m/s, diamond 18 km/s. The limits are wider than
@@ -69,26 +69,28 @@ def _stations(place: Place, body: BeamBody) -> Iterator[Defect]:
             yield from _plausible(spot.key(i), station, body.length_m)
 
 
-def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Defect]:
-    """Problems that look like a slip of units in one of the stiffnesses, or between stiffness and mass."""
+def _plausible(spot: Place, station: BeamStation, length: float) -> Iterator[Doubt]:
+    """What looks like a slip of units in one of the stiffnesses, or between stiffness and mass."""
     check = "check the units, a factor of 1000 for instance"
     speed = sqrt(station.EA_N / station.mass_per_length_kg_m)
     if not WAVE_SPEED[0] <= speed <= WAVE_SPEED[1]:
-        what = f"waves would run along the beam at {speed:.3g} m/s: no material does that"
+        what = f"waves would run along the beam at {speed:.3g} m/s: no usual material does that"
         window = f"sqrt(EA / mass per length) lies in {WAVE_SPEED[0]:g} to {WAVE_SPEED[1]:g} m/s"
-        yield Defect(str(spot.key("EA_N")), what, f"{check}: {window}")
+        yield Doubt(str(spot.key("EA_N")), what, f"{check}: {window}", "wave_speed")
         return
     for key in ("EIy_Nm2", "EIz_Nm2"):
         gyration = sqrt(getattr(station, key) / station.EA_N)
         if gyration > THICKEST * length > 0.0:
             what = f"the section's radius of gyration would be {gyration:.3g} m in a beam of {length:.3g} m"
-            yield Defect(str(spot.key(key)), what, f"{check}: sqrt(EI / EA) is a fraction of the section's width")
+            width = f"{check}: sqrt(EI / EA) is a fraction of the section's width"
+            yield Doubt(str(spot.key(key)), what, width, "thick_section")
     for key, limit in (("GJ_Nm2", station.EIy_Nm2 + station.EIz_Nm2), ("GAy_N", station.EA_N), ("GAz_N", station.EA_N)):
         value = getattr(station, key)
         if value is not None and value > STIFFEST_SHEAR * limit:
             counterpart = "EIy + EIz" if key == "GJ_Nm2" else "EA"
             what = f"{key} is {value / limit:.3g} times {counterpart}"
-            yield Defect(str(spot.key(key)), what, f"{check}: G is smaller than E in every isotropic material")
+            isotropic = f"{check}: G is smaller than E in every isotropic material"
+            yield Doubt(str(spot.key(key)), what, isotropic, "shear_stiffness")
 
 
 def _along(place: Place, body: BeamBody) -> Iterator[Defect]:
@@ -109,7 +111,7 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     if modes.count < 0 or mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
         yield Defect(str(place.key("count")), f"{modes.count} modes", remedy)
-    elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
+    elif body.elements >= 1 and mode_count(body) > (available := available_modes(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
         yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
     yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
@@ -121,7 +123,8 @@ def _damping(place: Place, modes: Modes, count: int) -> Iterator[Defect]:
         what = f"{len(ratios)} damping ratios for {count} modes"
         yield Defect(str(place), what, "give one ratio for all modes, or one for each")
     if any(ratio < 0.0 for ratio in (ratios if isinstance(ratios, tuple) else (ratios,))):
-        yield Defect(str(place), "a negative damping ratio feeds energy into the mode", "give ratios of at least zero")
+        what, remedy = "a negative damping ratio feeds energy into the mode", "give ratios of at least zero"
+        yield Doubt(str(place), what, remedy, "negative_damping")
 
 
 def _attachments(body: BeamBody) -> int:
@@ -130,7 +133,7 @@ def _attachments(body: BeamBody) -> int:
     return sum(counts[family] for family in body.modes.families)
 
 
-def _available(body: BeamBody) -> int:
+def available_modes(body: BeamBody) -> int:
     """Coordinates with inertia of the wanted families.
 
     A free-free beam has the root's coordinates in addition, but just as many rigid motions, which are not modes.

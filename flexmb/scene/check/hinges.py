@@ -14,15 +14,15 @@ from flexmb.scene.check.profiles import MOTIONS, initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
 from flexmb.scene.columns import alike, column
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
-NOT_NEGATIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
+USUALLY_POSITIVE = ("stiffness_Nm_rad", "stiffness_N_m", "damping_Nms_rad", "damping_Ns_m", "friction_Nms_rad")
 
 
 def hinges(scene: Scene) -> Iterator[Defect]:
-    """Springs and dampers that dissipate or store, motors that can act, gimbal sequences that exist."""
+    """Springs and dampers of the usual sign, motors that can act, gimbal sequences that exist."""
     for place, hinge in sound(scene, "hinges", _to_examine(scene)):
         yield from _springs(place, hinge)
         yield from _coordinates(place, hinge)
@@ -37,7 +37,7 @@ def _to_examine(scene: Scene) -> set[int]:
         if kind is Gimbal:
             found.update(owners)
         for key in kind.__struct_fields__:
-            if key in NOT_NEGATIVE:
+            if key in USUALLY_POSITIVE:
                 found.update(owners[i] for i in np.flatnonzero(column(structs, key) < 0.0).tolist())
             elif key in MOTIONS and any(profiles := list(map(attrgetter(key), structs))):
                 found.update(owner for owner, profile in zip(owners, profiles, strict=True) if profile is not None)
@@ -82,12 +82,13 @@ def point_masses(scene: Scene) -> Iterator[Defect]:
         yield from _coordinates(place, item)
 
 
-def _springs(place: Place, item: SceneStruct) -> Iterator[Defect]:
-    for key in NOT_NEGATIVE:
+def _springs(place: Place, item: SceneStruct) -> Iterator[Doubt]:
+    for key in USUALLY_POSITIVE:
         value = getattr(item, key, 0.0)
         if value < 0.0:
             noun = key.split("_")[0]
-            yield Defect(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
+            waiver = "negative_stiffness" if noun == "stiffness" else "negative_damping"
+            yield Doubt(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero", waiver)
 
 
 def _coordinates(place: Place, item: Any) -> Iterator[Defect]:

@@ -13,7 +13,7 @@ from flexmb.scene.check.beams import mode_count
 from flexmb.scene.check.second_order import second_order
 from flexmb.scene.check.walk import LARGEST, entries, sound
 from flexmb.scene.modal_data import ModalArrays, modal_arrays
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
@@ -112,7 +112,8 @@ def _matrices(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[De
             yield Defect(str(place.key(name)), what, "give a symmetric matrix")
         elif (lowest := float(np.linalg.eigvalsh(matrix)[0])) < -slack:
             what = f"the {name} is indefinite: its lowest eigenvalue is {lowest:.3g}"
-            yield Defect(str(place.key(name)), what, "give a positive semidefinite matrix: check its signs")
+            remedy = "give a positive semidefinite matrix: check its signs"
+            yield Doubt(str(place.key(name)), what, remedy, "negative_" + name)
 
 
 def _shapes(place: Place, body: ModalBody, arrays: ModalArrays) -> Iterator[Defect]:
@@ -202,7 +203,7 @@ def _mass_blocks(arrays: ModalArrays) -> tuple[Real, Real, Real]:
     return M[6:, 6:], M[:6, 6:], M[:6, :6]
 
 
-def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Defect]:
+def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Doubt]:
     """A slip of units between stiffness and mass shows in the lowest frequency against the body's size."""
     stiffness = (arrays.stiffness + arrays.stiffness.T) / 2.0
     from scipy.linalg import eigh  # SciPy is slow to import, and few scenes have raw modes
@@ -213,6 +214,6 @@ def _frequency(place: Place, arrays: ModalArrays, M: Real) -> Iterator[Defect]:
         return
     frequency = sqrt(lowest) / (2.0 * pi)
     if not SPEED[0] <= frequency * size <= SPEED[1]:
-        what = f"the lowest frequency is {frequency:.3g} Hz for a body of {size:.3g} m: no structure does that"
+        what = f"the lowest frequency is {frequency:.3g} Hz for a body of {size:.3g} m: no usual structure does that"
         remedy = "check the units of stiffness (N/m for modes without unit) against mass (kg): a factor of 1000, say?"
-        yield Defect(str(place.key("stiffness")), what, remedy)
+        yield Doubt(str(place.key("stiffness")), what, remedy, "modal_frequency")

@@ -7,12 +7,17 @@ from typing import Any
 
 from flexmb.scene.bodies import BeamBody, Body, ModalBody, RigidBody, SidBody
 from flexmb.scene.check.walk import entries
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, rest_frames
 
-# Hinges, wheels, point masses and closures share tables of loads, drive loads and coordinates, hence one set of names.
-NAMESPACES = (("bodies",), ("hinges", "wheels", "point_masses", "closures"), ("loads",), ("markers",))
+# Hinges, wheels, point masses, closures and connectors share tables of loads, drive loads and coordinates, hence one
+# set of names.
+NAMESPACES = (
+    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "connectors"), ("loads",), ("markers",),
+    ("sensors", "controllers"), ("events",),
+)  # fmt: skip
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 
 
@@ -64,6 +69,11 @@ def references(scene: Scene) -> Iterator[Defect]:
         if closure.body_a == closure.body_b:
             what = f'the closure joins "{closure.body_a}" to itself'
             yield Defect(str(place), what, "give two different bodies")
+    for place, connector in entries(scene, "connectors"):
+        for end in ("a", "b") if isinstance(connector, BetweenNodes) else ():
+            body, node = f"body_{end}", f"node_{end}"
+            ends = (body, getattr(connector, body)), (node, getattr(connector, node))
+            yield from _attachment(place, bodies, *ends, ground=True)
     for place, state in entries(scene, "modal_states"):
         yield from _body(place.key("body"), bodies.named, state.body)
 

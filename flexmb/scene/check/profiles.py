@@ -21,13 +21,13 @@ MOTIONS = ("prescribed_rad", "prescribed_m")
 SMOOTH = "use smooth_step, spin_up, sine, ramp, constant, or a table"
 
 
-def functions(scene: Scene, t_end: float | None) -> Iterator[Defect]:
-    """Problems of every function in the scene; with `t_end` (s) a table must reach that far."""
+def functions(scene: Scene, t_end: float | None, t_start: float = 0.0) -> Iterator[Defect]:
+    """Problems of every function in the scene; tables must cover t_start (s), and with `t_end` (s) reach that far."""
     for place, key, value in suspicious(scene, _with_functions):
         if isinstance(value, Function) and not any(non_finite(v) for _, _, v in values(place, value)):
             yield from _well_formed(place, value)
             if isinstance(value, Table):
-                yield from _covers(place, value, t_end)
+                yield from _covers(place, value, t_end, t_start)
             if isinstance(value, Pulse) and key in MOTIONS:
                 yield Defect(str(place), "a pulse jumps: no body can follow it", SMOOTH)
 
@@ -49,7 +49,9 @@ def start_of(function: Function) -> tuple[float, float] | None:
             return _smooth_step_start(function)
         case SpinUp(duration_s=duration) if duration > 0.0:
             return 0.0, 0.0
-        case Table(times_s=times, values=samples) if not any((*_table(ROOT, function), *_covers(ROOT, function, None))):
+        case Table(times_s=times, values=samples) if not any(
+            (*_table(ROOT, function), *_covers(ROOT, function, None, 0.0))
+        ):
             # here, because this import takes longer than everything else a scene without tables imports
             from scipy.interpolate import make_interp_spline
 
@@ -96,13 +98,13 @@ def _table(place: Place, table: Table) -> Iterator[Defect]:
             return
 
 
-def _covers(place: Place, table: Table, t_end: float | None) -> Iterator[Defect]:
+def _covers(place: Place, table: Table, t_end: float | None, t_start: float) -> Iterator[Defect]:
     if not table.times_s:
         return
     first, last = table.times_s[0], table.times_s[-1]
-    needed = 0.0 if t_end is None else t_end
-    if first > 0.0 or last < needed:
-        what = f"the profile covers {first:g} s to {last:g} s, but the run 0 s to {needed:g} s"
+    needed = t_start if t_end is None else t_end
+    if first > t_start or last < needed:
+        what = f"the profile covers {first:g} s to {last:g} s, but the run {t_start:g} s to {needed:g} s"
         yield Defect(str(place.key("times_s")), what, "extend the table, or shorten the run")
 
 

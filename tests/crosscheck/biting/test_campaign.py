@@ -113,6 +113,14 @@ def test_mutants_of_shipped_cases_are_scenes() -> None:
         assert all(each.reason for each in found.passed_over)
 
 
+def test_a_beam_in_pieces_has_no_modes_of_the_whole() -> None:
+    (case,) = resolve(("flying_spaghetti",))
+    found = litter(subject(case, "native"))
+    reasons = {each.mutation: each.reason for each in found.passed_over}
+    assert "takes the body apart" in reasons["mode_rotation"]
+    assert not any(control.mutation.startswith("mode_") for control in found.mutants.values())
+
+
 def test_rounding_is_no_mutation_and_one_per_cent_is() -> None:
     scene = load_case(CASE).scene(load_case(CASE).run.variants[0])
     assert same_to_rounding(scene, scene)

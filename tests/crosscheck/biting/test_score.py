@@ -7,7 +7,7 @@ import math
 import pytest
 
 from crosscheck.biting.mutants import PassedOver
-from crosscheck.biting.score import Mutant, Outcome, ShownIn, bite, mean_score, outcome
+from crosscheck.biting.score import Mutant, Outcome, ShownIn, bite, mean, outcome
 from crosscheck.judging.verdict import STATUSES, Status
 
 
@@ -83,5 +83,5 @@ def test_a_case_without_mutants_has_no_score_and_is_no_part_of_the_mean() -> Non
     empty = bite("case", "variant", "engine", [], [])
     half = bite("case", "variant", "engine", [mutant("one", "noticed", a="differ"), mutant("two", "missed")], [])
     assert empty.score is None and empty.score_at_goals is None
-    assert mean_score([empty, half]) == 0.5
-    assert mean_score([empty]) is None and mean_score([]) is None
+    assert mean([empty.score, half.score]) == 0.5
+    assert mean([None]) is None and mean([]) is None

@@ -29,7 +29,10 @@ from tests.crosscheck.fake_engines import STEPS, TOLERANCES, Pendulum
 
 T = 11
 TIMES = np.linspace(0.0, 1.0, T)
-NAMES = {"hinges": "pivot", "wheels": "wheel", "closures": "loop", "point_masses": "bob", "markers": "tip"}
+NAMES = {
+    "hinges": "pivot", "wheels": "wheel", "closures": "loop", "point_masses": "bob", "markers": "tip",
+    "connectors": "spring",
+}  # fmt: skip
 SCENE = cast(Scene, SimpleNamespace(**{kind: [SimpleNamespace(name=name)] for kind, name in NAMES.items()}))
 STEP = Effort("step", 0.5, "rk4")
 

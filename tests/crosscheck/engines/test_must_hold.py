@@ -105,14 +105,14 @@ def test_rigid_variants_of_the_cases(path, name):
     compare_rigid(randomise(rigidify(flexmb.load_scene(path)), np.random.default_rng(0)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart"])
 @pytest.mark.parametrize(("kind", "seed"), RANDOM)
 def test_rigid_variants_of_random_flexible_trees(kind, seed, name):
     recipe = trees.FULL if kind == "grounded" else trees.FREE_FLYING
     compare_rigid(rigidify(trees.random_scene(seed, recipe)), name)
 
 
-@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake"])
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "drake", "dart"])
 @pytest.mark.parametrize("seed", range(2))
 def test_finite_segments_of_a_beam(seed, name):
     """Sixteen stiff segments: a surrogate is a rigid tree like any other."""

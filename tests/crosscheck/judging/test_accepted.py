@@ -80,7 +80,7 @@ def test_a_loss_of_three_digits_is_a_warning_and_an_error_where_that_is_asked_fo
     assert (lost.ok, lost.headline) == (True, "All 1 verdicts are as expected, 1 of them worse than recorded")
     strictly = session(then, 1e-6, strict=True)
     assert (strictly.ok, strictly.headline) == (False, "1 of 1 verdicts are worse than recorded")
-    assert single(lost).worse.startswith("U is 1.8e-05, accepted were 1.8e-08")
+    assert single(lost).worse.startswith("U is 5.4e-05, accepted were 5.4e-08")
     for outcome, failures in ((lost, "0"), (strictly, "1")):
         write_summary(outcome, tmp_path / "summary.md")
         assert "## Worse than recorded" in (tmp_path / "summary.md").read_text(encoding="utf-8")

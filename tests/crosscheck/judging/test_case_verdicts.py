@@ -50,7 +50,7 @@ goals = { "marker:tip.position" = 0.5 }
 def test_two_that_converge_to_the_same_agree() -> None:
     verdict = single(judged(ONE_PAIR, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
     assert (verdict.status, verdict.ok, verdict.level) == ("agree", True, "rigid")
-    assert np.isclose(verdict.U, 2 * 9e-6, rtol=1e-3)
+    assert np.isclose(verdict.U, 2 * 3 * 9e-6, rtol=1e-3)
 
 
 @pytest.mark.parametrize("sample", range(len(TIMES)))
@@ -161,7 +161,7 @@ def test_an_effort_too_coarse_to_be_followed_is_left_out() -> None:
     one[0] = ended(one[0], "diverged")
     verdict = single(judged(ONE_PAIR, [*one, *two]))
     assert verdict.status == "agree"
-    assert np.isclose(verdict.U, 3 * 9e-6 + 9e-6, rtol=1e-3)
+    assert np.isclose(verdict.U, 3 * 9e-6 + 3 * 9e-6, rtol=1e-3)
 
 
 def test_efforts_of_another_ladder_do_not_count() -> None:

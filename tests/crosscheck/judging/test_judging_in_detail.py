@@ -71,7 +71,7 @@ def test_a_control_says_all_of_itself() -> None:
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
     assert np.isclose(control.E, 0.5 / 4.0, rtol=1e-4)
-    assert np.isclose(control.U, 2 * 9e-6 / 4.0, rtol=1e-3)
+    assert np.isclose(control.U, 3 * 2 * 9e-6 / 4.0, rtol=1e-3)
 
 
 def test_a_control_of_the_whole_scene_says_so_and_needs_its_runs() -> None:
@@ -106,7 +106,7 @@ def test_a_comparison_says_all_of_itself() -> None:
         "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5}, "worse": "",
         "expected_reason": "",
     }  # fmt: skip
-    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+    assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
     other = single(judged(ONE_PAIR + 'reason = "why"\n', [*runs[:3], *ladder("two", {TIP: way(2.0)})]))
     assert (other.status, other.outside, other.expected_reason) == ("differ", "", "why")
 
@@ -197,6 +197,8 @@ def test_why_there_is_nothing_to_compare(a: Signal, b: Signal, scale: float | No
         (values(0.0, 0.0, sizes=(0.0, 0.25)), values(0.0, 0.0, sizes=(0.0,)), 0.25),
         (values(0.0, 0.5, doubt=0.5), values(0.0, 0.5, sizes=(4.0,)), 4.0),
         (values(0.0, 0.5, doubt=0.5), values(0.0, 0.25, sizes=(0.125,)), 0.5),
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**24,)), 0.5),
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**25,)), 2.0**25),  # 2^-26 of its family: it is rounding
     ],
 )
 def test_a_signal_that_is_zero_within_its_doubt_is_measured_by_its_family(a: Signal, b: Signal, size: float) -> None:
@@ -215,15 +217,36 @@ def result(text: str, runs: list, variant: str = "rigid", engine: str = "one") -
     return results(text, runs).get(variant, engine)
 
 
-def test_a_torque_that_vanishes_is_measured_by_forces_at_distances() -> None:
-    """No torque anywhere, a force of 10 N, 2 m away: 20 Nm is the size; without a force there is none."""
-    none, force = np.zeros((len(TIMES), 3)), way(10.0)
-    signals = {"load:pivot.torque": none, "load:pivot.force": force, TIP: way(2.0)}
-    sizes = result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.torque", False).sizes
-    assert np.allclose(sizes, (0.0, 20.0), rtol=1e-5)
-    assert len(result(ONE_PAIR, ladder("one", signals)).signal("load:pivot.force", False).sizes) == 1
-    alone = result(ONE_PAIR, ladder("one", {"load:pivot.torque": none}))
-    assert alone.signal("load:pivot.torque", False).sizes == (0.0, 0.0)
+FLIGHT = {  # 3 m/s, 2 rad/s and 12 J, 1.5 m from the origin
+    "marker:tip.position": way(1.5),
+    "marker:tip.velocity": way(3.0),
+    "marker:tip.angular_velocity": way(2.0),
+    "energy.kinetic": way(12.0)[:, :1],
+}
+
+
+@pytest.mark.parametrize(
+    ("signals", "channel", "size"),
+    [
+        ({"load:pivot.force": way(10.0), TIP: way(2.0)}, "load:pivot.torque", 20.0),
+        ({"load:pivot.torque": way(10.0), TIP: way(2.0)}, "load:pivot.force", 5.0),
+        (FLIGHT, "momentum.linear", 8.0),
+        (FLIGHT, "momentum.angular", 12.0),
+        ({name: FLIGHT[name] for name in FLIGHT if "angular" not in name}, "marker:tip.angular_velocity", 2.0),
+        ({name: FLIGHT[name] for name in FLIGHT if ".velocity" not in name}, "marker:tip.velocity", 3.0),
+        ({}, "marker:tip.orientation", 1.0),
+        ({}, "momentum.linear", 0.0),
+        ({}, "load:pivot.force", 0.0),
+        ({}, "drive:pivot", 0.0),
+    ],
+)
+def test_a_family_that_vanishes_is_measured_by_the_scene(signals: dict, channel: str, size: float) -> None:
+    """Twice the kinetic energy over a speed is a momentum, a torque over a length a force; of nothing comes nothing."""
+    rest = np.zeros((len(TIMES), 3))
+    if channel.endswith(".orientation"):
+        rest = np.tile([1.0, 0.0, 0.0, 0.0], (len(TIMES), 1))
+    sizes = result(ONE_PAIR, ladder("one", signals | {channel: rest})).signal(channel, False).sizes
+    assert np.allclose(sizes, (0.0, size), rtol=1e-5)
 
 
 def test_spatial_doubt_is_added_over_time() -> None:
@@ -241,7 +264,7 @@ engines = ["one"]
     extra = spatial(TIP, way(), way(1.01), 3.0, 1.0)
     assert np.allclose(doubt.envelope, own.envelope + extra, rtol=1e-3)
     assert (doubt.value, doubt.order) == (doubt.envelope[-1], own.order)
-    assert doubt.how == "difference of the two finest tolerances; spatial refinement"
+    assert doubt.how == "3 x the difference of the two finest tolerances; spatial refinement"
     assert np.isclose(extra[-1], 1.25 * 1.5 * 0.01, rtol=1e-3)
 
 
@@ -374,7 +397,7 @@ def test_bounds_are_held_against_what_was_expected_alone() -> None:
     text = ONE_PAIR + 'expect = "differ"\nreason = "why"\nband = { "marker:tip" = [0.1, 1.0] }\n'
     verdict = single(judged(text, [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]))
     assert (verdict.status, verdict.outside, verdict.ok) == ("agree", "", False)
-    assert verdict.reason == "0 of the range apart, within the uncertainty 1.8e-05"
+    assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
 
 
 @pytest.mark.parametrize(

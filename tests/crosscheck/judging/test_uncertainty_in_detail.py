@@ -46,13 +46,35 @@ def test_other_orders_get_less_credit_or_none(efforts: tuple[float, ...]) -> Non
     assert how == "3 x the larger difference: the runs do not converge yet"
 
 
-@pytest.mark.parametrize(("values", "bound"), [((3.0, 1.0, 0.0), 1.0), ((3.5, 1.0, 0.0), 1.0), ((2.9, 1.0, 0.0), 5.7)])
-def test_tolerances_that_halve_the_error_bound_it(values: tuple[float, ...], bound: float) -> None:
-    given = [RungSignal(10.0**-n, np.array([[each]])) for n, each in enumerate(values)]
+@pytest.mark.parametrize(
+    ("differences", "ratio", "factor"),
+    [
+        ((2.0, 1.0), 10.0, 3.0),
+        ((12.0, 1.0), 100.0, 3.0),  # 10/(12 - 10) is more
+        ((15.0, 1.0), 100.0, 2.0),
+        ((15.0, 1.0), 10.0, 3.0),  # errors that fall faster than the tolerance earn no credit
+        ((20.0, 1.0), 100.0, 1.0),
+        ((90.0, 1.0), 100.0, 1.0),
+        ((1.0, 0.0), 100.0, 0.0),
+    ],
+)
+def test_tolerances_bound_the_error_by_how_fast_it_falls(
+    differences: tuple[float, float], ratio: float, factor: float
+) -> None:
+    wide, near = differences
+    given = [
+        RungSignal(ratio**-n, np.array([[each]])) for n, each in enumerate((wide + near, near, 0.0))
+    ]
     found = estimate(FORCE, "tolerance", given, 0, 0.0)
-    assert np.isclose(found.value, bound) and found.order is None
-    short = "difference of the two finest tolerances"
-    assert found.how == (short if bound == 1.0 else "3 x the larger difference: the runs do not converge yet")
+    assert np.isclose(found.value, factor * near) and found.order is None
+    assert found.how.endswith("x the difference of the two finest tolerances")
+
+
+def test_tolerances_that_do_not_halve_the_error_prove_nothing() -> None:
+    given = [RungSignal(10.0**-n, np.array([[each]])) for n, each in enumerate((2.9, 1.0, 0.0))]
+    found = estimate(FORCE, "tolerance", given, 0, 0.0)
+    assert np.isclose(found.value, 5.7) and found.order is None
+    assert found.how == "3 x the larger difference: the runs do not converge yet"
 
 
 def test_judging_warns_of_nothing() -> None:

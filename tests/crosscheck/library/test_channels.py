@@ -16,7 +16,7 @@ from flexmb.run.trajectory import Trajectory as OwnTrajectory
 from tests.flexmb.surrogate.beams import beam_scene
 
 SAMPLES = 5
-NAMED = {"loads": "a.b", "wheel_loads": "a.b", "drives": "a.b"}
+NAMED = {name: "a.b" for name in ("loads", "wheel_loads", "drives", "connectors", "hinge_forces")}
 
 
 def everything() -> Trajectory:

@@ -15,7 +15,7 @@ from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.functions import Ramp, Sine, SmoothStep
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
-from flexmb.scene.schema import Closure, Free, Load, Planar, PointMass, Scene, Wheel
+from flexmb.scene.schema import Closure, Free, Load, Planar, PointMass, Scene, SpringDamper, Wheel
 from flexmb.surrogate import modal_points
 
 INERTIA = ((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.25))
@@ -164,6 +164,11 @@ def everything() -> Scene:
             ),
         ),
         point_masses=(PointMass(name="lump", body="hub", mass_kg=0.1),),
+        connectors=(
+            SpringDamper(
+                name="spring", body_a="hub", body_b="tip", free_length_m=0.5, stiffness_N_m=10.0, damping_Ns_m=0.1
+            ),
+        ),
         loads=(Load(name="push", body="hub", node="port", type="force", direction=(1.0, 0.0, 0.0), function=PUSH),),
     )  # fmt: skip
 

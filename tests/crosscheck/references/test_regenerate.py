@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,7 +16,8 @@ from crosscheck.library.find import load_case
 from crosscheck.library.reference import KNOWLEDGE, VALUES, current_reference, load_reference
 from crosscheck.references.regenerate import Regenerated
 from crosscheck.references.regenerate import regenerate as make_again
-from crosscheck.running.scheduler import Limits
+from crosscheck.running.pool import run_jobs
+from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.running.sweep import run_planned
 from tests.crosscheck.sessions import CASE, PROVIDER, copy_case, run_here
 
@@ -114,6 +117,19 @@ def test_a_reference_says_what_is_known(made: Path) -> None:
     assert "E " in known.how
     assert "to stepper" in known.how
     assert all(0.0 < each.uncertainty < np.inf for each in reference.knowledge.channels.values())
+
+
+def test_routes_run_where_the_scheduler_is(copied: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+
+    def here(*given: Any, scheduler: Scheduler, **others: Any) -> None:
+        seen.append(scheduler)
+        run_here(*given, **others)
+
+    monkeypatch.setattr("crosscheck.references.routes.run_planned", here)
+    elsewhere = partial(run_jobs)
+    make_again(load_case(copied), check=True, provider=PROVIDER, limits=Limits(workers=1), scheduler=elsewhere)
+    assert seen == [elsewhere]
 
 
 def test_a_reference_that_is_reproduced_is_left_as_it_is(copied: Path) -> None:

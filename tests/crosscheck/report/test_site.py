@@ -10,7 +10,11 @@ from pathlib import Path
 import msgspec
 import pytest
 
+from crosscheck.biting.campaign import MutationFile
+from crosscheck.biting.mutants import PassedOver
+from crosscheck.biting.score import Mutant, Outcome, ShownIn, bite
 from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.judging.verdict import Status
 from crosscheck.report import write_all
 from crosscheck.report.html import source
 from crosscheck.report.mutations import FILE, read_scores
@@ -137,22 +141,35 @@ def test_a_page_has_an_address_that_every_browser_takes(name: str) -> None:
 
 def test_mutation_scores_are_shown(tmp_path: Path) -> None:
     _, index = session(tmp_path, MANY)
-    faults = [
-        {"mutation": "gravity_sign", "noticed": True, "channels": {"marker:tip.position": True, "load": False}},
-        {"mutation": "mass", "target": "arm", "noticed": False, "reason": "too small to be seen"},
-        {"mutation": "wheel", "noticed": None, "reason": "there is no wheel"},
-    ]
-    scores = {"cases": {"pendulum/single": {"score": 0.5, "mutations": faults}, "none": {"score": None}}}
-    (tmp_path / FILE).write_bytes(msgspec.json.encode(scores))
+    sign = mutant("gravity_sign", "noticed", **{"marker:tip.position": "differ", "load": "agree"})
+    mass = mutant("mass", "missed")
+    idle = PassedOver(mutation="wheel", target="", reason="there is no wheel")
+    scored = [bite("pendulum/single", "rigid", "fine", [sign, mass], [idle]), bite("none", "rigid", "fine", [], [])]
+    (tmp_path / FILE).write_bytes(msgspec.json.encode(MutationFile(cases=tuple(scored))))
     write_all(tmp_path / "records.jsonl", tmp_path)
     text, page = index.read_text(encoding="utf-8"), (index.parent / "pendulum" / "single.html").read_text("utf-8")
+    tags = re.compile("<[^>]*>")
     assert "0.50" in text and "mass of arm" in text and "none applies" in text
-    assert "ScoredMutation score 0.50" in page and "too small to be seen" in page and "does not apply" in page
+    assert "Mutation score 0.50 · by the stored reference 1.00" in tags.sub("", page)
+    assert "too small to be seen" in page and "does not apply" in page
     assert "missed by load" in page
     (tmp_path / FILE).write_text("{", encoding="utf-8")
     write_all(tmp_path / "records.jsonl", tmp_path)
     assert "mutation.json cannot be read" in index.read_text(encoding="utf-8")
     assert read_scores(tmp_path / "nowhere").cases == {}
+
+
+def mutant(name: str, outcome: Outcome, **channels: Status) -> Mutant:
+    return Mutant(
+        mutation=name,
+        target="arm",
+        of="scene",
+        outcome=outcome,
+        beyond_goal=False,
+        reason="too small to be seen",
+        channels={key: ShownIn(status=status, E=0.0, U=1e-9, goal=1e-6) for key, status in channels.items()},
+        by_reference="noticed" if outcome == "noticed" else None,
+    )
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -72,7 +72,7 @@ def interrupt_and_go_on(plugs: Path, gate: Path, folder: Path, *options: str) ->
     paths = [str(plugs), str(Path(__file__).parents[3])]
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(paths)}
     gate.touch()
-    first = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+    first = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True, preexec_fn=_heed_ctrl_c)
     deadline = time.monotonic() + 60.0
     while len(_runs(out)) < EFFORTS and time.monotonic() < deadline:
         time.sleep(0.1)
@@ -86,6 +86,11 @@ def interrupt_and_go_on(plugs: Path, gate: Path, folder: Path, *options: str) ->
     assert second.returncode == 0, second.stdout
     keys = [record.key for record in _runs(out)]
     assert len(keys) == len(set(keys)) == 2 * EFFORTS
+
+
+def _heed_ctrl_c() -> None:
+    """A shell starts what it runs in the background with SIGINT ignored, and children inherit that."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
 
 
 def _runs(out: Path) -> list[RunRecord]:

@@ -246,3 +246,19 @@ def test_an_engine_that_ends_its_process_is_no_reference(tmp_path: Path) -> None
     csv.write_text("t,tip.px,tip.py,tip.pz\n" + "".join(f"{t!r},0,0,0\n" for t in np.linspace(0.0, 4.0, 81).tolist()))
     with pytest.raises(VerifyError, match="crasher .* is not there: crashed"):
         verify_csv(case, csv, engine="crasher", provider=PROVIDER)
+
+
+def test_the_engine_runs_where_the_scheduler_is(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    seen = []
+    csv = tmp_path / "my.csv"
+    csv.write_text("t,tip.px,tip.py,tip.pz\n" + "".join(f"{t!r},0,0,0\n" for t in np.linspace(0.0, 4.0, 81).tolist()))
+
+    def nowhere(*given: object, scheduler: object, **others: object) -> None:
+        seen.append(scheduler)
+        raise VerifyError("stopped here")
+
+    monkeypatch.setattr("crosscheck.verify.against_case.run_planned", nowhere)
+    elsewhere = object()
+    with pytest.raises(VerifyError, match="stopped here"):
+        verify_csv(load_case(CASE), csv, engine="fine", provider=PROVIDER, scheduler=elsewhere)  # type: ignore[arg-type]
+    assert seen == [elsewhere]

@@ -58,6 +58,75 @@ def test_methods_for_stiff_scenes_tell_their_jacobians(scene_file, tmp_path):
     assert 'spectral_radius is for method "generalised_alpha"' in result.output
 
 
+def test_a_doubtful_scene_is_warned_of_and_with_strict_an_error(scene_file, tmp_path):
+    """By check and by simulate; not where the scene says that it is meant."""
+    text = scene_file.read_text().replace("child = ", "rotation = { damping_Nms_rad = -0.1 }\nchild = ", 1)
+    scene_file.write_text(text)
+    for words in (("check", scene_file), ("simulate", scene_file, "--t-end", 0.1, "--out", tmp_path, "--no-plots")):
+        result = invoke(*words)
+        assert result.exit_code == 0, result.output
+        for word in ("warning: ", "negative damping: -0.1", "-> give a damping", 'allow = ["negative_damping"]'):
+            assert word in result.stderr
+            assert word not in result.stdout
+        assert "damping_Nms_rad" in result.stderr
+        strictly = invoke(*words, "--strict")
+        assert strictly.exit_code == 2
+        assert "error: " in strictly.stderr and "negative damping" in strictly.stderr
+    scene_file.write_text('allow = ["negative_damping"]\n' + text)
+    result = invoke("check", scene_file, "--strict")
+    assert (result.exit_code, result.stderr) == (0, "")
+
+
+def test_errors_are_estimated_on_request(scene_file, tmp_path):
+    words = ("simulate", scene_file, "--t-end", 0.5, "--samples", 11, "--out", tmp_path, "--no-plots", "--rtol", 1e-6)
+    assert "largest error" not in invoke(*words).output
+    result = invoke(*words, "--error-estimate")
+    assert result.exit_code == 0, result.output
+    for word in ("Errors by a tighter run", "marker:centre.position", "e-", "load:pivot.force"):
+        assert word in result.output
+    assert "nan" not in result.output
+
+
+@pytest.fixture
+def beam_file(tmp_path):
+    strip = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700)
+    scene = (
+        fm.SceneBuilder("pendulum", gravity=(0, -9.81, 0))
+        .beam("rod:1", length=1.0, elements=4, section=strip, modes=2)
+        .revolute("pivot", "ground", "rod:1", angle=0.5)
+        .scene()
+    )
+    fm.save_scene(scene, tmp_path / "rod.toml")
+    return tmp_path / "rod.toml"
+
+
+def test_section_loads_are_written(beam_file, tmp_path):
+    """At given places, or at 21; a name may hold a colon; the root's shear is the hinge's force."""
+    words = ("simulate", beam_file, "--t-end", 0.2, "--samples", 3, "--out", tmp_path, "--no-plots")
+    assert invoke(*words, "--sections", "rod:1").exit_code == 0
+    assert len((tmp_path / "sections-rod:1.csv").read_text().splitlines()) == 1 + 3 * 21
+    result = invoke(*words, "--sections", "rod:1:0,0.5")
+    assert result.exit_code == 0, result.output
+    assert "sections-rod:1.csv" in result.output
+    header, *rows = [line.split(",") for line in (tmp_path / "sections-rod:1.csv").read_text().splitlines()]
+    assert header[:4] == ["t [s]", "x [m]", "axial [N]", "shear_y [N]"] and len(rows) == 6
+    table = (tmp_path / "trajectory.csv").read_text().splitlines()
+    first = dict(zip(table[0].split(","), table[1].split(","), strict=True))
+    force = [float(first[f"pivot.force.{axis} [N]"]) for axis in "xy"]
+    assert float(rows[0][2]) ** 2 + float(rows[0][3]) ** 2 == pytest.approx(force[0] ** 2 + force[1] ** 2)
+    for wrong in ("bar", "rod:1:0,x", "rod:1:2.0"):
+        result = invoke(*words, "--sections", wrong)
+        assert result.exit_code == 2 and "--sections" in result.output
+
+
+def test_mass_properties_are_printed(beam_file):
+    result = invoke("mass", beam_file)
+    assert result.exit_code == 0, result.output
+    for word in ("Mass properties of pendulum", "scene", "rod:1", "0.27", "0.5, 0, 0", "0.0225"):
+        assert word in result.output
+    assert invoke("mass", beam_file, "--body", "bar").exit_code == 2
+
+
 def test_check_finds_defects_with_place_and_remedy(scene_file, tmp_path):
     assert invoke("check", scene_file).exit_code == 0
     scene_file.write_text(scene_file.read_text().replace('child = "bob"', 'child = "bop"'))
@@ -124,3 +193,20 @@ def test_advise_writes_the_reduced_scene_and_the_command_that_runs_it(tmp_path):
     refused = invoke("advise", tmp_path / "arm.toml", "--tol", 1e-9, "--t-end", 1.2, "--out", tmp_path / "none.toml")
     assert refused.exit_code == 1 and "refused" in refused.output
     assert not (tmp_path / "none.toml").exists()
+
+
+def test_simulate_sets_values_begins_later_and_goes_on(scene_file, tmp_path):
+    """Two runs by the command line end as one does, to the last digit that is written."""
+    words = ("simulate", scene_file, "--set", "bob.mass_kg=2.5", "--from-time", 1, "--no-plots", "--samples", 3)
+    assert invoke(*words, "--t-end", 2, "--out", tmp_path / "whole").exit_code == 0
+    assert invoke(*words, "--t-end", 1.5, "--out", tmp_path / "first").exit_code == 0
+    restart = tmp_path / "first" / "restart.npz"
+    on = ("simulate", scene_file, "--set", "bob.mass_kg=2.5", "--no-plots", "--samples", 2, "--out", tmp_path / "later")
+    result = invoke(*on, "--t-end", 2, "--restart", restart)
+    assert result.exit_code == 0 and "restart.npz" in result.output, result.output
+    whole, later = ((tmp_path / name / "trajectory.csv").read_text().splitlines() for name in ("whole", "later"))
+    assert whole[-1].startswith("2,") and later[-1] == whole[-1]
+    wrong = ("--set", "bob.mass=1"), ("--restart", scene_file)
+    for more, message in zip(wrong, ('did you mean "mass_kg"', "no restart"), strict=True):
+        result = invoke(*on, "--t-end", 2, *more)
+        assert result.exit_code == 2 and message in result.output, result.output

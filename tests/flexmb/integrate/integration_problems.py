@@ -14,6 +14,7 @@ from scipy.special import ellipj
 from flexmb.integrate.control import ACCEPTED, COUNTS, Interval, copy, derivative
 from flexmb.integrate.dop853 import ExplicitStages, dop853, interpolant, interpolate, stages
 from flexmb.integrate.dop853_tableau import STAGES, STAGES_DENSE
+from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock, Problem, problem
 from flexmb.integrate.rk4 import rk4
 from flexmb.jit.bundle import bundle
@@ -144,7 +145,9 @@ def solve(kind: int, times, *, rtol=None, step=None, ends=None, controlled=None,
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     accuracy = Accuracy(rtol or 0.0, rtol or 0.0, controlled or len(y), max_steps, step or 0.0)
-    status, t = (dop853 if step is None else rk4)(of_kind, y, Clock(times, ends), accuracy, out, counts)
+    status, t = (dop853 if step is None else rk4)(
+        of_kind, y, Clock(times, ends), accuracy, out, counts, memory(len(y), 0), None
+    )
     return Result(status, t, y, out[: counts[3]], *map(int, counts[:3]), int(workspace.fault[0]))
 
 

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.integrate.control import COUNTS
+from flexmb.integrate.memory import memory
 from flexmb.integrate.problem import Accuracy, Clock, stiff_problem
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import kernel
@@ -158,7 +159,7 @@ def solve(integrator, problem, y, times, rtol, atol, controlled, *, ends=None, m
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)
     accuracy = Accuracy(rtol, atol, controlled, max_steps, **more)
-    status, t = integrator(equations, y, Clock(times, ends), accuracy, out, counts)
+    status, t = integrator(equations, y, Clock(times, ends), accuracy, out, counts, memory(len(y), len(y) + 3), None)
     evaluations, accepted, rejected, samples, _, jacobians, factorisations = map(int, counts)
     return Result(
         status, t, y, out[:samples], evaluations, accepted, rejected, jacobians, factorisations, int(workspace.fault[0])

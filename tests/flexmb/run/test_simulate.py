@@ -166,8 +166,8 @@ def test_steps_stop_where_a_load_switches():
         .force("kick", "cart", direction=(1.0, 0.0, 0.0), function=fm.Pulse(value=4.0, start_s=0.3, duration_s=0.2))
         .scene()
     )
-    assert timing(scene).before(1.0) == [0.3, 0.5]
-    assert timing(scene).before(0.5) == [0.3]
+    assert timing(scene).between(0.0, 1.0) == [0.3, 0.5]
+    assert timing(scene).between(0.0, 0.5) == [0.3]
     for options in ({}, {"method": "rk4", "step": 0.07}):
         run = fm.simulate(scene, 1.0, samples=[0.0, 0.4, 1.0], **options)
         assert run.u[:, 0] == pytest.approx([0.0, 0.2, 0.4], abs=20 * EPS)

@@ -90,6 +90,12 @@ def calls() -> dict[str, Call]:
     }.items():  # fmt: skip
         add(f"System.{name}", getattr(tree, name), of_rates, state=states, accelerations=kind)
     add("System.hinge_loads", tree.hinge_loads, of_rates, state=states, accelerations=but_none(vectors))
+    of_body = {"state": state, "body": "arm"}
+    add("System.mass_properties", tree.mass_properties, of_body, state=states, body=but_none(names))
+    of_sections = {"state": state, "body": "arm", "x": np.array([0.25, 0.0])}
+    add("System.section_loads", tree.section_loads, of_sections, state=states, body=names,
+        x=chosen(None, "root", [0.6], [-0.1], [[0.1]], [np.nan], [0.1j], plain=(([0.25, 0], np.array([0.25, 0.0])),)),
+    )  # fmt: skip
     add("System.factorise", lambda state: tree.factorise(state).log_determinant, {"state": state}, state=states)
     add("System.operators", lambda state: tree.operators(state).M, {"state": state}, state=states)
     add(
@@ -142,6 +148,7 @@ def calls() -> dict[str, Call]:
     start = chain.initial_state
     for name in (
         "mass_matrix", "bias", "energy", "momentum", "determined_loads", "closure_gaps", "hinge_loads", "digits_left",
+        "mass_properties",
         "precision",
     ):  # fmt: skip
         add(f"ClosedSystem.{name}", getattr(chain, name), {"state": start}, state=closed_states)
@@ -296,7 +303,9 @@ EXEMPT = {
     "Trajectory.columns", "LinearModel.to_scipy", "LinearModel.to_control",  # nothing
     "Trajectory.to_csv", "Trajectory.plot", "Trajectory.to_npz", "Trajectory.to_parquet",  # a path
     "Trajectory.to_rerun",  # a path
-    "Trajectory.to_pandas", "Trajectory.to_xarray",  # nothing
+    "Trajectory.to_pandas", "Trajectory.to_xarray", "Trajectory.error_estimate",  # nothing
+    "Trajectory.section_loads", "Trajectory.loads_in",  # the system's
+    "ClosedSystem.section_loads",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
     "ClosedSystem.factorise", "ClosedSystem.operators", "ClosedSystem.partitions", "ClosedSystem.nested",
@@ -308,7 +317,7 @@ EXEMPT = {
     "Batch.initial_states", "Batch.tables", "Batch.constants",  # nothing; of those who fill lanes
     "BatchTrajectory",  # a result
     "ClosureError", "DynamicsError", "EquilibriumError", "Interrupted", "PrecisionWarning",
-    "SceneError",
+    "SceneError", "SceneWarning",
 }  # fmt: skip
 CLASSES = (
     fm.System,

@@ -12,6 +12,8 @@ from flexmb.tables import features
 from flexmb.tables.status import OK
 from flexmb.typing import Real
 from tests.bounds import gamma
+from tests.flexmb.connectors.connected_scenes import everything as connected
+from tests.flexmb.connectors.connected_scenes import free_flying
 from tests.trees import RIGID, Recipe, random_scene
 
 FEW = {"conservative": True, "wheels": 0, "point_masses": 0}
@@ -42,7 +44,7 @@ def test_a_chain_has_hardly_anything(exact):
 def test_each_thing_has_its_name(exact):
     assert features.SPRINGS in fm.compile(chain(stiffness=2.0).scene()).constants.features()
     assert features.DAMPERS in fm.compile(chain(damping=2.0).scene()).constants.features()
-    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",)))
+    scenes = random_scene(0, EVERYTHING), random_scene(0, Recipe(levels=("stiffened",))), connected()
     found = frozenset.union(*(fm.compile(scene).constants.features() for scene in scenes))
     names = {value for name, value in vars(features).items() if name.isupper() and isinstance(value, str)}
     missing = names - {GENERAL} - {name.rstrip("0123456789- ") for name in found}
@@ -81,7 +83,21 @@ def slope(scene: fm.System, scale: float) -> Real:
     ids=["axes", "ruthless", "rigid", "everything"],
 )
 def test_exact_kernels_compute_what_general_ones_do(recipe, monkeypatch):
-    scene = random_scene(5, recipe)
+    compare_kernels(random_scene(5, recipe), monkeypatch)
+
+
+@pytest.mark.slow
+def test_exact_kernels_of_connectors_do_too(monkeypatch):
+    compare_kernels(connected(), monkeypatch)
+
+
+def test_connectors_are_compiled_kind_by_kind(exact):
+    found = fm.compile(free_flying()).constants.features()
+    assert {features.CONNECTORS, features.ONE_SIDED, features.BUSHINGS} <= found
+    assert not {features.ACTUATORS, features.HINGE_SPRINGS, features.FRICTION} & found
+
+
+def compare_kernels(scene, monkeypatch) -> None:
     found = []
     for kernels in ("general", "exact"):
         monkeypatch.setenv("FLEXMB_KERNELS", kernels)

@@ -1,0 +1,263 @@
+"""Connectors evaluated for the peers, from the schema's definitions: loads on both ends, energy, power.
+
+Independent of the native code's compiled evaluation, so that the two check each other.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_right
+from collections.abc import Callable
+from math import hypot, inf, sqrt
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from crosscheck.engines.conventions import Frame, cross, cross_matrix, frame, quaternion_of, rotation_vector
+from crosscheck.engines.functions_of_time import profile
+from crosscheck.engines.links import Attachment, Link, attachment
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.connectors import (
+    AlongHinge,
+    BetweenNodes,
+    Bushing,
+    HingeFriction,
+    HingeSpring,
+    SpringDamper,
+    by_stem,
+)
+from flexmb.scene.schema import Marker, Scene
+from flexmb.scene.tree import GROUND, coordinate_of
+from flexmb.typing import Real
+
+Law = Callable[[float], tuple[float, float]]
+"""Of a displacement: the load that resists it, and the energy stored."""
+
+
+class Moving(NamedTuple):
+    """A frame in World: position (3,), rotation (3,3), angular velocity (3,), velocity (3,)."""
+
+    position: Real
+    rotation: Real
+    angular: Real
+    linear: Real
+
+    def carrying(self, inner: Frame) -> Moving:
+        """A frame fixed to this one."""
+        arm = self.rotation @ inner.position
+        velocity = self.linear + cross(self.angular, arm)
+        return Moving(self.position + arm, self.rotation @ inner.rotation, self.angular, velocity)
+
+
+WORLD = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+
+
+class Exerted(NamedTuple):
+    """[torque; force] (6,) on A about A and on B about B, World axes; energy (J); power of what is not elastic (W)."""
+
+    on_a: Real
+    on_b: Real
+    energy: float
+    power: float
+
+
+class Along(NamedTuple):
+    """Load along a coordinate, or tension of a line; energy (J), power of what is not elastic (W)."""
+
+    load: float
+    energy: float
+    power: float
+
+
+class Connection:
+    """A connector between two frames on links, -1 being the ground; `exerted(t, a, b)` is what it does."""
+
+    def __init__(self, scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes) -> None:
+        self.name = connector.name
+        self.a, self.b = (_attached(scene, chain, connector, side) for side in "ab")
+        self.exerted = exerts(connector)
+
+
+def exerts(connector: BetweenNodes) -> Callable[[float, Moving, Moving], Exerted]:
+    """What a connector does at time t between frames A and B that move so."""
+    on = _line(connector) if isinstance(connector, SpringDamper) else _bushing(connector)
+
+    def exerted(t: float, a: Moving, b: Moving) -> Exerted:
+        on_b, energy, power = on(t, a, b)
+        arm = b.position - a.position
+        on_a = -np.concatenate([on_b[:3] + cross(arm, on_b[3:]), on_b[3:]])
+        return Exerted(on_a, on_b, energy, power)
+
+    return exerted
+
+
+def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]:
+    """Connectors between nodes."""
+    return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, BetweenNodes))
+
+
+def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float], Along]]]:
+    """(name, hinge, point mass or wheel, number of its coordinate, load by value and rate) of each along a hinge."""
+    found = []
+    for connector in scene.connectors:
+        if isinstance(connector, AlongHinge):
+            item, number = coordinate_of(scene, connector)
+            found.append((connector.name, item.name, number, _along(connector)))
+    return found
+
+
+def stiffest(scene: Scene, chain: tuple[Link, ...]) -> float:
+    """A bound (rad/s) of what connectors between nodes add to frequencies, for choosing a step.
+
+    By their stiffness at rest and the links' own masses and inertias, which other links only add to.
+    """
+    squares = 0.0
+    for each, connector in zip(connections(scene, chain), _between(scene), strict=True):
+        ends = [chain[at.link].inertia for at in (each.a, each.b) if at.link >= 0]
+        linear = sum(1.0 / end.mass for end in ends)
+        angular = sum(1.0 / max(float(np.linalg.eigvalsh(end.inertia)[0]), 1e-12) for end in ends)
+        if isinstance(connector, Bushing):
+            K = np.array(connector.stiffness)
+            turning, moving = (float(np.linalg.eigvalsh(part)[-1]) for part in (K[:3, :3], K[3:, 3:]))
+            squares = max(squares, moving * linear, turning * angular)
+        else:
+            rise = np.max(np.diff(connector.loads_N) / np.diff(connector.table_m)) if connector.table_m else 0.0
+            squares = max(squares, max(connector.stiffness_N_m, float(rise)) * linear)
+    return sqrt(squares)
+
+
+def _between(scene: Scene) -> list[BetweenNodes]:
+    return [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+
+
+def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, side: str) -> Attachment:
+    body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
+    own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
+    if body == GROUND:
+        return Attachment(-1, own)
+    at = attachment(scene, chain, Marker(name="", body=body, node=node))
+    return Attachment(at.link, at.frame @ own)
+
+
+def law_of(stems: dict[str, Any]) -> Law:
+    """The law of a spring by its keys without units."""
+    if stems["table"]:
+        return _by_table(PchipInterpolator(stems["table"], stems["loads"]))
+    powers = [stems["preload"], stems["stiffness"], *stems["stiffening"]]
+
+    def by_powers(x: float) -> tuple[float, float]:
+        load = sum(each * x**n for n, each in enumerate(powers))
+        return load, sum(each * x ** (n + 1) / (n + 1) for n, each in enumerate(powers))
+
+    return by_powers
+
+
+def _by_table(spline: PchipInterpolator) -> Law:
+    """Between the knots its cubics, beyond them straight lines; in plain numbers, for a spline's call takes long."""
+    knots, pieces = spline.x.tolist(), spline.c.T.tolist()
+    levels, slopes = spline.antiderivative()(spline.x).tolist(), spline.derivative()(spline.x).tolist()
+    loads = spline(spline.x).tolist()
+
+    def at(x: float) -> tuple[float, float]:
+        i = bisect_right(knots, x) - 1
+        if i < 0 or i >= len(pieces):
+            i = max(i, 0)
+            d = x - knots[i]
+            return loads[i] + slopes[i] * d, levels[i] + d * (loads[i] + 0.5 * slopes[i] * d)
+        (a, b, c, e), d = pieces[i], x - knots[i]
+        return ((a * d + b) * d + c) * d + e, levels[i] + d * (e + d * (c / 2.0 + d * (b / 3.0 + d * a / 4.0)))
+
+    zero = at(0.0)[1]
+
+    def by_table(x: float) -> tuple[float, float]:
+        load, energy = at(x)
+        return load, energy - zero
+
+    return by_table
+
+
+def tension_of(connector: SpringDamper) -> Callable[[float, float, float], Along]:
+    """Tension, energy and power by time, distance beyond the free length, and its rate."""
+    law, push = law_of(by_stem(connector)), connector.force_N and profile(connector.force_N)
+    sign = {"both": 0.0, "tension": 1.0, "compression": -1.0}[connector.acts]
+    slack = 0.5 * connector.preload_N**2 / connector.stiffness_N_m if sign else 0.0
+
+    def tension_at(t: float, x: float, rate: float) -> Along:
+        elastic, energy = law(x)
+        tension, energy = elastic + connector.damping_Ns_m * rate, energy + slack
+        if sign and sign * elastic <= 0.0:
+            elastic, tension, energy = 0.0, 0.0, 0.0
+        elif sign:
+            tension = sign * max(0.0, sign * tension)
+        tension -= push(t).value if push else 0.0
+        return Along(tension, energy, (elastic - tension) * rate)
+
+    return tension_at
+
+
+def _line(connector: SpringDamper) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    tension = tension_of(connector)
+
+    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
+        arm = b.position - a.position
+        length = sqrt(arm @ arm)
+        along = arm / length
+        pulled = tension(t, length - connector.free_length_m, float(along @ (b.linear - a.linear)))
+        return np.concatenate([np.zeros(3), -pulled.load * along]), pulled.energy, pulled.power
+
+    return exert
+
+
+def _bushing(connector: Bushing) -> Callable[[float, Moving, Moving], tuple[Real, float, float]]:
+    K, D = np.array(connector.stiffness), np.array(connector.damping)
+
+    def exert(t: float, a: Moving, b: Moving) -> tuple[Real, float, float]:
+        to_a, arm = a.rotation.T, b.position - a.position
+        theta = rotation_vector(quaternion_of(to_a @ b.rotation))
+        inverse = _inverse_jacobian(theta)
+        xi = np.concatenate([theta, to_a @ arm])
+        moving = to_a @ (b.linear - a.linear - cross(a.angular, arm))
+        rate = np.concatenate([inverse @ (to_a @ (b.angular - a.angular)), moving])
+        elastic, lost = K @ xi, D @ rate
+        g = elastic + lost
+        on_b = -np.concatenate([a.rotation @ (inverse.T @ g[:3]), a.rotation @ g[3:]])
+        return on_b, 0.5 * float(elastic @ xi), -float(lost @ rate)
+
+    return exert
+
+
+def _inverse_jacobian(theta: Real) -> Real:
+    """(3,3) inverse left Jacobian of the exponential."""
+    angle, turn = float(np.linalg.norm(theta)), cross_matrix(theta)
+    if angle < 1e-4:
+        return np.asarray(np.eye(3) - 0.5 * turn + turn @ turn / 12.0)
+    b = (1.0 - 0.5 * angle / np.tan(0.5 * angle)) / angle**2
+    return np.asarray(np.eye(3) - 0.5 * turn + b * turn @ turn)
+
+
+def _along(connector: AlongHinge) -> Callable[[float, float], Along]:
+    stems = by_stem(connector)
+    if isinstance(connector, HingeFriction):
+        return lambda q, v: _friction(stems, v)
+    assert isinstance(connector, HingeSpring)
+    law = law_of(stems)
+    lower, upper = (-inf if stems["lower"] is None else stems["lower"]), (
+        inf if stems["upper"] is None else stems["upper"]
+    )
+    k, e = stems["stop_stiffness"], stems["stop_dissipation"]
+
+    def load(q: float, v: float) -> Along:
+        elastic, energy = law(q - stems["rest"])
+        deep, side = (q - upper, 1.0) if q > upper else (lower - q, -1.0) if q < lower else (0.0, 1.0)
+        pushed = side * k * deep * max(0.0, 1.0 + e * side * v)
+        lost = stems["damping"] * v + pushed - side * k * deep
+        return Along(-(elastic + side * k * deep + lost), energy + 0.5 * k * deep**2, -lost * v)
+
+    return load
+
+
+def _friction(stems: dict[str, Any], v: float) -> Along:
+    rising = 0.0 if stems["static"] is None else stems["static"] - stems["sliding"]
+    level = stems["sliding"] + rising / (1.0 + (v / (stems["stribeck"] or 1.0)) ** 2)
+    load = -level * v / hypot(v, stems["smoothing"])
+    return Along(load, 0.0, load * v)

@@ -1,0 +1,57 @@
+"""The DART adapter: what it supports, and how hard it may try."""
+
+from __future__ import annotations
+
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from crosscheck.engines.contract import Effort, EngineMissing, Support
+from crosscheck.engines.links import obstacle
+from flexmb.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from crosscheck.engines.dart.model import DartModel
+
+
+class DartEngine:
+    """Rigid trees, exact: DART's forward dynamics, hybrid where coordinates are prescribed."""
+
+    name = "dart"
+    summary = "rigid trees in minimal coordinates, hybrid dynamics of its own"
+    algorithm = "articulated bodies, O(N)"
+    settings = (
+        "The articulated-body dynamics of its Skeleton, compiled and called from Python, stepped by SciPy's DOP853, in "
+        "Python, so that much of its time on small scenes is not its own. Its own World.step is a semi-implicit Euler "
+        "method of first order, with springs and dampers taken implicitly, and would be no rival. No contacts. Outputs "
+        "are observed after the timed solve."
+    )
+
+    def version(self) -> str:
+        try:
+            import dartpy  # noqa: F401
+        except ImportError as error:
+            raise EngineMissing("DART is not installed: pip install flexmb[more-peers]") from error
+        return version("dartpy")
+
+    def supports(self, scene: Scene) -> Support:
+        reason = _open_loops_only(scene) or obstacle(scene, "DART", ())
+        return Support("no", reason) if reason else Support("exact")
+
+    def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-9, 1e-12))
+
+    def compile(self, scene: Scene) -> DartModel:
+        self.version()
+        from crosscheck.engines.dart.model import DartModel
+
+        support = self.supports(scene)
+        if support.kind == "no":
+            raise ValueError(f'scene "{scene.name}": {support.reason}')
+        return DartModel(scene)
+
+
+def _open_loops_only(scene: Scene) -> str:
+    """Why a closed loop is refused: constraints are impulses of a step, and no part of the forward dynamics."""
+    if not scene.closures:
+        return ""
+    return f'closure "{scene.closures[0].name}": DART closes loops by impulses of its own steps only, to first order'

@@ -1,0 +1,72 @@
+"""What engines that have joined a case cannot represent of it: *not applicable*, which is no verdict.
+
+A case expects something only of the engines that it names. One that it names nowhere has joined by `--engine`; that it
+refuses the scene, or does not offer a channel, is no finding about it, and is listed with its own reason. It stays a
+verdict where somebody expected more: of an engine that the case names, or for which it has accepted figures.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from crosscheck.judging.results import CaseResults, Result
+from crosscheck.judging.verdict import Verdict
+
+
+@dataclass(frozen=True)
+class Inapplicable:
+    """What an engine cannot represent; `channel` is "" where that is the whole variant. The reason is the engine's."""
+
+    case: str
+    variant: str
+    engine: str
+    channel: str
+    reason: str
+
+    @property
+    def where(self) -> str:
+        """What of the case it is about, in words."""
+        return f"{self.variant}, {self.channel}" if self.channel else self.variant
+
+
+def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verdict], tuple[Inapplicable, ...]]:
+    """The verdicts that count, and what is not applicable, each once whatever number of verdicts it would have been."""
+    joined = {engine for engine in case.case.joined if not _has_figures(case, engine)}
+    refused = [each for each in case.results.values() if each.status == "refused" and each.engine in joined]
+    found = {_inapplicable(case, result, ""): None for result in refused}
+    counting: list[Verdict] = []
+    for verdict in verdicts:
+        refusing = _refusing(case, verdict)
+        if verdict.ok or not refusing or any(result.engine not in joined for result in refusing):
+            counting.append(verdict)
+        else:
+            found |= {_inapplicable(case, result, verdict.channel): None for result in refusing}
+    return counting, tuple(found)
+
+
+def _refusing(case: CaseResults, verdict: Verdict) -> list[Result]:
+    """The results that are why there is nothing to judge: refusals of the scene, or else what lacks the channel.
+
+    None where something graver than a refusal is the reason.
+    """
+    sides = [case.results.get((*side, "main")) for side in verdict.sides]
+    results = [result for result in sides if result is not None]
+    if verdict.status == "refused":
+        refused = [result for result in results if result.status == "refused"]
+        return refused or [result for result in results if verdict.channel not in result.channels]
+    if verdict.status == "did not run" and len(results) == len(sides):  # no channel has the name of a goal
+        return results if all(result.status == "finished" for result in results) else []
+    return []
+
+
+def _inapplicable(case: CaseResults, result: Result, channel: str) -> Inapplicable:
+    whole = result.status == "refused"
+    named, reason = ("", result.message) if whole else (channel, f"{result.engine} does not offer it")
+    return Inapplicable(case.case.case, result.variant, result.engine, named, reason)
+
+
+def _has_figures(case: CaseResults, engine: str) -> bool:
+    """Whether figures of the engine were accepted: it gave results once, and is expected to go on."""
+    places = (place for table in case.case.accepted.values() for place in table)
+    return any(side.startswith(f"{engine} (") for place in places for side in place.split(" | ")[1:])

@@ -1,0 +1,133 @@
+"""Scenes that are their own image in a mirror: what starts in the mirror's plane stays in it.
+
+The plane is normal to an axis that World and all frames of the scene share. Bodies move in the plane, turn about its
+normal only, and bend within it: of their inertia the part about the normal matters, and a torque along it is the same
+in World and in body axes.
+"""
+
+from __future__ import annotations
+
+from flexmb.scene.bodies import BeamBody, Body, Matrix3, Quaternion, RigidBody, Vector
+from flexmb.scene.hinges import Closure, Free, Hinge, Planar, Prismatic, Revolute, Spherical, Weld
+from flexmb.scene.schema import Load, Scene, Wheel
+
+X, Y, Z = AXES = (0, 1, 2)
+EPS = 1e-12
+KNOWN = frozenset(
+    ("name", "description", "allow", "gravity_m_s2", "bodies", "hinges", "closures", "wheels", "loads", "markers")
+)
+
+
+def mirrors(scene: Scene) -> tuple[int, ...]:
+    """The axes (0, 1, 2 for x, y, z) along which mirroring changes nothing; none where the rules cannot tell."""
+    if not only_known(scene):
+        return ()
+    return tuple(axis for axis in AXES if _is_own_image(scene, axis))
+
+
+def only_known(scene: Scene) -> bool:
+    """Whether nothing acts in the scene but what rules of symmetry and rest know of."""
+    return not any(getattr(scene, key) for key in scene.__struct_fields__ if key not in KNOWN)
+
+
+def within(vector: Vector, axis: int) -> bool:
+    """Whether the vector has no component along the axis."""
+    return abs(vector[axis]) <= EPS * max(map(abs, vector))
+
+
+def along(vector: Vector, axis: int) -> bool:
+    """Whether the vector has no other component."""
+    return all(abs(vector[other]) <= EPS * max(map(abs, vector)) for other in AXES if other != axis)
+
+
+def _is_own_image(scene: Scene, axis: int) -> bool:
+    return (
+        within(scene.gravity_m_s2, axis)
+        and all(_body(each, axis, _mounted(scene, each.name)) for each in scene.bodies)
+        and all(_hinge(each, axis) for each in scene.hinges)
+        and all(_closure(each, axis) for each in scene.closures)
+        and all(_wheel(each, axis) for each in scene.wheels)
+        and all(_load(each, axis) for each in scene.loads)
+    )
+
+
+def _mounted(scene: Scene, body: str) -> set[str]:
+    """The nodes of a body at which more than markers are."""
+    carried: tuple[Wheel | Load, ...] = (*scene.wheels, *scene.loads)
+    ends = [(item.body, item.node) for item in carried]
+    ends += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
+    ends += [end for each in scene.closures for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
+    return {node for name, node in ends if name == body}
+
+
+def _body(body: Body, axis: int, mounted: set[str]) -> bool:
+    """A beam is along x, symmetric about its section's axes."""
+    match body:
+        case RigidBody():
+            nodes = [node for node in body.nodes if node.name in mounted]
+            frames = all(within(node.position_m, axis) and _turned(node.quaternion, axis) for node in nodes)
+            return frames and within(body.com_m, axis) and _inertia(body.inertia_kg_m2, axis)
+        case BeamBody():
+            lumps = all(within(each.com_m, axis) and _inertia(each.inertia_kg_m2, axis) for each in body.tip_masses)
+            return axis != X and lumps and all(_turned(node.quaternion, axis) for node in body.nodes)
+    return False
+
+
+def _hinge(hinge: Hinge, axis: int) -> bool:
+    frames = (
+        within(hinge.parent_position_m, axis)
+        and within(hinge.child_position_m, axis)
+        and _turned(hinge.parent_quaternion, axis)
+        and _turned(hinge.child_quaternion, axis)
+    )
+    match hinge:
+        case Weld():
+            return frames
+        case Revolute():
+            return frames and along(hinge.axis, axis)
+        case Prismatic():
+            return frames and within(hinge.axis, axis)
+        case Planar():
+            return frames and axis == Z
+        case Spherical():
+            return frames and _turned(hinge.quaternion, axis) and along(hinge.angular_velocity_rad_s, axis)
+        case Free():
+            place = within(hinge.position_m, axis) and _turned(hinge.quaternion, axis)
+            speed = within(hinge.velocity_m_s, axis) and along(hinge.angular_velocity_rad_s, axis)
+            return frames and place and speed
+    return False
+
+
+def _closure(closure: Closure, axis: int) -> bool:
+    frames = (
+        within(closure.position_a_m, axis)
+        and within(closure.position_b_m, axis)
+        and _turned(closure.quaternion_a, axis)
+        and _turned(closure.quaternion_b, axis)
+    )
+    match closure.type:
+        case "weld" | "spherical":
+            return frames
+        case "revolute":
+            return frames and along(closure.axis, axis)
+        case "prismatic":
+            return frames and within(closure.axis, axis)
+    return False
+
+
+def _wheel(wheel: Wheel, axis: int) -> bool:
+    return along(wheel.axis, axis) and within(wheel.offset_m, axis)
+
+
+def _load(load: Load, axis: int) -> bool:
+    return within(load.direction, axis) if load.type == "force" else along(load.direction, axis)
+
+
+def _turned(quaternion: Quaternion, axis: int) -> bool:
+    """Whether a rotation is about the axis, or none at all."""
+    return all(abs(quaternion[1 + other]) <= EPS for other in AXES if other != axis)
+
+
+def _inertia(matrix: Matrix3, axis: int) -> bool:
+    """Whether the axis is a principal one."""
+    return along(matrix[axis], axis)

@@ -1,0 +1,171 @@
+"""From connectors to the arrays of flexmb.tables.arrays: ends, laws, bushings, springs and friction along hinges."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from flexmb.building.links import BodyLink, Port, port
+from flexmb.building.numbering import Numbering
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.connectors import BetweenNodes, HingeFriction, HingeSpring, by_stem
+from flexmb.scene.quaternions import rotation_matrix
+from flexmb.scene.tree import GROUND, coordinate_of
+from flexmb.tables import arrays as a
+from flexmb.typing import Real
+
+SMOOTHING = 1e-8  # of the free length
+SHORTEST = 1e-12  # m, the smoothing of a spring without free length
+NO_STOP = 1e300  # no coordinate is ever beyond it
+ACTS = {"both": a.BOTH, "tension": a.TENSION, "compression": a.COMPRESSION}
+
+Rows = list[tuple[float, ...]]
+
+
+def between_nodes(scene: s.Scene) -> list[BetweenNodes]:
+    """Connectors between two nodes, in the scene's order."""
+    return [each for each in scene.connectors if isinstance(each, BetweenNodes)]
+
+
+def end_ports(scene: s.Scene, chain: list[BodyLink], index: dict[str, int]) -> list[tuple[int, Port] | None]:
+    """(body, port) of sides A and B of the first connector, of the second ...; None on the ground.
+
+    NotImplementedError where a body of level ruthless deforms at an end.
+    """
+    found: list[tuple[int, Port] | None] = []
+    for connector in between_nodes(scene):
+        for side in "ab":
+            body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
+            if body == GROUND:
+                found.append(None)
+                continue
+            link = chain[index[body]]
+            at = port(link.node(node), *_offset(connector, side), np.eye(3))
+            if link.level.at_rest and at.deforms:
+                raise NotImplementedError(
+                    f'connector "{connector.name}": body "{body}" of level "{link.level.name}" shows its rest shape to '
+                    f'all that acts on it, and a spring at its node "{node}" would not feel it bend; use level '
+                    '"linear" or "full"'
+                )
+            found.append((index[body], at))
+    return found
+
+
+def connector_arrays(
+    scene: s.Scene, ends: list[tuple[int, int]], numbering: Numbering, number: Callable[[s.Function | None], int]
+) -> dict[str, Any]:
+    """The tables of connectors by their names in Constants.
+
+    ends: (body, port) of sides A and B of the first between two nodes, of the second ..., (-1, -1) on the ground;
+    `number` gives the number of a function of time.
+    """
+    laws: Rows = []
+    connectors = between_nodes(scene)
+    records, sides = np.zeros(len(connectors), a.CONNECTOR), np.zeros((len(connectors), 2), a.END)
+    bushings = [each for each in connectors if isinstance(each, s.Bushing)]
+    matrices = np.zeros(len(bushings), a.BUSHING_MATRIX)
+    for i, connector in enumerate(connectors):
+        record = records[i]
+        record["function"] = record["row"] = -1
+        for j, side in enumerate("ab"):
+            sides[i, j]["body"], sides[i, j]["port"] = ends[2 * i + j]
+            if sides[i, j]["body"] == a.ON_GROUND:
+                offset, quaternion = _offset(connector, side)
+                sides[i, j]["position"], sides[i, j]["rotation"] = offset, rotation_matrix(quaternion).ravel()
+        if isinstance(connector, s.Bushing):
+            record["kind"], row = a.BUSHING, bushings.index(connector)
+            record["row"] = row
+            matrices[row]["stiffness"], matrices[row]["damping"] = connector.stiffness, connector.damping
+        else:
+            record["kind"], record["acts"] = a.ALONG_LINE, ACTS[connector.acts]
+            record["free_length"], record["damping"] = connector.free_length_m, connector.damping_Ns_m
+            record["smoothing"] = max(SMOOTHING * connector.free_length_m, SHORTEST)
+            record["function"] = number(connector.force_N)
+            record["start"], record["stop"] = _add(laws, _pieces(by_stem(connector), connector.acts))
+    springs = [each for each in scene.connectors if isinstance(each, HingeSpring)]
+    frictions = [each for each in scene.connectors if isinstance(each, HingeFriction)]
+    return {
+        "connector": records,
+        "end": sides,
+        "bushing": matrices,
+        "hinge_spring": _hinge_springs(scene, springs, numbering, laws),
+        "friction": _frictions(scene, frictions, numbering),
+        "law": np.array(laws, float).reshape(-1, 8),
+    }
+
+
+def _offset(connector: BetweenNodes, side: str) -> tuple[s.Vector, s.Quaternion]:
+    """Fixed offsets of frame A or B from its node."""
+    return getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY)
+
+
+def _speed(scene: s.Scene, connector: HingeSpring | HingeFriction, numbering: Numbering) -> int:
+    item, place = coordinate_of(scene, connector)
+    return numbering.u[item.name].start + place
+
+
+def _hinge_springs(scene: s.Scene, springs: list[HingeSpring], numbering: Numbering, laws: Rows) -> a.Record:
+    out = np.zeros(len(springs), a.HINGE_SPRING)
+    for row, spring in zip(out, springs, strict=True):
+        law = by_stem(spring)
+        row["speed"], (row["start"], row["stop"]) = _speed(scene, spring, numbering), _add(laws, _pieces(law))
+        for name in ("rest", "damping", "stop_stiffness", "stop_dissipation"):
+            row[name] = law[name]
+        row["lower"] = -NO_STOP if law["lower"] is None else law["lower"]
+        row["upper"] = NO_STOP if law["upper"] is None else law["upper"]
+    return out
+
+
+def _frictions(scene: s.Scene, frictions: list[HingeFriction], numbering: Numbering) -> a.Record:
+    out = np.zeros(len(frictions), a.FRICTION)
+    for row, friction in zip(out, frictions, strict=True):
+        law = by_stem(friction)
+        row["speed"], row["sliding"], row["smoothing"] = (
+            _speed(scene, friction, numbering), law["sliding"], law["smoothing"],
+        )  # fmt: skip
+        row["static"] = law["sliding"] if law["static"] is None else law["static"]
+        row["stribeck"] = 1.0 if law["stribeck"] is None else law["stribeck"]
+    return out
+
+
+def _add(laws: Rows, pieces: Rows) -> tuple[int, int]:
+    """Where in the table of all laws these pieces are."""
+    start = len(laws)
+    laws += pieces
+    return start, len(laws)
+
+
+def _pieces(law: dict[str, Any], acts: str = "both") -> Rows:
+    """Rows (8,) of a law: left end, energy there, coefficients, highest power first."""
+    if law["table"]:
+        return _through(np.array(law["table"]), np.array(law["loads"]))
+    powers = (law["preload"], law["stiffness"], *law["stiffening"], 0.0, 0.0, 0.0, 0.0)[:6]
+    if acts == "both":
+        return [(0.0, 0.0, *powers[::-1])]
+    slack = -law["preload"] / law["stiffness"]  # where the load would change its sign
+    loaded, idle = (slack, 0.0, *powers[:0:-1], 0.0), (slack, *(0.0,) * 7)
+    return [idle, loaded] if acts == "tension" else [loaded, idle]
+
+
+def _through(x: Real, loads: Real) -> Rows:
+    """Cubic pieces through samples, continued by their end slopes; no energy is stored at x = 0."""
+    from scipy.interpolate import PchipInterpolator  # slow to import, and few scenes have tables of loads
+
+    spline = PchipInterpolator(x, loads)
+    energy = spline.antiderivative()
+    slopes = spline.derivative()(x[[0, -1]])
+    ends = [(x[0], energy(x[0]), loads[0], slopes[0]), (x[-1], energy(x[-1]), loads[-1], slopes[1])]
+    (before, *_, after) = ([at, stored, 0.0, 0.0, 0.0, 0.0, slope, load] for at, stored, load, slope in ends)
+    cubics = [[left, energy(left), 0.0, 0.0, *spline.c[:, i]] for i, left in enumerate(x[:-1])]
+    rows = np.array([before, *cubics, after], float)
+    rows[:, 1] -= _energy_at(rows, 0.0)
+    return [tuple(row) for row in rows.tolist()]
+
+
+def _energy_at(rows: Real, x: float) -> float:
+    """Of a law."""
+    row = rows[max(0, int(np.searchsorted(rows[:, 0], x, side="right")) - 1)]
+    return float(row[1] + np.polyval(np.polyint(row[2:]), x - row[0]))

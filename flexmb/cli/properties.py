@@ -1,0 +1,64 @@
+"""`flexmb mass`: mass properties of a scene and of its bodies with all that they carry."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import TYPE_CHECKING, Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from flexmb.cli.terminal import SceneFile, console, no_traceback
+from flexmb.scene.files import load_scene
+
+if TYPE_CHECKING:
+    from flexmb.system.mass_properties import MassProperties
+
+
+def mass(
+    scene: SceneFile,
+    body: Annotated[
+        list[str] | None,
+        typer.Option(help="A body with all that it carries; may be repeated. Default: all.", show_default=False),
+    ] = None,
+) -> None:
+    """
+    Print mass, mass centre and inertia of a scene, and of its bodies with all that they carry, at the initial state.
+
+        flexmb mass satellite.toml
+        flexmb mass satellite.toml --body panel
+
+    Of the **scene**, centre and inertia are in World axes; of a **body**, in its own frame. Inertia is about the mass
+    centre: xx, yy, zz, xy, xz, yz. Wheels and point masses count as parts of what carries them.
+
+    **Exit code**: 0 printed, 2 the scene is wrong, or has no such body.
+    """
+    with no_traceback():
+        from flexmb.system.compile import compile
+
+        system = compile(load_scene(scene))
+        state = system.initial_state
+        rows = [] if body else [("scene", system.mass_properties(state))]
+        rows += [(name, system.mass_properties(state, name)) for name in (body or system.body_names)]
+        console.print(_table(system.scene.name, rows))
+
+
+def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Table:
+    table = Table(title=f"\nMass properties of {scene}", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table.add_column("with what it carries")
+    for heading in ("mass kg", "centre m", "inertia kg m²"):
+        table.add_column(heading, justify="left")
+    for name, found in rows:
+        J = found.inertia_in_body
+        six = [*np.diag(J), J[0, 1], J[0, 2], J[1, 2]]
+        table.add_row(name, f"{found.mass:.6g}", _numbers(found.centre_in_body), _numbers(six))
+    return table
+
+
+def _numbers(values: Iterable[float]) -> str:
+    """Six digits; what rounding has left of the largest is zero."""
+    found = [float(value) for value in values]
+    largest = max(map(abs, found))
+    kept = [0.0 if abs(value) < 1e-14 * largest else value for value in found]
+    return ", ".join(f"{value:.6g}" for value in kept)

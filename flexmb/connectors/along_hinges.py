@@ -1,0 +1,81 @@
+"""Connectors along scalar coordinates: nonlinear springs with stops, and dry friction.
+
+A stop at depth d, pressed in at the rate d', pushes back by k d (1 + e d'), Hunt and Crossley (1975), and never pulls:
+the load starts from zero however fast it is met. Friction follows Hess and Soom (1990), smooth through zero:
+
+    [Fc + (Fs - Fc) / (1 + (v/vs)^2)] v / sqrt(v^2 + vr^2)
+"""
+
+from flexmb.connectors.laws import resistance
+from flexmb.jit.features import has
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import select
+from flexmb.spatial.scalar import sqrt
+from flexmb.tables.features import FRICTION, HINGE_SPRINGS
+
+
+@helper
+def add_loads_along_hinges(c, w):
+    """Loads of all springs and friction along coordinates, added to w.speed.applied."""
+    evaluate_along_hinges(c, w)
+    for i in range(c.hinge_spring.shape[0]):
+        w.speed[c.hinge_spring[i].speed].applied += w.hinge_spring[i].load
+    for i in range(c.friction.shape[0]):
+        w.speed[c.friction[i].speed].applied += w.friction[i].load
+
+
+@helper
+def evaluate_along_hinges(c, w):
+    """The same into w.hinge_spring and w.friction, with energy and power."""
+    if has(c, HINGE_SPRINGS):
+        for i in range(c.hinge_spring.shape[0]):
+            _spring(c, w, i)
+    if has(c, FRICTION):
+        for i in range(c.friction.shape[0]):
+            _friction(c, w, i)
+
+
+@helper
+def _spring(c, w, i):
+    j = c.hinge_spring[i].speed
+    q, v = w.q[c.speed[j].coordinate], w.u[j]
+    elastic, energy = resistance(q - c.hinge_spring[i].rest, c.law, c.hinge_spring[i].start, c.hinge_spring[i].stop)
+    lower, upper, k = c.hinge_spring[i].lower, c.hinge_spring[i].upper, c.hinge_spring[i].stop_stiffness
+    beyond = select(q.real > upper, q - upper, select(q.real < lower, q - lower, 0.0 * q))
+    pressing = 1.0 + c.hinge_spring[i].stop_dissipation * select(q.real < lower, -v, v)
+    pushed = k * beyond * select(pressing.real > 0.0, pressing, 0.0 * pressing)
+    lost = c.hinge_spring[i].damping * v + (pushed - k * beyond)
+    w.hinge_spring[i].load = -(elastic + k * beyond + lost)
+    w.hinge_spring[i].energy = energy + 0.5 * k * beyond * beyond
+    w.hinge_spring[i].power = -lost * v
+
+
+@helper
+def _friction(c, w, i):
+    v, smoothing = w.u[c.friction[i].speed], c.friction[i].smoothing
+    sliding, ratio = c.friction[i].sliding, v / c.friction[i].stribeck
+    level = sliding + (c.friction[i].static - sliding) / (1.0 + ratio * ratio)
+    load = level * v / sqrt(v * v + smoothing * smoothing)
+    w.friction[i].load = -load
+    w.friction[i].energy = 0.0
+    w.friction[i].power = -load * v
+
+
+@helper
+def stored_along_hinges(c, w):
+    """Energy (J) at the last evaluation."""
+    total = 0.0
+    for i in range(c.hinge_spring.shape[0]):
+        total += w.hinge_spring[i].energy
+    return total
+
+
+@helper
+def power_along_hinges(c, w):
+    """Power (W) of dampers, stops and friction at the last evaluation."""
+    total = 0.0
+    for i in range(c.hinge_spring.shape[0]):
+        total += w.hinge_spring[i].power
+    for i in range(c.friction.shape[0]):
+        total += w.friction[i].power
+    return total

@@ -1,0 +1,77 @@
+"""Bushings: six stiffnesses and more between two frames, for any rotation below half a turn.
+
+The displacement of B seen from A is xi = [theta; x], theta = log(R_A'R_B) and x = R_A'(p_B - p_A), in axes of A. With
+the angular velocity w_rel = J theta' of B relative to A, J the left Jacobian of the exponential, its rate is
+
+    theta' = J^-1 w_rel        x' = R_A'(v_B - v_A) - w_A x x
+
+Generalised loads g = K xi + D xi' do the work g . xi'; hence the load on B about B is -[J'^-1 g_theta; g_x], and that
+of the springs is exactly the derivative of the energy 1/2 xi . K xi, however far B has turned. At half a turn theta
+jumps to the other side, and the energy with it: a bushing ends the run ten degrees before.
+"""
+
+from math import cos, radians
+
+from flexmb.jit.kernel import helper
+from flexmb.jit.lanes import every, kept
+from flexmb.spatial.rotation import (
+    inverse_jacobian_coefficient,
+    inverse_left_jacobian_times,
+    inverse_right_jacobian_times,
+    quaternion_of_matrix,
+    rotation_vector,
+)
+from flexmb.spatial.spatial_vector import dot6, scale6, store6, sum6, times6
+from flexmb.spatial.vector import cross, dot, matmul, store3, sub, times_t, transpose
+from flexmb.tables.arrays import BUSHING
+
+LEAST_UPRIGHT = cos(0.5 * radians(170.0)) ** 2
+
+
+@helper
+def load_of_bushing(c, w, i, A, B):
+    """Load, energy and power of connector i into w.connector[i], from (position, rotation, velocity) of A and B."""
+    R_A, arm, row = A[1], sub(B[0], A[0]), c.connector[i].row
+    q = quaternion_of_matrix(matmul(transpose(R_A), B[1]))
+    theta, x = rotation_vector(q[0], q[1], q[2], q[3]), times_t(R_A, arm)
+    b = inverse_jacobian_coefficient(dot(theta, theta))
+    turning = inverse_left_jacobian_times(theta, b, times_t(R_A, sub(B[2][0], A[2][0])))
+    moving = sub(times_t(R_A, sub(B[2][1], A[2][1])), cross(times_t(R_A, A[2][0]), x))
+    elastic = _product(c.bushing[row].stiffness, (theta, x))
+    damping = _product(c.bushing[row].damping, (turning, moving))
+    g = sum6(elastic, damping)
+    # the transpose of the inverse left Jacobian is the inverse right one
+    upright = q[0] * q[0]
+    w.connector[i].upright = upright
+    torque = inverse_right_jacobian_times(theta, b, g[0])
+    load = (kept(upright.real > LEAST_UPRIGHT, torque[0]), torque[1], torque[2]), g[1]
+    store6(w.connector[i].load, 0, scale6(-1.0, times6(R_A, load)))
+    store3(w.connector[i].arm, 0, arm)
+    w.connector[i].energy = 0.5 * dot6(elastic, (theta, x))
+    w.connector[i].power = -dot6(damping, (turning, moving))
+
+
+@helper
+def overturned(c, w):
+    """A bushing that is turned beyond its range, or -1. Of lanes: of all of them; what goes on of some is NaN."""
+    for i in range(c.connector.shape[0]):
+        if c.connector[i].kind == BUSHING and every(w.connector[i].upright.real <= LEAST_UPRIGHT):
+            return i
+    return -1
+
+
+@helper
+def _product(m, V):
+    """m V of a matrix (6,6)."""
+    return (
+        (_row(m, 0, V), _row(m, 1, V), _row(m, 2, V)),
+        (_row(m, 3, V), _row(m, 4, V), _row(m, 5, V)),
+    )
+
+
+@helper
+def _row(m, r, V):
+    return (
+        m[r, 0] * V[0][0] + m[r, 1] * V[0][1] + m[r, 2] * V[0][2]
+        + m[r, 3] * V[1][0] + m[r, 4] * V[1][1] + m[r, 5] * V[1][2]
+    )  # fmt: skip

@@ -1,0 +1,271 @@
+"""The feedback of a scene in its runs: the closed loop that integrators see, and what its signals were."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from flexmb.control import loop
+from flexmb.control import tables as a
+from flexmb.control.memory import LoopMemory
+from flexmb.control.power import powers
+from flexmb.control.schedule import instants, slack
+from flexmb.control.user import Called
+from flexmb.control.wiring import widest, wired
+from flexmb.entry.observation import sense_markers
+from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.jit.direct import address, addresses
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR
+from flexmb.motion.retraction import move
+from flexmb.scene.control import LoadSensor
+from flexmb.system.algorithm import DynamicsAlgorithm, Route
+from flexmb.system.tree_system import System
+from flexmb.tables.state import State
+from flexmb.typing import Index, Real
+
+
+class Begun(NamedTuple):
+    """What an integrator is given for a run of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
+
+    problem: Problem | StiffProblem
+    y: Real
+    clock: Clock
+    accuracy: Accuracy
+
+
+class Starting(Protocol):
+    """state: of the motion, with its time; y = [q, u, work], or with the memory of controllers [q, u, x, work]."""
+
+    @property
+    def state(self) -> State: ...
+    @property
+    def y(self) -> Real: ...
+    @property
+    def controllers(self) -> LoopMemory | None: ...
+
+
+class Feedback:
+    """Controllers around a system that is theirs alone: its functions of time are written to.
+
+    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that
+    cannot be had, NotImplementedError for what cannot be combined.
+    """
+
+    def __init__(self, plant: System, algorithm: DynamicsAlgorithm, route: Route, tables: tuple[Any, Any]) -> None:
+        self._plant, self._algorithm, self._tables = plant, algorithm, tables
+        self._wiring = wired(plant)
+        self._refuse(algorithm)
+        constants, workspace = tables
+        self._outputs = plant._observation.outputs()
+        self._tree, self._tree_workspace = plant.constants, plant.workspace()
+        where = np.zeros(a.ADDRESSES, np.int64)
+        where[a.MOTION], where[a.CONSTANTS], where[a.WORKSPACE] = addresses(
+            route.rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace
+        )
+        where[a.MANIFOLD], _ = addresses(route.project, NOTHING, REAL, VECTOR, constants)
+        where[a.OUTPUTS] = address(self._outputs)
+        if self._has_markers:
+            where[a.MARKERS], where[a.TREE], where[a.TREE_WORKSPACE], _ = addresses(
+                sense_markers, NOTHING, REAL, VECTOR, self._tree, self._tree_workspace, self._outputs
+            )
+        if algorithm.observing is not None and not plant.scene.closures:
+            where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
+        self._where, self._held = where, self._buffers()
+        self._called = self._callbacks()
+        self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
+        self._run: a.Loop | None = None
+
+    def with_retraction(self) -> None:
+        """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
+        self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
+
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+        """A run, whose controllers start as the scene says, or as they were where a run ended.
+
+        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). Instants that were due before
+        the start are gone: what they put out is remembered, or zero.
+        """
+        start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
+        ends, apart = clock.segment_ends, slack(start, t_end)
+        table = instants(self._plant.scene.controllers, start, t_end, ends[np.isfinite(ends)])
+        due = table[table["time"] < t_end]
+        held = np.zeros((max(int(np.sum(due["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
+        for values in self._held.values():
+            values[:] = 0.0
+        self._run = made = self._loop(due, held, apart)
+        if known is None:
+            made.following[0] = np.searchsorted(due["time"], start)
+            self._held["state"][:] = self._wiring.initial
+            y = np.concatenate([begin.y[:-1], self._wiring.continuous, begin.y[-1:]])
+            loop.start(start, y, made)
+        else:
+            y, made.following[0] = begin.y, int(known.instants[0])
+            self._held["state"][:], self._held["signal"][:] = known.state, known.signal
+            held[: len(known.held)] = known.held[: len(held)]
+        kernels = loop.rhs, loop.project, made, made
+        if linear:
+            jacobian, exact, tangent = linear
+            posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
+        else:
+            posed = problem(*kernels)
+        controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
+        ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
+        return Begun(posed, y, Clock(clock.times, ends), controlled)
+
+    def look(self, begin: Starting) -> None:
+        """At one state, as at the only sample of a run that is over."""
+        t = begin.state.t
+        self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
+        self.replay()
+
+    def remember(self) -> LoopMemory:
+        """At the end of a run, before it is replayed."""
+        s = self.running
+        return LoopMemory(s.signal.copy(), s.state.copy(), s.held.copy(), s.following.astype(float))
+
+    def heed(self, stop: Index) -> None:
+        """Let what a Python law raises end the run, by stop[0] = 1."""
+        for each in self._called:
+            each.stop = stop
+
+    def raise_trouble(self) -> None:
+        """What a Python law raised, unharmed."""
+        for each in self._called:
+            if each.trouble is not None:
+                trouble, each.trouble = each.trouble, None
+                raise trouble
+
+    @property
+    def reads_at_once(self) -> bool:
+        """Whether a continuous controller reads what depends on forces of the same instant."""
+        return self._wiring.reads_at_once
+
+    @property
+    def driven(self) -> list[int]:
+        """Numbers of the functions of time that controllers drive."""
+        found: list[int] = self._wiring.drive["function"].tolist()
+        return found
+
+    @property
+    def state_names(self) -> list[str]:
+        """Of the continuous controllers' states x, in their order."""
+        named = zip(self._wiring.controller, self._plant.scene.controllers, strict=True)
+        return [
+            f"{controller.name}.state[{i}]"
+            for row, controller in named
+            if not row["sampled"]
+            for i in range(int(row["states"]))
+        ]
+
+    @property
+    def running(self) -> a.Loop:
+        """Of the last run."""
+        assert self._run is not None  # asked of a run only
+        return self._run
+
+    @property
+    def motion(self) -> tuple[Any, a.Loop, a.Loop]:
+        """The closed loop's right-hand side, with its tables."""
+        return loop.rhs, self.running, self.running
+
+    observing = loop.observe
+    """What observes where that was evaluated, by an algorithm that does so in compiled code."""
+
+    def replay(self) -> None:
+        """From now on the loop shows the run that is over: what sampled controllers put out is read, not found."""
+        self.running.replaying[0] = 1
+        self.running.now[0] = np.inf
+
+    def course(self, times: Real, states: Real) -> tuple[dict[str, Real], dict[str, Real]]:
+        """Signals by sensor and controller, (T,k), and the power of controllers' outputs (W), likewise.
+
+        At the states (T,n) of the run that is replayed.
+        """
+        times, found = times[: len(states)], np.empty((len(states), len(self.running.signal)))
+        done = loop.retrace(times, states, self.running, found)
+        self.raise_trouble()
+        found[done:] = np.nan
+        power = powers(self._plant, times, states, self._wiring.drive, found)
+        named = self._wiring.names
+        controllers = [controller.name for controller in self._plant.scene.controllers]
+        return (
+            {name: found[:, place].copy() for name, place in named.items()},
+            {name: power[:, named[name]].copy() for name in controllers},
+        )
+
+    @property
+    def _observation(self) -> Any:
+        """As of the system: what is observed has the same names."""
+        return self._plant._observation
+
+    def _observe_row(self, t: float, y: Real, algorithm: Any, row: Real) -> None:
+        """As of the system, with what the controllers said at t."""
+        loop.hold(t, y, self.running)
+        self.raise_trouble()
+        self._plant._observe_row(t, self.running.y.copy(), algorithm, row)
+
+    @property
+    def _has_markers(self) -> bool:
+        kinds = self._wiring.sensor["kind"]
+        seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
+        return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
+
+    def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
+        """NotImplementedError for loads that this algorithm does not have in compiled code."""
+        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor)]
+        if loads and (algorithm.observing is None or self._plant.scene.closures):
+            raise NotImplementedError(
+                f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
+                "measure an acceleration, or leave it out"
+            )
+
+    def _buffers(self) -> dict[str, Real]:
+        """The arrays that laws read and write, which stay where they are."""
+        w = self._wiring
+        signals = max((place.stop for place in w.names.values()), default=0)
+        return {
+            "signal": np.zeros(signals), "input": np.zeros(len(w.wire)), "state": np.zeros(len(w.initial)),
+            "output": np.zeros(int(np.sum(w.controller["outputs"]))), "change": np.zeros(len(w.initial)),
+        }  # fmt: skip
+
+    def _callbacks(self) -> list[Called]:
+        """Plain Python laws, their addresses put into the controllers' table."""
+        found, held = list[Called](), self._held
+        for i, law in self._wiring.laws.items():
+            row = self._wiring.controller[i]
+            inputs = slice(row["input"], row["input"] + row["inputs"])
+            states = slice(row["state"], row["state"] + row["states"])
+            outputs = slice(row["output"], row["output"] + row["outputs"])
+            numbers = slice(row["number"], row["number"] + row["numbers"])
+            arrays = (
+                held["input"][inputs], held["state"][states], self._wiring.number[numbers], held["output"][outputs],
+                held["change"][states],
+            )  # fmt: skip
+            found.append(Called(law, arrays))
+            row["function"] = found[-1].address
+        return found
+
+    def _loop(self, table: Any, held: Real, apart: float) -> a.Loop:
+        w, plant, out = self._wiring, self._plant, self._outputs
+        at_once = bool(np.any(w.sensor["kind"] >= a.AT_ONCE))
+        return a.Loop(
+            address=self._where, sensor=w.sensor, controller=w.controller, wire=w.wire, number=w.number, drive=w.drive,
+            course=w.course, piece=w.piece, function=plant.constants.function, instant=table,
+            continuous=np.array([not np.all(w.controller["sampled"])], np.int64),
+            has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
+            follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
+            slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
+            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
+            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
+            doubt=self._doubt, **self._held,
+        )  # fmt: skip
+
+
+def _with_instants(ends: Real, times: Real, t_end: float) -> Real:
+    """Ends of segments as `Clock` has them, with instants up to t_end (s) among them."""
+    equal_steps, inner = not np.isfinite(ends[-1]), times[times < t_end]
+    is_end = len(inner) < len(times) or np.sum(ends == t_end) > (0 if equal_steps else 1)
+    before = np.union1d(ends[ends < t_end], inner)
+    last = [t_end] * bool(is_end) + [np.inf] if equal_steps else [t_end] + [t_end] * bool(is_end)
+    return np.array([*before, *last])

@@ -1,0 +1,260 @@
+"""The closed loop: the mechanics' right-hand side with controllers around it, as integrators see it.
+
+What controllers say is the value of functions of time of the mechanics, `Loop.drive`: any right-hand side takes it as a
+torque or force, and knows of no controllers. Sampled controllers act where an integrator evaluates the right-hand side
+at their instant for the first time. Instants are ends of segments (`flexmb.integrate.problem.Clock`), before which
+integrators evaluate nothing at or after them: that first evaluation is at the state that the run has reached there.
+
+A loop is passed as constants and as workspace.
+"""
+
+from flexmb.control import tables as a
+from flexmb.control.laws import FILTERED, act, pid_error
+from flexmb.control.measuring import measure_at_once, measure_motion
+from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.kernel import helper, kernel
+from flexmb.tables.status import OK
+
+
+@kernel
+def rhs(t, y, dy, s, _):
+    """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
+    _take(y, s)
+    status = _set(t, s)
+    if status == OK:
+        status = _move(t, s)
+    if status == OK and s.follows[0]:
+        status = _follow(t, s)
+    _give(s.dy, s.change, s, dy)
+    return status
+
+
+@kernel
+def project(t, y, s):
+    """Put the mechanics' part of y on its manifold."""
+    _take(y, s)
+    nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
+    _give(s.y, s.state, s, y)
+
+
+@kernel
+def move(y, increment, result, s):
+    """Coordinates of result = q o exp(increment), as of the mechanics alone; for loops without continuous states."""
+    nothing_at(s.address[a.RETRACTION], (y, increment, result, s.address[a.CONSTANTS]))
+
+
+@kernel
+def observe(s, _, out):
+    """What the mechanics' kernel observes where `rhs` was just evaluated."""
+    nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], out))
+
+
+@kernel
+def start(t, y, s):
+    """Begin a run at t and y, where nothing is held yet: PID controllers' filters stand at the first error.
+
+    Puts the continuous controllers' states into y.
+    """
+    _take(y, s)
+    measure_motion(t, s)
+    for i in range(s.controller.shape[0]):
+        _gather(i, s)
+        if s.controller[i].law == a.PID:
+            s.state[s.controller[i].state + FILTERED] = pid_error(i, s)
+    _give(s.y, s.state, s, y)
+
+
+@kernel
+def retrace(times, states, s, course):
+    """Signals (T,S) at the output times (T,) of a run that is over, from its states (T,n); how many could be found."""
+    for sample in range(times.shape[0]):
+        t = times[sample]
+        _take(states[sample], s)
+        if _keep_time(t, s) != OK or _steer(t, s) != OK:
+            return sample
+        if s.has_at_once[0]:
+            if _move(t, s) != OK:
+                return sample
+            measure_at_once(t, s)
+        for i in range(s.signal.shape[0]):
+            course[sample, i] = s.signal[i]
+    return times.shape[0]
+
+
+@kernel
+def hold(t, y, s):
+    """Have the functions of the mechanics say what the controllers say at t, at y; returns a status code."""
+    _take(y, s)
+    return _set(t, s)
+
+
+@helper
+def _set(t, s):
+    """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
+    status = _keep_time(t, s)
+    if status == OK and s.continuous[0]:
+        return _steer(t, s)
+    _drive(s)
+    return status
+
+
+@helper
+def _take(y, s):
+    """s.y = [q, u, work] and the continuous controllers' states from y = [q, u, x, work]."""
+    n = s.y.shape[0] - 1
+    for i in range(n):
+        s.y[i] = y[i]
+    s.y[n] = y[y.shape[0] - 1]
+    for i in range(s.controller.shape[0]):
+        o = s.controller[i]
+        if not o.sampled:
+            for j in range(o.states):
+                s.state[o.state + j] = y[n + o.x + j]
+
+
+@helper
+def _give(of_mechanics, of_controllers, s, y):
+    """The other way round, for states or their rates."""
+    n = s.y.shape[0] - 1
+    for i in range(n):
+        y[i] = of_mechanics[i]
+    y[y.shape[0] - 1] = of_mechanics[n]
+    for i in range(s.controller.shape[0]):
+        o = s.controller[i]
+        if not o.sampled:
+            for j in range(o.states):
+                y[n + o.x + j] = of_controllers[o.state + j]
+
+
+@helper
+def _keep_time(t, s):
+    """All instants up to t that have not been; returns a status code."""
+    reached = t
+    if s.replaying[0]:
+        if t < s.now[0]:
+            _rewind(s)
+        s.now[0] = t
+        reached = t + s.slack[0]
+    looked_at = -1.0
+    while s.following[0] < s.instant.shape[0] and reached >= s.instant[s.following[0]].time:
+        due = s.instant[s.following[0]]
+        if due.kind == a.APPLY:
+            _put_out(due.controller, due.row, s)
+        elif not s.replaying[0]:
+            if looked_at != due.time:
+                status = _look(t, s)
+                if status != OK:
+                    return status
+                looked_at = due.time
+            status = _sample(t, due.controller, due.row, s)
+            if status != OK:
+                return status
+        if due.immediate:
+            _put_out(due.controller, due.row, s)
+        s.following[0] += 1
+    return OK
+
+
+@helper
+def _rewind(s):
+    """To before the first instant."""
+    s.following[0] = 0
+    for i in range(s.controller.shape[0]):
+        if s.controller[i].sampled:
+            for j in range(s.controller[i].outputs):
+                s.signal[s.controller[i].signal + j] = 0.0
+
+
+@helper
+def _look(t, s):
+    """Everything that a sampled controller may read at t: sensors of all kinds, and continuous controllers."""
+    status = _steer(t, s)
+    if status == OK and s.has_at_once[0]:
+        status = _move(t, s)
+        if status == OK:
+            measure_at_once(t, s)
+    return status
+
+
+@helper
+def _sample(t, i, row, s):
+    """Let controller i act; its outputs wait in a row of s.held."""
+    o = s.controller[i]
+    _gather(i, s)
+    status = act(t, i, s)
+    for j in range(o.outputs):
+        s.held[row, j] = s.output[o.output + j]
+    for j in range(o.states):
+        s.state[o.state + j] = s.change[o.state + j]
+    return status
+
+
+@helper
+def _put_out(i, row, s):
+    """What waits there is what controller i says from now on."""
+    for j in range(s.controller[i].outputs):
+        s.signal[s.controller[i].signal + j] = s.held[row, j]
+
+
+@helper
+def _gather(i, s):
+    """Inputs of controller i from the signals."""
+    o = s.controller[i]
+    for j in range(o.inputs):
+        s.input[o.input + j] = s.signal[s.wire[o.input + j]]
+
+
+@helper
+def _steer(t, s):
+    """Sensors, continuous controllers, and what they drive; returns a status code.
+
+    What depends on forces at once is not known yet: it reaches outputs through states only, and is zero here.
+    """
+    measure_motion(t, s)
+    if s.follows[0]:
+        _forget_at_once(s)
+    status = _act_continuously(t, s)
+    _drive(s)
+    return status
+
+
+@helper
+def _drive(s):
+    """Functions of time of the mechanics, whose values are signals."""
+    for i in range(s.drive.shape[0]):
+        s.function[s.drive[i].function].data[0] = s.drive[i].gain * s.signal[s.drive[i].signal]
+
+
+@helper
+def _forget_at_once(s):
+    for i in range(s.sensor.shape[0]):
+        if s.sensor[i].kind >= a.AT_ONCE:
+            for n in range(s.sensor[i].width):
+                s.signal[s.sensor[i].signal + n] = 0.0
+
+
+@helper
+def _act_continuously(t, s):
+    for i in range(s.controller.shape[0]):
+        o = s.controller[i]
+        if not o.sampled:
+            _gather(i, s)
+            status = act(t, i, s)
+            if status != OK:
+                return status
+            for j in range(o.outputs):
+                s.signal[o.signal + j] = s.output[o.output + j]
+    return OK
+
+
+@helper
+def _move(t, s):
+    """The mechanics' right-hand side: s.dy."""
+    return status_at(s.address[a.MOTION], (t, s.y, s.dy, s.address[a.CONSTANTS], s.address[a.WORKSPACE]))
+
+
+@helper
+def _follow(t, s):
+    """Rates of controllers that read what depends on forces at once, now that it is known."""
+    measure_at_once(t, s)
+    return _act_continuously(t, s)

@@ -1,0 +1,112 @@
+"""What sensors measure at y = [q, u, work] in s.y, into s.signal."""
+
+from flexmb.control import tables as a
+from flexmb.jit.direct import nothing_at
+from flexmb.jit.kernel import helper
+from flexmb.spatial.scalar import sqrt
+from flexmb.spatial.vector import mat3, store3, sub, times_t, vec3
+from flexmb.tables.functions import evaluate
+
+_R, _VELOCITY, _ACCELERATION = 3, 12, 18  # places in the row of a marker
+
+
+@helper
+def measure_motion(t, s):
+    """All sensors that follow from coordinates, speeds and time."""
+    if s.has_markers[0]:
+        see_markers(t, s)
+    for i in range(s.sensor.shape[0]):
+        if s.sensor[i].kind < a.AT_ONCE:
+            _measure(t, i, s)
+
+
+@helper
+def measure_at_once(t, s):
+    """All others, where the equations of motion were just evaluated: s.dy, and the mechanics' workspace."""
+    first = s.y.shape[0] - 1 - s.rates.shape[0]
+    for j in range(s.rates.shape[0]):
+        s.rates[j] = s.dy[first + j]
+    if s.address[a.OBSERVING]:
+        nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
+    if s.has_markers[0]:
+        see_markers(t, s)
+    for i in range(s.sensor.shape[0]):
+        if s.sensor[i].kind >= a.AT_ONCE:
+            _measure(t, i, s)
+
+
+@helper
+def see_markers(t, s):
+    """Rows of all markers into s.markers, with the accelerations in s.rates."""
+    nothing_at(
+        s.address[a.MARKERS],
+        (t, s.y, s.address[a.TREE], s.address[a.TREE_WORKSPACE], s.address[a.OUTPUTS]),
+    )
+
+
+@helper
+def _measure(t, i, s):
+    sensor = s.sensor[i]
+    first, kind, place = sensor.signal, sensor.kind, sensor.place
+    if kind <= a.RATE:
+        for n in range(sensor.width):
+            s.signal[first + n] = s.y[place + n]
+    elif kind == a.TIME:
+        s.signal[first] = t
+    elif kind == a.PROFILE:
+        f = s.course[place]
+        value, rate, _ = evaluate(f.kind, f.data, f.start, f.stop, s.piece, t)
+        s.signal[first] = value
+        s.signal[first + 1] = rate
+    elif kind == a.LOAD:
+        for n in range(6):
+            s.signal[first + n] = s.loads[place, n]
+    elif kind == a.ORIENTATION:
+        _store_quaternion(s.markers[place], s.signal, first)
+    else:
+        _store_vector(kind, sensor.axes, s.markers[place], s, first)
+
+
+@helper
+def _store_vector(kind, axes, row, s, first):
+    """A vector of a marker, World axes or its own."""
+    v = vec3(row, 0)
+    if kind == a.ANGULAR_VELOCITY:
+        v = vec3(row, _VELOCITY)
+    elif kind == a.VELOCITY:
+        v = vec3(row, _VELOCITY + 3)
+    elif kind == a.ANGULAR_ACCELERATION:
+        v = vec3(row, _ACCELERATION)
+    elif kind == a.ACCELERATION:
+        v = vec3(row, _ACCELERATION + 3)
+    elif kind == a.SPECIFIC_FORCE:
+        v = sub(vec3(row, _ACCELERATION + 3), vec3(s.gravity, 0))
+    if axes == a.OWN:
+        v = times_t(mat3(row, _R), v)
+    store3(s.signal, first, v)
+
+
+@helper
+def _store_quaternion(row, signal, first):
+    """Of R_World_marker, by the largest of its four components, then the scalar one not negative."""
+    xx, xy, xz = row[_R], row[_R + 1], row[_R + 2]
+    yx, yy, yz = row[_R + 3], row[_R + 4], row[_R + 5]
+    zx, zy, zz = row[_R + 6], row[_R + 7], row[_R + 8]
+    trace = xx + yy + zz
+    if trace >= xx and trace >= yy and trace >= zz:
+        d = 2.0 * sqrt(1.0 + trace)
+        w, x, y, z = 0.25 * d, (zy - yz) / d, (xz - zx) / d, (yx - xy) / d
+    elif xx >= yy and xx >= zz:
+        d = 2.0 * sqrt(1.0 + xx - yy - zz)
+        w, x, y, z = (zy - yz) / d, 0.25 * d, (xy + yx) / d, (xz + zx) / d
+    elif yy >= zz:
+        d = 2.0 * sqrt(1.0 - xx + yy - zz)
+        w, x, y, z = (xz - zx) / d, (xy + yx) / d, 0.25 * d, (yz + zy) / d
+    else:
+        d = 2.0 * sqrt(1.0 - xx - yy + zz)
+        w, x, y, z = (yx - xy) / d, (xz + zx) / d, (yz + zy) / d, 0.25 * d
+    sign = -1.0 if w < 0.0 else 1.0
+    signal[first] = sign * w
+    signal[first + 1] = sign * x
+    signal[first + 2] = sign * y
+    signal[first + 3] = sign * z

@@ -1,0 +1,216 @@
+"""From a scene to the tables of its closed loop: which signal is whose, and what leads where."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from flexmb.control import laws
+from flexmb.control import tables as a
+from flexmb.control.user import compiled_address, found
+from flexmb.jit.foreign import is_foreign
+from flexmb.scene.check.control import named, output_width
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    TimeSensor,
+    UserLaw,
+)
+from flexmb.scene.convert import ROOT, label
+from flexmb.system.tree_system import System
+from flexmb.tables.functions import pack
+from flexmb.typing import Index, Real, Record
+
+_QUANTITIES = {
+    "position": a.POSITION, "orientation": a.ORIENTATION, "velocity": a.VELOCITY,
+    "angular_velocity": a.ANGULAR_VELOCITY, "acceleration": a.ACCELERATION,
+    "angular_acceleration": a.ANGULAR_ACCELERATION, "specific_force": a.SPECIFIC_FORCE,
+}  # fmt: skip
+_LAWS = {StateSpace: a.LINEAR, Pid: a.PID, Saturation: a.CLAMP, GainTable: a.LOOKUP}
+
+
+class Wiring(NamedTuple):
+    """What of a `Loop` is known before a run. `names`: signals by sensor and controller; laws: the plain Python
+    functions by controller."""
+
+    sensor: Record
+    controller: Record
+    wire: Index
+    number: Real
+    drive: Record
+    course: Record
+    piece: Real
+    initial: Real  # of `Loop.state`
+    names: dict[str, slice]
+    continuous: Real  # (X,) those of continuous controllers
+    reads_at_once: bool
+    laws: dict[int, Callable[..., None]]
+
+
+def wired(system: System) -> Wiring:
+    """Of a system whose scene was checked.
+
+    SceneError for a function of the user's that cannot be had, ValueError for references that only compiled bodies
+    could refuse.
+    """
+    scene = system.scene
+    sensor, course, piece, names = _sensors(system)
+    at_once = [sensor["kind"][i] >= a.AT_ONCE for i in range(len(sensor))]
+    immediate = {n for row in sensor[at_once] for n in range(row["signal"], row["signal"] + row["width"])}
+    record, wire = np.zeros(len(scene.controllers), a.CONTROLLER), list[int]()
+    number, initial = list[float](), list[float]()
+    follows, continuous, outputs = False, list[float](), 0
+    plain: dict[int, Callable[..., None]] = {}
+    for i, (row, each) in enumerate(zip(record, scene.controllers, strict=True)):
+        inputs = [n for reference in each.inputs for n in _signals(names, reference)]
+        width = output_width(each, len(inputs)) or 0
+        first = max((place.stop for place in names.values()), default=0)
+        names[each.name] = slice(first, first + width)
+        states, numbers = _states(each), _numbers(each, len(inputs))
+        row["sampled"] = each.period_s is not None
+        row["signal"], row["x"] = first, len(continuous)
+        row["input"], row["inputs"], row["state"], row["states"] = len(wire), len(inputs), len(initial), len(states)
+        row["output"], row["outputs"], row["number"], row["numbers"] = outputs, width, len(number), len(numbers)
+        if isinstance(each, UserLaw):
+            place = ROOT.key("controllers", i).named(label("controllers", each)).key("function")
+            law = found(each.function, scene.name, place)
+            if is_foreign(law):
+                row["law"], row["function"] = a.COMPILED, compiled_address(law, scene.name, place)
+            else:
+                row["law"], plain[i] = a.CALLED, law
+        else:
+            row["law"] = _LAWS[type(each)]
+        if each.period_s is None:
+            continuous += states
+            follows |= not immediate.isdisjoint(inputs)
+        wire += inputs
+        number += numbers
+        initial += states
+        outputs += width
+    drive = np.zeros(len(system.signals), a.DRIVE)
+    for row, (function, signal) in zip(drive, system.signals.items(), strict=True):
+        row["function"], row["signal"], row["gain"] = function, _signals(names, signal.source)[0], signal.gain
+    return Wiring(
+        sensor, record, np.array(wire, np.int64), np.array(number, float), drive, course, piece,
+        np.array(initial, float), names, np.array(continuous, float), follows, plain,
+    )  # fmt: skip
+
+
+def _sensors(system: System) -> tuple[Record, Record, Real, dict[str, slice]]:
+    """SENSOR records, functions of profiles with their spline pieces, and signals by name."""
+    sensors = system.scene.sensors
+    record, names, first = np.zeros(len(sensors), a.SENSOR), dict[str, slice](), 0
+    profiles = [each.function for each in sensors if isinstance(each, ProfileSensor)]
+    for row, sensor in zip(record, sensors, strict=True):
+        row["kind"], row["place"], row["width"], row["axes"] = _sensor(system, sensor)
+        if isinstance(sensor, ProfileSensor):
+            row["place"] = profiles.index(sensor.function)
+        row["signal"] = first
+        names[sensor.name] = slice(first, first + int(row["width"]))
+        first += int(row["width"])
+    return record, *pack(profiles), names
+
+
+def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
+    """Kind, place, width and axes."""
+    observed = system._observation.names
+    match sensor:
+        case CoordinateSensor(of=of, quantity="value"):
+            place = system.coordinate(of)
+            return a.COORDINATE, place.start, place.stop - place.start, a.WORLD
+        case CoordinateSensor(of=of):
+            place = system.speed(of)
+            return a.RATE, system.nq + place.start, place.stop - place.start, a.WORLD
+        case MarkerSensor(marker=marker, quantity=quantity, frame=frame):
+            axes = a.WORLD if frame == "world" else a.OWN
+            width = 4 if quantity == "orientation" else 3
+            return _QUANTITIES[quantity], list(observed.markers).index(marker), width, axes
+        case LoadSensor(hinge=hinge):
+            return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
+        case TimeSensor():
+            return a.TIME, 0, 1, a.WORLD
+    return a.PROFILE, 0, 2, a.WORLD
+
+
+def _signals(names: dict[str, slice], reference: str) -> list[int]:
+    """Numbers of the signals that a reference names; ValueError for a number that there is not."""
+    at = named(reference)
+    assert at is not None  # the scene was checked
+    every = list(range(names[at.name].start, names[at.name].stop))
+    if at.number is None:
+        return every
+    if at.number >= len(every):
+        raise ValueError(f'signal "{reference}": "{at.name}" has {len(every)} numbers, 0 to {len(every) - 1}')
+    return [every[at.number]]
+
+
+def _states(controller: Controller) -> list[float]:
+    """Where they start."""
+    match controller:
+        case StateSpace(A=A, initial=initial):
+            return list(initial) or [0.0] * len(A)
+        case UserLaw(initial=initial):
+            return list(initial)
+        case Pid():
+            return [0.0, 0.0]
+    return []
+
+
+def _numbers(controller: Controller, inputs: int) -> list[float]:
+    """As the laws take them; ValueError where matrices do not fit inputs that only compiled bodies know."""
+    match controller:
+        case StateSpace():
+            return _matrices(controller, inputs).ravel().tolist()
+        case Pid() as pid:
+            found = [0.0] * laws.PID_NUMBERS
+            found[laws.KP], found[laws.KI], found[laws.KD], found[laws.FILTER] = pid.kp, pid.ki, pid.kd, pid.filter_s
+            found[laws.LOWER] = -np.inf if pid.lower is None else pid.lower
+            found[laws.UPPER] = np.inf if pid.upper is None else pid.upper
+            found[laws.TRACKING], found[laws.SETPOINT] = _tracking(pid), pid.setpoint
+            found[laws.PERIOD] = pid.period_s or 0.0
+            return found
+        case Saturation(lower=lower, upper=upper):
+            return [lower, upper]
+        case GainTable(points=points, values=values):
+            return [*points, *values]
+    return list(controller.parameters)
+
+
+def _tracking(pid: Pid) -> float:
+    """Time in which a limit takes back the integral: not below the period, in which nothing changes."""
+    if pid.tracking_s is not None:
+        return pid.tracking_s
+    if not pid.ki:
+        return np.inf
+    return max(abs(pid.kp / pid.ki), pid.period_s or 0.0) or 1.0
+
+
+def _matrices(controller: StateSpace, inputs: int) -> Any:
+    """[A B; C D]."""
+    n, p = len(controller.A), len(controller.C) or len(controller.D)
+    block = np.zeros((n + p, n + inputs))
+    places = {"A": (0, 0, n), "B": (0, n, inputs), "C": (n, 0, n), "D": (n, n, inputs)}
+    for key, (row, column, width) in places.items():
+        matrix = getattr(controller, key)
+        if any(len(each) != width for each in matrix):
+            raise ValueError(f'controller "{controller.name}": {key} has {len(matrix[0])} columns, {width} are needed')
+        for i, each in enumerate(matrix):
+            block[row + i, column : column + width] = each
+    return block
+
+
+def widest(record: Record) -> int:
+    """The most outputs of a controller."""
+    return max(chain([1], record["outputs"].tolist()))
+

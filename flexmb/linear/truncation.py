@@ -1,0 +1,145 @@
+"""What the modes left out of beams change in the eigenvalues of a linear model: seen from a model with twice as many.
+
+By Rayleigh and Ritz, modes that are left out make an undamped structure stiffer: its frequencies fall towards their
+limit when modes are added. So the change by the next modes shows the size of what is missing. It leaves out what
+those beyond would change: for eigenmodes of a beam with a heavy body at its tip, about as much again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TypeGuard
+
+import msgspec
+import numpy as np
+from scipy.optimize import linear_sum_assignment
+
+from flexmb.linear.linear_model import Complex, LinearModel
+from flexmb.linear.linearize import linearize
+from flexmb.modal.flexible import flexible_model
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
+from flexmb.scene.check.beams import available_modes, mode_count
+from flexmb.scene.schema import ModalState, Scene
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
+from flexmb.typing import Real
+
+MORE = 2  # times the modes, and the elements that they need
+ALIKE = 0.5  # modal assurance: with less, a mode of the finer model is another one
+NEARNESS = 0.1  # weight of the eigenvalues' distance: growth and decay of one motion have one shape
+SEEN_AT = 4  # positions along a beam for each mode that is looked for there
+
+
+@dataclass(frozen=True, eq=False)
+class Truncation:
+    """By mode of a model, in its order: eigenvalue (rad/s) in the finer one, NaN where none is alike.
+
+    `change`: of it relative to its modulus, NaN for rigid-body motions too. `likeness`: modal assurance of the two
+    shapes by kinetic energy, 0 to 1. `unrefined`: flexible bodies of which there is no finer model.
+    """
+
+    eigenvalues: Complex
+    change: Real
+    likeness: Real
+    unrefined: tuple[str, ...]
+
+
+def truncation(
+    model: LinearModel, scene: Scene, linearized: Callable[[System], LinearModel] = linearize
+) -> Truncation:
+    """The modes of a scene's linear model against those with twice the modes of every beam.
+
+    `linearized` makes the finer model as `model` was made: about its initial state by default. Raises as it does.
+    """
+    finer = linearized(compile(finer_scene(scene)))
+    across, modes = _embedding(model, finer, scene), model.modes
+    candidates = [mode for mode in finer.modes if not mode.is_rigid_body]
+    likeness = np.zeros((len(modes), len(candidates)))
+    apart = np.ones_like(likeness)
+    for i, mode in enumerate(modes):
+        if not mode.is_rigid_body:
+            likeness[i] = [_likeness(finer.mass, across @ mode.shape, other.shape) for other in candidates]
+            apart[i] = [abs(other.eigenvalue - mode.eigenvalue) / abs(mode.eigenvalue) for other in candidates]
+    found, change, alike = np.full(len(modes), np.nan, complex), np.full(len(modes), np.nan), np.zeros(len(modes))
+    for i, j in zip(*linear_sum_assignment(NEARNESS * np.minimum(apart, 1.0) - likeness), strict=True):
+        if likeness[i, j] >= ALIKE:
+            found[i], alike[i] = candidates[j].eigenvalue, likeness[i, j]
+            change[i] = abs(found[i] - modes[i].eigenvalue) / abs(modes[i].eigenvalue)
+    others = (body for body in scene.bodies if not isinstance(body, RigidBody | BeamBody))
+    return Truncation(found, change, alike, tuple(body.name for body in others if body.level != "rigid"))
+
+
+def finer_scene(scene: Scene) -> Scene:
+    """The scene with twice the eigenmodes of every flexible beam, and the elements for them."""
+    finer = {body.name: _finer(body) for body in scene.bodies if _bends(body)}
+    bodies = tuple(finer.get(body.name, body) for body in scene.bodies)
+    states = tuple(_moved(state, scene, finer) for state in scene.modal_states)
+    return msgspec.structs.replace(scene, bodies=bodies, modal_states=states)
+
+
+def _bends(body: Body) -> TypeGuard[BeamBody]:
+    return isinstance(body, BeamBody) and body.level != "rigid"
+
+
+def _finer(body: BeamBody) -> BeamBody:
+    count = MORE * max(body.modes.count, 1)
+    attached = mode_count(body) - body.modes.count
+    finer = msgspec.structs.replace(body, elements=max(MORE * body.elements, count + attached))
+    count = min(count, available_modes(finer) - attached)  # a shaft of two lumps has two modes of torsion
+    ratio = body.modes.damping_ratio
+    if isinstance(ratio, tuple):
+        ratio = (*ratio, *[ratio[-1]] * (count - body.modes.count))
+    modes = msgspec.structs.replace(body.modes, count=count, damping_ratio=ratio)
+    return msgspec.structs.replace(finer, modes=modes)
+
+
+def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> ModalState:
+    """The same shape and speed of deformation in the modes of the finer beam."""
+    if state.body not in finer:
+        return state
+    coarse = next(body for body in scene.bodies if body.name == state.body and _bends(body))
+    across = _across(coarse, finer[state.body])
+    return ModalState(
+        body=state.body, coordinates=tuple((across @ state.coordinates).tolist()),
+        rates=tuple((across @ state.rates).tolist()) if state.rates else (),
+    )  # fmt: skip
+
+
+def _across(coarse: BeamBody, fine: BeamBody) -> Real:
+    """(fine, coarse) modal coordinates of the finer beam for unit coordinates of the other, by least squares."""
+    shapes = []
+    count = SEEN_AT * (fine.modes.count + 2)
+    for body in (coarse, fine):
+        nodes = tuple(BeamNode(name=f"seen {i}", x_m=i / count * body.length_m) for i in range(1, count + 1))
+        found = flexible_model(msgspec.structs.replace(body, nodes=nodes)).nodes
+        length = body.length_m
+        rows = [np.vstack([found[n.name].translation, length * found[n.name].rotation_modes]) for n in nodes]
+        shapes.append(np.concatenate(rows))
+    solved: Real = np.linalg.lstsq(shapes[1], shapes[0], rcond=None)[0]
+    return solved
+
+
+def _embedding(model: LinearModel, finer: LinearModel, scene: Scene) -> Real:
+    """(n_fine, n) displacements of the finer model for unit displacements of the other, by their names."""
+    rows = {name: i for i, name in enumerate(finer.displacements)}
+    places = {name: i for i, name in enumerate(model.displacements)}
+    out = np.zeros((len(rows), len(places)))
+    for name, i in places.items():
+        out[rows[name], i] = 1.0
+    for body in scene.bodies:
+        if _bends(body):
+            across = _across(body, _finer(body))
+            fine = [rows[f"{body.name}.mode[{n}]"] for n in range(across.shape[0])]
+            coarse = [places[f"{body.name}.mode[{n}]"] for n in range(across.shape[1])]
+            out[np.ix_(fine, coarse)] = across
+    return out
+
+
+def _likeness(mass: Real, one: Complex, other: Complex) -> float:
+    """Modal assurance criterion in the metric of kinetic energy."""
+
+    def product(a: Complex, b: Complex) -> complex:
+        return complex(np.vdot(a, mass @ b))
+
+    return abs(product(one, other)) ** 2 / (product(one, one).real * product(other, other).real)

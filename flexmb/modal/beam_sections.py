@@ -1,0 +1,72 @@
+"""A beam cut at some sections: the inertia points beyond each cut, and the motion of the sections themselves.
+
+Between two cuts the beam's own inertia is integrated piece by piece, so that no cut falls between two points of the
+dynamics. All integrals are those of the dynamics: the sum beyond the root is that of the whole beam.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from flexmb.modal.beam import BeamElements, beam_elements
+from flexmb.modal.element_points import Points
+from flexmb.modal.flexible import points_of
+from flexmb.modal.flexible_model import SecondOrder
+from flexmb.modal.reduce import beam_modes
+from flexmb.modal.second_order import beam_second_order
+from flexmb.modal.stations import inertia_stations, lumps
+from flexmb.scene.bodies import BeamBody
+from flexmb.typing import Index, Real
+
+
+@dataclass(frozen=True, eq=False)
+class BeamSections:
+    """Cuts at x (X,) m of a beam, body frame.
+
+    points: inertia points of the whole beam, a cut never within the interval that one stands for; `beyond` (n,): how
+    many cuts each is beyond, or at; `second`: their second-order field at level stiffened. motion (X,6,m): mode shapes
+    [displacement; rotation] of the sections, `second_motion` their field. Stiffnesses (X,): EA N, EIy, EIz, GJ N m².
+    """
+
+    x: Real
+    points: Points
+    beyond: Index
+    second: SecondOrder | None
+    motion: Real
+    second_motion: SecondOrder | None
+    EA: Real
+    EIy: Real
+    EIz: Real
+    GJ: Real
+
+
+def beam_sections(body: BeamBody, x: Real) -> BeamSections:
+    """A beam with its modes, none at level rigid, cut at ascending x (X,) m."""
+    elements = beam_elements(body)
+    table, rigid_lumps = elements.table, lumps(body)
+    stations = inertia_stations(body, elements.mesh, table)
+    if body.level == "rigid":
+        columns = np.zeros((elements.size, 0))
+    else:
+        columns = beam_modes(elements, elements.stiffness(), elements.mass(stations, rigid_lumps), body.modes).columns
+    if body.mass == "consistent":
+        stations = inertia_stations(body, elements.mesh, table, cuts=x)
+    points = points_of(body, elements, columns, stations, rigid_lumps)
+    return BeamSections(
+        x=x,
+        points=points,
+        beyond=np.searchsorted(x, points.x, side="right"),
+        second=_second(body, elements, columns, points.x, points.position - points.x[:, None] * (1.0, 0.0, 0.0)),
+        motion=elements.motion(x, columns),
+        second_motion=_second(body, elements, columns, x, np.zeros((len(x), 3))),
+        EA=table.at(table.EA, x),
+        EIy=table.at(table.EIy, x),
+        EIz=table.at(table.EIz, x),
+        GJ=table.at(table.GJ, x),
+    )
+
+
+def _second(body: BeamBody, elements: BeamElements, columns: Real, x: Real, offset: Real) -> SecondOrder | None:
+    return beam_second_order(elements, columns, x, offset) if body.level == "stiffened" else None

@@ -1,0 +1,186 @@
+"""Runs of scenes with events: from event to event in compiled code, what happens there in Python, joined to one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.integrate.integrator import Method
+from flexmb.integrate.settings import Settings
+from flexmb.integrate.watch import Watch, watch
+from flexmb.run.joining import joined
+from flexmb.run.origin import Beginning
+from flexmb.run.outputs import observed
+from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.situation import EventRecord, Situation
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.events import EndRun, Impact, Latch
+from flexmb.scene.schema import SceneEvent
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.tree_system import System
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
+MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
+
+
+def refuse_events(system: System, method: Method) -> None:
+    """NotImplementedError for events that a method or a closed chain does not have."""
+    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in system.scene.events):
+        raise NotImplementedError(
+            f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
+            '"radau5" or "exponential"'
+        )
+    for event in system.scene.events if system.scene.closures else ():
+        if any(isinstance(action, Latch | Impact) for action in event.actions):
+            raise NotImplementedError(
+                f'event "{event.name}" has an impulse, and the scene has closures, which would take part of it: that '
+                "is not supported yet; use a stiff spring, or a tree"
+            )
+
+
+class EventfulRun:
+    """One run of a scene with events."""
+
+    def __init__(
+        self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float
+    ) -> None:
+        """times (T,) s of the output."""
+        self._situation, self._times, self._settings = Situation(system), times, settings
+        self._algorithm, self._stabilise = algorithm, stabilise
+        self._events = system.scene.events
+        self._happened: list[EventRecord] = []
+        self._paused_at: list[float] = []
+        self._whole: Trajectory | None = None
+
+    @property
+    def system(self) -> System:
+        """As events have left it."""
+        return self._situation.system
+
+    def __call__(self, begin: Beginning) -> tuple[Trajectory, Raw]:
+        """The trajectory, and the last piece of the run as the integrator left it."""
+        watched = [event for event in self._events if event.watch != "time"]
+        sides = self._sides(watched, begin.y)
+        while True:
+            levels = self._watch(watched, sides)
+            raw, stop = self._piece(begin, levels)
+            found = self._found(raw, stop, watched, levels)
+            if not found:
+                return self._ended(raw), raw
+            self._paused_at.append(raw.t)
+            y, controlled = self._apart(raw.y)
+            for event in self._arriving(found, watched, levels, y):
+                self._happened.append(self._situation.happen(event, raw.t, y))
+            raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
+            ends = any(isinstance(action, EndRun) for event in found for action in event.actions)
+            if ends or self._chatters() or raw.t >= self._times[-1]:
+                return self._ended(self._last(raw, ends)), raw
+            sides = self._sides_after(watched, levels, y)
+            begin = self._going_on(raw)
+
+    def _apart(self, y: Real) -> tuple[Real, Real]:
+        """[q, u, work], and the states of controllers, which events do not touch."""
+        motion = self.system.nq + self.system.nu
+        return np.r_[y[:motion], y[-1]], y[motion:-1]
+
+    def _going_on(self, raw: Raw) -> Beginning:
+        """From where a piece ended; controllers know what they knew."""
+        state = self.system.layout.known(raw.t, np.r_[self._apart(raw.y)[0][:-1], 0.0])
+        return Beginning(state, raw.y, None, raw.controllers)
+
+    def _piece(self, begin: Beginning, levels: Watch | None) -> tuple[Raw, float]:
+        """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
+        t, system = begin.state.t, self._situation.system
+        start = max(t, self._times[0]) if begin.memory is not None else t
+        due = [event.level for event in self._events if event.watch == "time" and t < event.level < self._times[-1]]
+        stop = min([*due, self._times[-1]])
+        is_last = stop == self._times[-1]
+        wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
+        times = np.unique([start, *wanted, stop])
+        with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            raw = integrate(system, solve, begin, times, self._settings, levels)
+            kept = np.isin(times[: len(raw.states)], wanted)
+            shown = raw._replace(states=raw.states[kept])
+            self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
+        return raw, stop
+
+    def _found(self, raw: Raw, stop: float, watched: Sequence[SceneEvent], levels: Watch | None) -> list[SceneEvent]:
+        """What happens where a piece ended, in the order of the scene."""
+        assert self._whole is not None
+        if raw.status is not Status.OK or self._whole.status is not Status.OK or raw.interrupted:
+            return []
+        crossed = [watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
+        return [
+            event for event in self._events
+            if event in crossed or (event.watch == "time" and raw.t == stop == event.level < self._times[-1])
+        ]  # fmt: skip
+
+    def _arriving(
+        self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
+    ) -> list[SceneEvent]:
+        """Those that come to their levels, which are set exactly; rounding may find one again that flies off."""
+        off = []
+        for i, event in enumerate(watched):
+            if levels is not None and event in found:
+                y[self._situation.places[event.watch]] = event.level
+                rate = self._situation.rate_of(event.watch)
+                if rate is not None and levels.side[i] * y[rate] > 0.0:
+                    off.append(event)
+        return [event for event in found if event not in off]
+
+    def _watch(self, watched: Sequence[SceneEvent], sides: Sequence[int]) -> Watch | None:
+        if not watched:
+            return None
+        entries = [self._situation.places[event.watch] for event in watched]
+        directions = [DIRECTIONS[event.crossing] for event in watched]
+        return watch(entries, [event.level for event in watched], directions, sides)
+
+    def _sides(self, watched: Sequence[SceneEvent], y: Real) -> list[int]:
+        """On which side of its level everything is; 0 at it."""
+        return [int(np.sign(y[self._situation.places[event.watch]] - event.level)) for event in watched]
+
+    def _sides_after(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
+        """After an event. What was found at its level is beyond it, or back where it does not go on; held at it: 0."""
+        sides = self._sides(watched, y)
+        for i, event in enumerate(watched):
+            came = int(levels.side[i]) if levels is not None else 0
+            if levels is not None and levels.found[i]:
+                rate = self._situation.rate_of(event.watch)
+                goes_on = rate is None or -came * y[rate] > 0.0
+                sides[i] = 0 if self._situation.is_held(event.watch) else -came if goes_on else came
+            elif sides[i] == 0:
+                sides[i] = came
+        return sides
+
+    def _chatters(self) -> bool:
+        if len(self._paused_at) < MANY:
+            return False
+        return self._paused_at[-1] - self._paused_at[-MANY] < SHORT * (self._times[-1] - self._times[0])
+
+    def _last(self, raw: Raw, ends: bool) -> Raw:
+        """The state after the last event is an output too."""
+        last = raw._replace(states=raw.y[None])
+        if not ends and raw.t < self._times[-1]:
+            last = last._replace(status=Status.CHATTERING)
+        system = self.system
+        with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            if solve.feedback is not None:
+                solve.feedback.look(self._going_on(raw))
+            found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
+        if ends:
+            found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
+        cost = {name: 0 for name in vars(found.statistics)}
+        self._join(replace(found, statistics=replace(found.statistics, **cost)))
+        return last
+
+    def _join(self, part: Trajectory) -> None:
+        self._whole = part if self._whole is None else joined(self._whole, part)
+
+    def _ended(self, raw: Raw) -> Trajectory:
+        assert self._whole is not None  # there was a piece
+        return replace(self._whole, events=tuple(self._happened))

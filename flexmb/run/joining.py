@@ -1,0 +1,89 @@
+"""Two runs, one after the other, as one trajectory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.run.trajectory import MarkerPath, Trajectory
+
+SAME_NAMES = (
+    "q_names", "u_names", "markers", "loads", "wheel_loads", "energy", "connectors", "hinge_forces",
+)  # fmt: skip
+
+
+def joined(first: Trajectory, later: Trajectory) -> Trajectory:
+    """See `Trajectory.then`; the later run may have no output where the first one ended."""
+    for key in SAME_NAMES:
+        strange = set(getattr(first, key)) ^ set(getattr(later, key))
+        if strange:
+            names = ", ".join(sorted(map(str, strange)))
+            raise ValueError(f"the runs cannot be joined: only one of them has {key}: {names}")
+    if len(later.t) == 0:
+        return _ended(first, later, first.work)
+    kept = int(np.searchsorted(first.t, later.t[0]))
+    # a run that was taken up has counted on by itself
+    counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
+
+    def both(a: Real, b: Real) -> Real:
+        return np.concatenate([a[:kept], b])
+
+    def each(a: Mapping[str, Real], b: Mapping[str, Real]) -> dict[str, Real]:
+        return {name: both(a[name], b[name]) for name in b}
+
+    whole = replace(
+        first,
+        t=both(first.t, later.t), q=both(first.q, later.q), u=both(first.u, later.u),
+        markers={name: _path(first.markers[name], later.markers[name], kept) for name in later.markers},
+        loads=each(first.loads, later.loads), wheel_loads=each(first.wheel_loads, later.wheel_loads),
+        drives=_of_some(first, later, kept, "drives"), energy=each(first.energy, later.energy),
+        momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
+        hinge_forces=each(first.hinge_forces, later.hinge_forces),
+        signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
+    )  # fmt: skip
+    return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
+
+
+def _ended(whole: Trajectory, later: Trajectory, work: Real, statistics: Any = None) -> Trajectory:
+    return replace(
+        whole, work=work, status=later.status, message=later.message, stopped_at=later.stopped_at,
+        restart=later.restart, events=whole.events + later.events,
+        statistics=statistics or _sum(whole.statistics, later.statistics),
+    )  # fmt: skip
+
+
+def _sum(a: Any, b: Any) -> Any:
+    """Of statistics."""
+    return type(a)(*(getattr(a, field.name) + getattr(b, field.name) for field in fields(a)))
+
+
+def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
+    """A marker's path without a jump of the quaternion's sign."""
+    turned = kept > 0 and float(a.quaternion[kept - 1] @ b.quaternion[0]) < 0.0
+    b = replace(b, quaternion=-b.quaternion) if turned else b
+    return type(b)(*(np.concatenate([getattr(a, f.name)[:kept], getattr(b, f.name)]) for f in fields(b)))
+
+
+def _of_some(first: Trajectory, later: Trajectory, kept: int, key: str) -> dict[str, Real]:
+    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it.
+
+    What is not driven takes no load and no power, and is zero then; a signal that there is not is NaN.
+    """
+    missing = np.nan if key == "signals" else 0.0
+    a, b, found = getattr(first, key), getattr(later, key), {}
+    for name in {**a, **b}:
+        width = max(each[name].shape[1] for each in (a, b) if name in each)
+        parts = []
+        for values, count in ((a, kept), (b, len(later.t))):
+            part = np.full((count, width), missing)
+            if name in values:
+                part[:, : values[name].shape[1]] = values[name][:count]
+            parts.append(part)
+        found[name] = np.concatenate(parts)
+    return found

@@ -1,0 +1,126 @@
+"""Where a run begins: the scene's own state, a state, values by name, or where another run ended."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.control.memory import LoopMemory
+from flexmb.integrate.memory import Memory
+from flexmb.run.restart import Restart
+from flexmb.scene.problems import closest
+from flexmb.system.tree_system import System
+from flexmb.tables import arguments
+from flexmb.tables.state import State, pack
+from flexmb.typing import Real
+
+Values = Mapping[str, float | Sequence[float] | Real]
+Given = State | Restart | Values | None
+SAME = 1e-9  # relative difference of a value that is given and one that a prescribed motion has
+
+
+class Beginning(NamedTuple):
+    """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; of one taken up its memory,
+    that of its controllers, and their states before the work in y."""
+
+    state: State
+    y: Real
+    memory: Memory | None
+    controllers: LoopMemory | None = None
+
+
+def start_time(t_start: float | None, state: Given) -> float:
+    """Time (s) at which a run begins; ValueError or TypeError for one that makes no sense."""
+    own = state.t if isinstance(state, State | Restart) else 0.0
+    if t_start is None:
+        return own
+    t_start = arguments.number("t_start", t_start)
+    if isinstance(state, Restart) and not state.since <= t_start <= own:
+        raise ValueError(
+            f"t_start is {t_start:g} s, but the run that is taken up goes on from {state.since:.17g} s and ended at "
+            f"{own:.17g} s: leave t_start out, or give a time between these"
+        )
+    return t_start
+
+
+def origin(system: System, t: float, state: Given, method: str) -> Beginning:
+    """What a run by this method begins with at time t (s).
+
+    ValueError for a restart of another scene or method, for values that do not belong to the scene or contradict its
+    prescribed motions, for a state that closes its closures only roughly; TypeError for anything else than `Given`.
+    """
+    if isinstance(state, Restart):
+        return _taken_up(system, state, method)
+    if state is None:
+        found = system.initial_state if t == 0.0 else system.admissible(t, system.scene_state(t))
+    elif isinstance(state, State):
+        system.layout.entering(state)
+        found = system.admissible(t, pack(state))
+    elif isinstance(state, Mapping):
+        found = _named(system, t, state)
+    else:
+        raise TypeError(f"state is {type(state).__name__}: give a State, a Restart, or values by name")
+    return Beginning(found, found.y.copy(), None)
+
+
+def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
+    remedy = "; to start from its last state instead, give the state `last_state` of its trajectory"
+    if restart.method != method:
+        raise ValueError(f'the run that is taken up was by method "{restart.method}": give the same{remedy}')
+    if restart.scene != system.scene:
+        raise ValueError(f'the run that is taken up was of scene "{restart.scene.name}" with other contents{remedy}')
+    y = restart.memory.y.copy()
+    t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
+    return Beginning(
+        system.layout.known(t, np.r_[motion[:-1], 0.0]), y, restart.taken_up(), restart.controllers
+    )
+
+
+def _named(system: System, t: float, values: Values) -> State:
+    places, y = names_of_places(system), system.scene_state(t)
+    given = np.zeros(len(y), bool)
+    for name, value in values.items():
+        if name not in places:
+            raise ValueError(
+                f"state: scene \"{system.scene.name}\" has no coordinate or speed {name!r}: {closest(name, places)} "
+                f"There are {', '.join(sorted(places))}"
+            )
+        place = places[name]
+        y[place] = arguments.finite(
+            f'state["{name}"]', arguments.vector(f'state["{name}"]', np.atleast_1d(value), place.stop - place.start)
+        )
+        given[place] = True
+    _, whole = system.layout.whole(t, y)
+    found = system.admissible(t, whole)
+    _refuse_other_than_prescribed(system, whole, found, given)
+    return found
+
+
+def names_of_places(system: System) -> dict[str, slice]:
+    """Places in [q, u, work] of all that a state may be given by.
+
+    Single entries as in `Trajectory.q_names` and `u_names`; "<hinge>", "<wheel>", "<body>.modes" for all coordinates of
+    one, with ".speeds" behind it for all its speeds.
+    """
+    q, u = system.state_names
+    found = {name: slice(i, i + 1) for i, (name, _) in enumerate((*q, *u))}
+    for suffix, places, first in (("", system.layout.q, 0), (".speeds", system.layout.u, system.nq)):
+        for name, place in places.items():
+            if place.stop > place.start and not name.endswith(".hinge"):
+                found[name + suffix] = slice(first + place.start, first + place.stop)
+    return found
+
+
+def _refuse_other_than_prescribed(system: System, whole: Real, found: State, given: Real) -> None:
+    """A value that is given says where the motion starts: a prescribed motion must agree."""
+    names = [name for names in system.state_names for name, _ in names]
+    speed = system.constants.speed
+    for j in np.flatnonzero(speed["prescribed"] >= 0).tolist():
+        for i in (int(speed["coordinate"][j]), system.nq + j):
+            if given[i] and abs(whole[i] - found.y[i]) > SAME * max(1.0, abs(found.y[i])):
+                raise ValueError(
+                    f'state: "{names[i]}" is prescribed, and its motion has {found.y[i]:g} at t = {found.t:g} s, not '
+                    f"{whole[i]:g}: leave it out, or change the function"
+                )

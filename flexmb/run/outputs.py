@@ -1,0 +1,71 @@
+"""The trajectory of what an integrator left: everything observable at the samples reached, and how the run ended."""
+
+from __future__ import annotations
+
+from time import perf_counter
+
+from flexmb.integrate.control import ACCEPTED, EVALUATIONS, FACTORISATIONS, JACOBIANS, REJECTED
+from flexmb.run.observing import observe
+from flexmb.run.propagate import Integration, Raw
+from flexmb.run.trajectory import Statistics, Trajectory, gathered
+from flexmb.system.algorithm import Algorithm
+from flexmb.system.tree_system import System
+from flexmb.tables.state import DynamicsError, NotFiniteError
+from flexmb.tables.status import Status
+from flexmb.typing import Real
+
+
+def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
+    """Evaluate everything observable at the samples reached, of a run by `solve`."""
+    start = perf_counter()
+    rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
+    status, stopped_at, message = raw.status, raw.t, ending(system, raw)
+    if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
+        status, stopped_at = _why(trouble), float(times[len(rows)])
+        message = f"stopped at t = {stopped_at:g} s" + (
+            f", while outputs were evaluated: {status.advice}" if status is Status.INTERRUPTED else f": {trouble}"
+        )
+    states = raw.states[: len(rows)]
+    signals, power = ({}, {}) if solve.feedback is None else solve.feedback.course(times, states)
+    q_names, u_names = system.state_names
+    return Trajectory(
+        scene=system.scene.name,
+        status=status,
+        message=message,
+        stopped_at=stopped_at,
+        t=times[: len(rows)],
+        q=states[:, : system.nq],
+        u=states[:, system.nq : system.nq + system.nu],
+        q_names=q_names,
+        u_names=u_names,
+        **gathered(system._observation, rows),
+        work=states[:, -1],
+        signals=signals,
+        power=power,
+        statistics=Statistics(
+            evaluations=raw.counts[EVALUATIONS],
+            accepted_steps=raw.counts[ACCEPTED],
+            rejected_steps=raw.counts[REJECTED],
+            jacobians=raw.counts[JACOBIANS],
+            factorisations=raw.counts[FACTORISATIONS],
+            compile_s=raw.compile_s,
+            run_s=raw.run_s,
+            output_s=perf_counter() - start,
+        ),
+    )
+
+
+def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
+    """Of the end of the outputs; squares overflow earlier than the state itself, and fixed steps may have jumped over
+    the place where the dynamics ends."""
+    if isinstance(trouble, KeyboardInterrupt):
+        return Status.INTERRUPTED
+    return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
+
+
+def ending(system: System, raw: Raw) -> str:
+    """How a run ended, in words."""
+    if raw.status is Status.OK:
+        return f"finished at t = {raw.t:g} s"
+    place = system.fault_name(raw.status, raw.fault)
+    return f"stopped at t = {raw.t:g} s: " + raw.status.advice.format(body=f'"{place}"')

@@ -1,0 +1,130 @@
+"""What the actions of events make of a scene, its system and its state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from msgspec.structs import replace
+
+from flexmb.run.impulses import struck
+from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
+from flexmb.scene.functions import Constant
+from flexmb.scene.hinges import LinearCoordinate
+from flexmb.scene.schema import Scene, SceneEvent, Wheel
+from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
+from flexmb.scene.values import changed_at
+from flexmb.system.compile import assembled
+from flexmb.system.tree_system import System
+from flexmb.tables.state import State
+from flexmb.typing import Real
+
+
+@dataclass(frozen=True)
+class EventRecord:
+    """An event that happened at t (s).
+
+    impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
+    (J), which the work of the trajectory counts; before, after: the states.
+    """
+
+    name: str
+    t: float
+    impulses: dict[str, float]
+    energy_change: float
+    before: State
+    after: State
+
+
+class Situation:
+    """The scene as events have left it, with its system; systems that come back are not built again."""
+
+    def __init__(self, system: System) -> None:
+        self.system = system
+        self._given = system.scene
+        self._paths = scalar_paths(system.scene)
+        self._built = [system]
+        q, u = system.state_names
+        self.places = {name: i for i, (name, _) in enumerate((*q, *u))}
+        """Of coordinates and speeds in [q, u, work], by name."""
+
+    def happen(self, event: SceneEvent, t: float, y: Real) -> EventRecord:
+        """Do what an event says at time t to y = [q, u, work], in place."""
+        before, work, impulses = self._state(t, y), float(y[-1]), dict[str, float]()
+        for action in event.actions:
+            self._do(action, t, y, impulses)
+        return EventRecord(event.name, t, impulses, float(y[-1]) - work, before, self._state(t, y))
+
+    def rate_of(self, watched: str) -> int | None:
+        """Place in [q, u, work] of the rate of a coordinate; None for what is a rate itself."""
+        path = self._paths.get(watched)
+        return None if path is None else self.places[rate_name(watched, path)]
+
+    def is_held(self, watched: str) -> bool:
+        """Whether a coordinate is latched or prescribed."""
+        place = self.rate_of(watched)
+        return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
+
+    def _do(self, action: Action, t: float, y: Real, impulses: dict[str, float]) -> None:
+        match action:
+            case Latch(coordinate=name):
+                self._strike(t, y, name, 0.0, impulses)
+                self._become(changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]])))
+                self.system.project(t, y, self.system.constants)
+            case Impact(coordinate=name, restitution=restitution):
+                self._strike(t, y, name, -restitution, impulses)
+            case Release(coordinate=name):
+                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)))
+            case Change(path=path, value=value):
+                energy = self._energy(t, y)
+                self._become(self.system.scene.with_values({path: value}))
+                self._given = self._given.with_values({path: value})
+                y[-1] += self._energy(t, y) - energy
+            case EndRun():
+                pass
+
+    def _strike(self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float]) -> None:
+        """An impulse that multiplies a speed."""
+        rates = {self.places[rate_name(each, path)]: each for each, path in self._paths.items()}
+        place = self.places[rate_name(name, self._paths[name])]
+        found = struck(self.system, self._state(t, y), {place - self.system.nq: factor * y[place]})
+        y[self.system.nq : -1] = found.u
+        y[-1] += found.energy
+        for j, impulse in found.impulses.items():
+            along = rates[self.system.nq + j]
+            impulses[along] = impulses.get(along, 0.0) + impulse
+
+    def _held(self, value: float):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
+        def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
+            value_key, rate_key, motor, motion = _keys(item)
+            return replace(item, **{value_key: 0.0, rate_key: 0.0, motor: None, motion: Constant(value=float(value))})
+
+        return held
+
+    def _freed(self, name: str):  # type: ignore[no-untyped-def]
+        found: list[Coordinate | Wheel] = []
+        changed_at(self._given, self._paths[name], lambda item: found.append(item) or item)
+        motion = _keys(found[0])[3]
+        return lambda _: replace(found[0], **{motion: None})
+
+    def _become(self, scene: Scene) -> None:
+        for system in self._built:
+            if system.scene == scene:
+                self.system = system
+                return
+        self.system = assembled(scene)
+        self._built.append(self.system)
+
+    def _state(self, t: float, y: Real) -> State:
+        return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)
+
+    def _energy(self, t: float, y: Real) -> float:
+        return float(np.sum(list(self.system.energy(self._state(t, y)).values())))
+
+
+def _keys(item: Coordinate | Wheel) -> tuple[str, str, str, str]:
+    """Keys of initial value, initial rate, motor and prescribed motion."""
+    if isinstance(item, LinearCoordinate):
+        return "position_m", "rate_m_s", "force_N", "prescribed_m"
+    rate = "speed_rad_s" if isinstance(item, Wheel) else "rate_rad_s"
+    return "angle_rad", rate, "torque_Nm", "prescribed_rad"

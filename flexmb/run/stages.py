@@ -1,0 +1,89 @@
+"""A manoeuvre in stages: one run after the other, each from where the last one ended, under its own scene."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Unpack
+
+from flexmb.integrate.integrator import Method
+from flexmb.run.origin import Given, start_time
+from flexmb.run.simulate import RunSettings, simulate
+from flexmb.run.trajectory import Trajectory
+from flexmb.scene.schema import Scene
+from flexmb.system.compile import compile
+from flexmb.system.tree_system import System
+from flexmb.tables import arguments
+
+
+@dataclass(frozen=True)
+class RunStage:
+    """So long (s), and what is different from the stage before: another scene, other values in it, or nothing.
+
+    values: see `Scene.with_values`; they stay in the stages that follow. samples: number of output times, both ends
+    included.
+    """
+
+    duration_s: float
+    values: Mapping[str, Any] = field(default_factory=dict)
+    scene: Scene | None = None
+    samples: int = 201
+
+
+def simulate_stages(
+    scene: Scene,
+    stages: Sequence[RunStage],
+    method: Method = "dop853",
+    *,
+    t_start: float | None = None,
+    state: Given = None,
+    **settings: Unpack[RunSettings],
+) -> Trajectory:
+    """Simulate stages in sequence; one trajectory, whose status is that of the first stage that fails.
+
+    Time goes on from stage to stage, also for functions of time. Each stage starts with the coordinates and speeds that
+    the last one ended with: scenes must have the same ones, and the same markers and hinges. Controllers begin anew.
+    A motion that is prescribed in a stage begins where the coordinate is; where it does not, in value or rate,
+    ValueError says so.
+    method, t_start, state and settings: see `simulate`. Raises what `simulate` does, before anything runs where a
+    scene is wrong, and ValueError for stages that do not fit each other.
+    """
+    systems = _systems(scene, stages)
+    t = start_time(t_start, state)
+    whole: Trajectory | None = None
+    for stage, system in zip(stages, systems, strict=True):
+        if whole is not None:
+            state = whole.values_at(-1)
+        end = t + stage.duration_s
+        run = simulate(
+            system, end, method, t_start=None if whole is None and state is not None and t_start is None else t,
+            state=state, samples=stage.samples, **settings,
+        )  # fmt: skip
+        whole = run if whole is None else whole.then(run)
+        if not run.finished:
+            break
+        t = end
+    assert whole is not None  # there is a stage
+    return whole
+
+
+def _systems(scene: Scene, stages: Sequence[RunStage]) -> list[System]:
+    """Of all stages, which fit each other; a scene that does not change is compiled once."""
+    if not stages:
+        raise ValueError("there are no stages: give at least one")
+    found: list[System] = []
+    for i, stage in enumerate(stages):
+        if arguments.number(f"stages[{i}].duration_s", stage.duration_s) <= 0.0:
+            raise ValueError(f"stages[{i}] lasts {stage.duration_s:g} s: give a positive duration")
+        if found and found[-1].scene.events:
+            raise NotImplementedError(
+                f"stages[{i - 1}] has events, which change its scene: let events on time do what stages would"
+            )
+        scene = (stage.scene or scene).with_values(stage.values)
+        found.append(found[-1] if found and found[-1].scene == scene else compile(scene))
+        for what, names in (("coordinates", 0), ("speeds", 1)):
+            strange = set(found[i].state_names[names]) ^ set(found[0].state_names[names])
+            if strange:
+                listed = ", ".join(sorted(name for name, _ in strange))
+                raise ValueError(f"stages[{i}] has other {what} than stages[0]: {listed}")
+    return found

@@ -1,0 +1,133 @@
+"""Connectors: laws that are laws, matrices that store or dissipate, ends and coordinates that can move."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from flexmb.scene.check.walk import sound
+from flexmb.scene.connectors import (
+    AlongHinge,
+    AngularFriction,
+    AngularSpring,
+    Bushing,
+    HingeFriction,
+    HingeSpring,
+    LinearFriction,
+    LinearSpring,
+    SpringDamper,
+    by_stem,
+)
+from flexmb.scene.problems import Defect, Place
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import GROUND, coordinate_of
+
+HIGHEST = 4  # coefficients beside the stiffness: a law is a polynomial of degree five at most
+SYMMETRIC = 1e-9  # of the largest entry: matrices printed to ten digits are symmetric, and not negative, this well
+NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", "sliding", "static")
+
+
+def connectors(scene: Scene) -> Iterator[Defect]:
+    """Every connector by itself, and that it acts on something that moves."""
+    for place, connector in sound(scene, "connectors"):
+        yield from _signs(place, connector)
+        match connector:
+            case SpringDamper():
+                yield from _law(place, connector)
+                yield from _one_sided(place, connector)
+                yield from _ends(place, connector)
+            case Bushing():
+                yield from _matrix(place.key("stiffness"), connector.stiffness)
+                yield from _matrix(place.key("damping"), connector.damping)
+                yield from _ends(place, connector)
+            case AngularSpring() | LinearSpring():
+                yield from _law(place, connector)
+                yield from _stops(place, connector)
+            case AngularFriction() | LinearFriction():
+                yield from _friction(place, connector)
+        if isinstance(connector, AlongHinge):
+            try:
+                coordinate_of(scene, connector)
+            except ValueError as error:
+                yield Defect(str(place.key("hinge")), str(error), "name a hinge, and its coordinate as the hinge does")
+
+
+def _signs(place: Place, connector: SpringDamper | Bushing | AlongHinge) -> Iterator[Defect]:
+    for key, (stem, value) in zip(connector.__struct_fields__, by_stem(connector).items(), strict=True):
+        if stem in NOT_NEGATIVE and isinstance(value, float) and value < 0.0:
+            noun = stem.replace("_", " ")
+            yield Defect(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero")
+
+
+def _law(place: Place, connector: SpringDamper | HingeSpring) -> Iterator[Defect]:
+    """A polynomial, or a table of one load for each of several increasing places, not both."""
+    law = by_stem(connector)
+    table, loads, stiffening = law["table"], law["loads"], law["stiffening"]
+    if len(stiffening) > HIGHEST:
+        what = f"{len(stiffening)} coefficients beside the stiffness make a polynomial of degree {len(stiffening) + 1}"
+        yield Defect(str(place.key("stiffening")), what, f"give {HIGHEST} at most, or a table")
+    if law["stiffness"] < 0.0 and not stiffening:
+        what = f"negative stiffness: {law['stiffness']:g}"
+        yield Defect(str(place), what, "give a stiffness of at least zero, or stiffening to hold it together")
+    if not (table or loads):
+        return
+    if law["stiffness"] or law["preload"] or stiffening:
+        yield Defect(str(place), "the law is given twice, by coefficients and by a table", "leave one of them out")
+    if len(table) != len(loads) or len(table) < 2:
+        what = f"the table has {len(table)} places and {len(loads)} loads"
+        yield Defect(str(place), what, "give one load for each place, and two places at least")
+    elif np.any(np.diff(table) <= 0.0):
+        yield Defect(str(place), "the table's places do not increase", "sort the samples and drop repeated places")
+
+
+def _one_sided(place: Place, connector: SpringDamper) -> Iterator[Defect]:
+    if connector.acts == "both":
+        return
+    if connector.table_m or connector.stiffening or connector.stiffness_N_m <= 0.0:
+        what = f'a spring that acts in {connector.acts} only has a constant, positive stiffness'
+        remedy = "write other one-sided laws as a table with loads of zero where the spring is slack"
+        yield Defect(str(place.key("acts")), what, remedy)
+
+
+def _ends(place: Place, connector: SpringDamper | Bushing) -> Iterator[Defect]:
+    if connector.body_a == connector.body_b == GROUND:
+        yield Defect(str(place), "both ends are on the ground", "name a body that moves")
+    a = connector.body_a, connector.node_a, connector.position_a_m
+    if isinstance(connector, SpringDamper) and a == (connector.body_b, connector.node_b, connector.position_b_m):
+        yield Defect(str(place), "both ends are one point, and no line leads from one to the other", "move an end")
+
+
+def _matrix(place: Place, rows: tuple[tuple[float, ...], ...]) -> Iterator[Defect]:
+    matrix = np.array(rows)
+    largest = float(np.max(np.abs(matrix)))
+    if np.max(np.abs(matrix - matrix.T)) > SYMMETRIC * largest:
+        yield Defect(str(place), "the matrix is not symmetric", "give a symmetric one: [rotation; translation]")
+    elif np.min(np.linalg.eigvalsh(matrix)) < -SYMMETRIC * largest:
+        yield Defect(str(place), "the matrix is negative along some displacement", "give one that is not")
+
+
+def _stops(place: Place, connector: HingeSpring) -> Iterator[Defect]:
+    law = by_stem(connector)
+    lower, upper = law["lower"], law["upper"]
+    if lower is not None and upper is not None and not lower < upper:
+        yield Defect(str(place), f"the stops leave nothing between {lower:g} and {upper:g}", "put lower below upper")
+    if (lower is not None or upper is not None) and law["stop_stiffness"] == 0.0:
+        yield Defect(str(place), "the stops have no stiffness", "give one, or leave lower and upper out")
+    if lower is None and upper is None and law["stop_stiffness"] > 0.0:
+        yield Defect(str(place), "there is a stop stiffness, but no stop", "give lower or upper, or leave it out")
+
+
+def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
+    law = by_stem(connector)
+    if law["smoothing"] <= 0.0:
+        what = f"the smoothing speed is {law['smoothing']:g}"
+        yield Defect(str(place), what, "give a positive speed, well below those that matter")
+    if (law["static"] is None) != (law["stribeck"] is None):
+        yield Defect(str(place), "static friction and the Stribeck speed belong together", "give both, or neither")
+    elif law["static"] is not None:
+        if law["static"] < law["sliding"]:
+            what = f"static friction {law['static']:g} is below sliding friction {law['sliding']:g}"
+            yield Defect(str(place), what, "give at least as much")
+        if law["stribeck"] <= 0.0:
+            yield Defect(str(place), f"the Stribeck speed is {law['stribeck']:g}", "give a positive one")

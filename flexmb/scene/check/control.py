@@ -1,0 +1,274 @@
+"""Feedback: signals that exist, sizes that fit, instants that come, no torque that depends on itself at once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any, NamedTuple
+
+from flexmb.scene.bodies import BeamBody, ModalBody
+from flexmb.scene.check.profiles import MOTIONS
+from flexmb.scene.check.walk import entries, suspicious
+from flexmb.scene.columns import alike
+from flexmb.scene.control import (
+    Controller,
+    CoordinateSensor,
+    GainTable,
+    LoadSensor,
+    MarkerSensor,
+    Pid,
+    ProfileSensor,
+    Saturation,
+    Sensor,
+    StateSpace,
+    UserLaw,
+)
+from flexmb.scene.functions import ControlSignal
+from flexmb.scene.hinges import Free, Spherical
+from flexmb.scene.problems import Defect, Place, closest
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import coordinates
+
+REFERENCE = re.compile(r"(?P<name>[^\[\]]+)(?:\[(?P<number>\d+)\])?")
+AT_ONCE = ("acceleration", "angular_acceleration", "specific_force")
+ADDRESS = re.compile(r"[\w.]+:\w[\w.]*")
+
+
+class Named(NamedTuple):
+    """What a reference to a signal names: a sensor or controller, and which of its numbers, None for all."""
+
+    name: str
+    number: int | None
+
+
+def named(reference: str) -> Named | None:
+    """"gyro" or "gyro[2]" taken apart; None for what is neither."""
+    found = REFERENCE.fullmatch(reference)
+    return None if found is None else Named(found["name"], None if found["number"] is None else int(found["number"]))
+
+
+def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
+    """How many numbers a sensor has; None where only compiled bodies know it, or nothing has that name."""
+    match sensor:
+        case CoordinateSensor(of=of, quantity=quantity):
+            return _coordinates(scene, of, quantity == "rate")
+        case MarkerSensor(quantity=quantity):
+            return 4 if quantity == "orientation" else 3
+        case LoadSensor():
+            return 6
+        case ProfileSensor():
+            return 2
+    return 1
+
+
+def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
+    for hinge in scene.hinges:
+        if hinge.name == of:
+            if isinstance(hinge, Free):
+                return 6 if rates else 7
+            if isinstance(hinge, Spherical):
+                return 3 if rates else 4
+            return len(coordinates(hinge))
+    for mass in scene.point_masses:
+        if mass.name == of:
+            return len(coordinates(mass))
+    return 1 if any(wheel.name == of for wheel in scene.wheels) else None
+
+
+def depends_at_once(sensor: Sensor) -> bool:
+    """Whether forces change what it measures without delay: accelerations and loads."""
+    return isinstance(sensor, LoadSensor) or (isinstance(sensor, MarkerSensor) and sensor.quantity in AT_ONCE)
+
+
+def output_width(controller: Controller, inputs: int | None) -> int | None:
+    """How many outputs a controller of so many inputs has."""
+    match controller:
+        case StateSpace(C=C, D=D):
+            return len(C) or len(D)
+        case Pid():
+            return 1
+        case UserLaw(outputs=outputs):
+            return outputs
+        case GainTable():
+            return None if inputs is None else max(1, inputs - 1)
+    return inputs
+
+
+def control(scene: Scene) -> Iterator[Defect]:
+    """All problems of sensors, controllers and signals."""
+    yield from _sensors(scene)
+    widths: dict[str, int | None] = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
+    immediate = {sensor.name for sensor in scene.sensors if depends_at_once(sensor)}
+    later = {controller.name for controller in scene.controllers}
+    for place, controller in entries(scene, "controllers"):
+        inputs: int | None = 0
+        for i, reference in enumerate(controller.inputs):
+            spot = place.key("inputs", i)
+            yield from _reference(spot, reference, widths, later)
+            width = _width(reference, widths)
+            inputs = None if inputs is None or width is None else inputs + width
+        yield from _instants(place, controller)
+        yield from _sizes(place, controller, inputs)
+        yield from _at_once(place, controller, immediate, widths)
+        widths[controller.name] = output_width(controller, inputs)
+    yield from _signals(scene, {each.name: widths[each.name] for each in scene.controllers})
+
+
+def _sensors(scene: Scene) -> Iterator[Defect]:
+    moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
+    moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, BeamBody | ModalBody)]
+    known: dict[Any, tuple[str, str, list[str]]] = {
+        CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
+        MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
+        LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),
+    }
+    for place, sensor in entries(scene, "sensors"):
+        if type(sensor) in known:
+            key, what, names = known[type(sensor)]
+            if getattr(sensor, key) not in names:
+                remedy = closest(getattr(sensor, key), names)
+                yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
+        if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, ControlSignal):
+            remedy = f'let the controller take "{sensor.function.source}" itself'
+            yield Defect(str(place.key("function")), "a signal is no function of time", remedy)
+
+
+def _width(reference: str, widths: dict[str, int | None]) -> int | None:
+    found = named(reference)
+    if found is None or found.name not in widths:
+        return None
+    return widths[found.name] if found.number is None else 1
+
+
+def _reference(place: Place, reference: str, widths: dict[str, int | None], later: set[str]) -> Iterator[Defect]:
+    """A signal that is known here, with such a number."""
+    found = named(reference)
+    if found is None:
+        yield Defect(str(place), f'"{reference}" is no signal', 'write "name", or "name[0]" for one of its numbers')
+    elif found.name not in widths:
+        what = f'there is no sensor or controller "{found.name}"'
+        if found.name in later:
+            what, remedy = f'controller "{found.name}" is listed later', "list a controller before those that read it"
+        else:
+            remedy = closest(found.name, widths)
+        yield Defect(str(place), what, remedy)
+    else:
+        width = widths[found.name]
+        if found.number is not None and width is not None and found.number >= width:
+            remedy = f"its numbers are 0 to {width - 1}"
+            yield Defect(str(place), f'"{found.name}" has no number {found.number}', remedy)
+
+
+def _instants(place: Place, controller: Controller) -> Iterator[Defect]:
+    period = controller.period_s
+    if period is not None and not period > 0.0:
+        yield Defect(str(place.key("period_s")), f"the period is {period:g} s", "give a positive one, or leave it out")
+    for key in ("offset_s", "delay_s"):
+        value = getattr(controller, key)
+        if value < 0.0:
+            yield Defect(str(place.key(key)), f"{key} is {value:g} s", "give a time that is not negative")
+        elif value and period is None:
+            remedy = "give its period_s too: a continuous controller has no instants, and no delay"
+            yield Defect(str(place.key(key)), f'controller "{controller.name}" is continuous', remedy)
+
+
+def _sizes(place: Place, controller: Controller, inputs: int | None) -> Iterator[Defect]:
+    match controller:
+        case StateSpace():
+            yield from _matrices(place, controller, inputs)
+        case Pid():
+            yield from _pid(place, controller, inputs)
+        case Saturation(lower=lower, upper=upper) if not lower <= upper:
+            yield Defect(str(place.key("lower")), f"it is above upper, {upper:g}", "exchange the two")
+        case GainTable(points=points, values=values):
+            if len(points) != len(values) or not points:
+                what = f"there are {len(points)} points and {len(values)} values"
+                yield Defect(str(place.key("values")), what, "give one value for each point, and one point at least")
+            if any(b <= a for a, b in zip(points, points[1:], strict=False)):
+                yield Defect(str(place.key("points")), "the points do not increase", "sort them, each once")
+        case UserLaw(function=function, outputs=outputs):
+            if not ADDRESS.fullmatch(function):
+                remedy = 'write "package.module:function"'
+                yield Defect(str(place.key("function")), f'"{function}" is no name of a function', remedy)
+            if outputs < 1:
+                yield Defect(str(place.key("outputs")), f"it has {outputs} outputs", "give one or more")
+    if inputs == 0 and not isinstance(controller, UserLaw | StateSpace):
+        yield Defect(str(place.key("inputs")), "it has no input", "name a sensor or controller")
+
+
+def _matrices(place: Place, controller: StateSpace, inputs: int | None) -> Iterator[Defect]:
+    n, p = len(controller.A), output_width(controller, inputs)
+    if not p:
+        yield Defect(str(place), "it has no output", "give C, D or both")
+    columns = {"A": n, "B": inputs, "C": n, "D": inputs}
+    rows = {"A": n, "B": n, "C": p if n else 0, "D": len(controller.D) and p}
+    for key in columns:
+        matrix = getattr(controller, key)
+        if len(matrix) != rows[key] and not (key == "B" and inputs == 0 and not matrix):
+            yield Defect(str(place.key(key)), f"it has {len(matrix)} rows", f"give {rows[key]}: A is {n} x {n}")
+        for i, row in enumerate(matrix):
+            if columns[key] is not None and len(row) != columns[key]:
+                what = f"it has {len(row)} columns"
+                yield Defect(str(place.key(key, i)), what, f"give {columns[key]}: one for each of what it multiplies")
+                break
+    if controller.initial and len(controller.initial) != n:
+        what = f"it has {len(controller.initial)} numbers"
+        yield Defect(str(place.key("initial")), what, f"give one for each of the {n} states, or leave it out")
+
+
+def _pid(place: Place, pid: Pid, inputs: int | None) -> Iterator[Defect]:
+    if inputs is not None and inputs not in (0, 1, 2):
+        what = f"its inputs are {inputs} numbers"
+        yield Defect(str(place.key("inputs")), what, "give the measured one, and if it varies the setpoint")
+    if pid.kd and not pid.filter_s and pid.period_s is None:
+        remedy = "give filter_s, a small part of the fastest period of interest; or feed a rate to a state_space"
+        yield Defect(str(place.key("filter_s")), "a continuous derivative needs a filter", remedy)
+    if pid.filter_s < 0.0:
+        yield Defect(str(place.key("filter_s")), f"it is {pid.filter_s:g} s", "give a time that is not negative")
+    if pid.lower is not None and pid.upper is not None and not pid.lower <= pid.upper:
+        yield Defect(str(place.key("lower")), f"it is above upper, {pid.upper:g}", "exchange the two")
+    if pid.tracking_s is not None and not pid.tracking_s > 0.0:
+        yield Defect(str(place.key("tracking_s")), f"it is {pid.tracking_s:g} s", "give a positive time")
+
+
+def _at_once(
+    place: Place, controller: Controller, immediate: set[str], widths: dict[str, int | None]
+) -> Iterator[Defect]:
+    """A continuous output must not depend at once on what it changes at once itself."""
+    if controller.period_s is not None:
+        return
+    column = 0
+    for i, reference in enumerate(controller.inputs):
+        found, width = named(reference), _width(reference, widths)
+        if found is not None and found.name in immediate and not _delays(controller, column, width):
+            what = f'an algebraic loop: "{reference}" changes at once with the output of "{controller.name}"'
+            remedy = "give the controller a period_s, or put a state_space without D in front of it, which filters"
+            yield Defect(str(place.key("inputs", i)), what, remedy)
+        column = column + width if width is not None else column
+
+
+def _delays(controller: Controller, column: int, width: int | None) -> bool:
+    """Whether inputs from this one on reach the outputs through states alone."""
+    if not isinstance(controller, StateSpace) or width is None:
+        return False
+    return not any(any(row[column : column + width]) for row in controller.D)
+
+
+def _signals(scene: Scene, widths: dict[str, int | None]) -> Iterator[Defect]:
+    """Signals name one output of a controller, and drive loads: no motion can follow what jumps."""
+    for place, key, value in suspicious(scene, _with_signals):
+        if not isinstance(value, ControlSignal) or key == "function" and place.path.startswith("$.sensors"):
+            continue
+        yield from _reference(place.key("source"), value.source, widths, set())
+        found = named(value.source)
+        if found is not None and found.number is None and (widths.get(found.name) or 1) > 1:
+            what = f'controller "{found.name}" has {widths[found.name]} outputs'
+            yield Defect(str(place.key("source")), what, f'say which: "{found.name}[0]"')
+        if key in MOTIONS:
+            remedy = "give it as torque_Nm or force_N"
+            yield Defect(str(place), "a controller cannot prescribe a motion", remedy)
+
+
+def _with_signals(items: Any) -> set[int]:
+    return {owner for group in alike(items) if group.kind is ControlSignal for owner in group.owners}
+

@@ -1,0 +1,136 @@
+"""A scene with other values at paths such as "rod.mass_kg" or "bodies.rod.nodes.tip.position_m"."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
+from numbers import Real
+from typing import Any, cast
+
+import msgspec
+
+from flexmb.scene.convert import to_struct
+from flexmb.scene.functions import Function
+from flexmb.scene.problems import SceneError, closest
+from flexmb.scene.reading import Unreadable, parse_toml
+
+EVERY = "*"
+
+
+class PathError(ValueError):
+    """A path that leads to nothing in a scene, or to what cannot be changed so; the message says how far it leads."""
+
+
+def with_values(scene: Any, values: Mapping[str, Any]) -> Any:
+    """The scene with other values; paths go by keys, items of an array by their name, number or `*` for all of them.
+
+    The array that an item is in may be left out where one item alone has that name. A number takes another number,
+    which is whole where it counts something; an array takes one of the same length; what is a structure, as a function
+    of time or nothing (None), takes a structure of the schema or None. PathError names what does not fit. The scene is
+    checked when it is run.
+    """
+    for path, value in values.items():
+        scene = changed_at(scene, path, partial(_replaced, new=value, path=path))
+    return scene
+
+
+def changed_at(scene: Any, path: str, change: Callable[[Any], Any]) -> Any:
+    """The scene with `change` applied where the path leads, in all places of a path with `*`; PathError."""
+    return _changed(scene, _in_full(scene, path), path, change)
+
+
+def number_at(path: str, old: Any, new: float) -> float:
+    """The number `new` in place of `old`, as its kind; PathError where it is none, or not whole and has to be."""
+    if isinstance(old, bool) or not isinstance(old, int | float):
+        remedy = "write it into the scene first" if old is None else "lead the path to a number"
+        raise PathError(f'parameter "{path}" is no number but {type(old).__name__}: {remedy}')
+    if isinstance(old, float):
+        return float(new)
+    if not float(new).is_integer():
+        raise PathError(f'parameter "{path}" counts something: {new:g} is no whole number')
+    return int(new)
+
+
+def _in_full(scene: Any, path: str) -> list[str]:
+    """The steps of a path, with the array that its first item is in."""
+    steps = path.split(".")
+    if steps[0] in scene.__struct_fields__:
+        return steps
+    arrays = {key: [getattr(item, "name", "") for item in getattr(scene, key)] for key in scene.__struct_fields__
+              if isinstance(getattr(scene, key), tuple)}  # fmt: skip
+    found = [key for key, names in arrays.items() if steps[0] in names]
+    if len(found) == 1:
+        return [found[0], *steps]
+    if found:
+        raise PathError(f'parameter "{path}": {" and ".join(found)} have a "{steps[0]}": begin with one of them')
+    known = [*scene.__struct_fields__, *(name for names in arrays.values() for name in names)]
+    raise _no_way(path, steps[0], filter(None, known))
+
+
+def _changed(node: Any, steps: list[str], path: str, change: Callable[[Any], Any]) -> Any:
+    """A part of a scene, changed where `steps` lead."""
+    if not steps:
+        return change(node)
+    step, rest = steps[0], steps[1:]
+    if isinstance(node, msgspec.Struct):
+        if step not in node.__struct_fields__:
+            raise _no_way(path, step, node.__struct_fields__)
+        return msgspec.structs.replace(node, **{step: _changed(getattr(node, step), rest, path, change)})
+    if isinstance(node, tuple):
+        chosen = {index for index, item in enumerate(node) if step in (EVERY, str(index), getattr(item, "name", None))}
+        if not chosen:
+            raise _no_way(path, step, [getattr(item, "name", str(index)) for index, item in enumerate(node)])
+        return tuple(_changed(item, rest, path, change) if i in chosen else item for i, item in enumerate(node))
+    raise PathError(f'parameter "{path}": nothing lies below {step}, as {node!r} has no parts: end the path before it')
+
+
+def _replaced(old: Any, new: Any, path: str) -> Any:
+    """`new` in place of `old`, of the same kind."""
+    if old is None or isinstance(old, msgspec.Struct):
+        return _structure(old, new, path)
+    if isinstance(old, tuple):
+        return _array(old, new, path)
+    if isinstance(old, str):
+        if not isinstance(new, str):
+            raise PathError(f'parameter "{path}" is a word: give one, not {new!r}')
+        return new
+    if isinstance(new, bool) or not isinstance(new, Real):
+        raise PathError(f'parameter "{path}" is a number: give one, not {new!r}')
+    return number_at(path, old, float(new))
+
+
+def _structure(old: Any, new: Any, path: str) -> Any:
+    """A structure, or a function of time as a file writes it."""
+    if new is None or isinstance(new, msgspec.Struct):
+        return new
+    if isinstance(new, dict) and (old is None or isinstance(old, Function)):
+        try:
+            return to_struct(new, cast(type, Function))
+        except SceneError as error:
+            raise PathError(f'parameter "{path}": {"; ".join(map(str, error.problems))}') from None
+    what = "nothing" if old is None else "a structure"
+    raise PathError(f'parameter "{path}" is {what}: give a structure of the schema or None, or a longer path')
+
+
+def _array(old: tuple[Any, ...], new: Any, path: str) -> tuple[Any, ...]:
+    if isinstance(new, str) or not isinstance(new, Sequence) and not hasattr(new, "tolist"):
+        raise PathError(f'parameter "{path}" is an array: give one, not {new!r}')
+    given = list(new)
+    if len(given) != len(old):
+        raise PathError(f'parameter "{path}" has {len(old)} entries, not {len(given)}: give as many')
+    return tuple(_replaced(a, b, path) for a, b in zip(old, given, strict=True))
+
+
+def _no_way(path: str, step: str, known: Iterable[str]) -> PathError:
+    return PathError(f'parameter "{path}": there is no "{step}": {closest(step, known)}')
+
+
+def parsed(assignment: str) -> tuple[str, Any]:
+    """Path and value of a word of a command line, `rod.mass_kg=2.0`; the value is written as in TOML. PathError."""
+    path, equals, text = assignment.partition("=")
+    if not equals:
+        raise PathError(f'"{assignment}" sets nothing: write name=value, such as rod.mass_kg=2.0')
+    try:
+        return path.strip(), parse_toml(f"value = {text}")["value"]
+    except Unreadable as problem:
+        raise PathError(f'"{assignment}": the value is not written as in TOML: {problem}') from None

@@ -1,0 +1,116 @@
+"""Where hinges, closures and nodes are at the state that a workspace was last filled for, World axes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from flexmb.building.links import Side, closure_sides
+from flexmb.modal.flexible_model import FlexibleNode
+from flexmb.scene.quaternions import rotation_by, rotation_matrix
+from flexmb.scene.tree import GROUND
+from flexmb.tables.arrays import Workspace
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+
+
+class Pose(NamedTuple):
+    """rotation (3,3) R_World_frame, position (3,) m of the frame's origin."""
+
+    rotation: Real
+    position: Real
+
+
+class HingeFrames(NamedTuple):
+    """Axes (3,3) of the inboard and outboard hinge frames, R_World_frame, and the outboard hinge point (3,) m."""
+
+    inboard: Real
+    outboard: Real
+    point: Real
+
+
+AT_GROUND = Pose(np.eye(3), np.zeros(3))
+
+
+def link_pose(w: Workspace, k: int) -> Pose:
+    """Of the frame in which the dynamics sees body k; -1 is the ground."""
+    if k < 0:
+        return AT_GROUND
+    return Pose(w.body["pose_rotation"][k].reshape(3, 3), w.body["pose_position"][k])
+
+
+def body_pose(system: System, w: Workspace, k: int) -> Pose:
+    """Of the frame of body k as the scene has it, undeformed."""
+    pose, at = link_pose(w, k), system._links[k].outboard
+    if at.deforms:
+        return pose
+    rotation = pose.rotation @ at.frame.T
+    return Pose(rotation, pose.position - rotation @ at.origin)
+
+
+def node_pose(system: System, w: Workspace, body: str, node: str) -> Pose:
+    """Of a node, which moves with the deformation; ValueError where there is no such body or node."""
+    if body == GROUND:
+        return AT_GROUND
+    names = system.body_names
+    if body not in names:
+        raise ValueError(f'there is no body "{body}"; there are {", ".join([GROUND, *names])}')
+    k = names.index(body)
+    try:
+        at = system._links[k].node(node)
+    except (KeyError, ValueError) as error:
+        raise ValueError(f'body "{body}" has no node "{node}"') from error
+    pose = link_pose(w, k)
+    turn, position = deformed(at, w.eta[k, : system._links[k].mode_count])
+    return Pose(pose.rotation @ turn, pose.position + pose.rotation @ position)
+
+
+def deformed(at: FlexibleNode, eta: Real) -> tuple[Real, Real]:
+    """Rotation (3,3) node -> link and position (3,) of a node of a link with modal coordinates eta (m,)."""
+    position, theta = at.position + at.translation @ eta, at.rotation_modes @ eta
+    if at.second is not None:
+        position = position + 0.5 * np.einsum("amn,m,n->a", at.second.translation, eta, eta)
+        theta = theta + 0.5 * np.einsum("amn,m,n->a", at.second.rotation, eta, eta)
+    return rotation_by(theta) @ at.rotation, position
+
+
+def hinge_frames(system: System, w: Workspace) -> dict[str, HingeFrames]:
+    """Of every hinge and point mass, and of closures: frames A and B, and the origin of B."""
+    found = {link.hinge.name: hinge_frames_of(system, w, k) for k, link in enumerate(system._links)}
+    closures = enumerate(system.scene.closures)
+    return found | {closure.name: closure_frames_of(system, w, i) for i, closure in closures}
+
+
+def closure_frames_of(system: System, w: Workspace, i: int) -> HingeFrames:
+    """Frames A and B of closure i, and the origin of B."""
+    sides = closure_sides(system.scene.closures[i])
+    a, b = (_of_side(w, sides[j], *system._closure_ports[2 * i + j]) for j in range(2))
+    return HingeFrames(a.rotation, b.rotation, b.position)
+
+
+def hinge_frames_of(system: System, w: Workspace, k: int) -> HingeFrames:
+    """Of the hinge of body k. The dynamics turns both frames so that a hinge axis is z: turned back here."""
+    body, back = system.constants.body[k], system._links[k].turn.T
+    parent, own = link_pose(w, int(body["parent"])), link_pose(w, k)
+    inward, outward = int(body["inboard_port"]), int(body["outboard_port"])
+    placed = body["placement_rotation"].reshape(3, 3) if inward < 0 else _port(w, inward)[0]
+    turn, arm = (np.eye(3), np.zeros(3)) if outward < 0 else _port(w, outward)
+    return HingeFrames(
+        parent.rotation @ placed @ back, own.rotation @ turn @ back, own.position + own.rotation @ arm
+    )
+
+
+def _of_side(w: Workspace, side: Side, body: int, port: int) -> Pose:
+    """Frame A or B of a closure; -1 for a body is the ground, whose side has no port."""
+    if body < 0:
+        return Pose(rotation_matrix(side.quaternion), np.array(side.offset, float))
+    pose, (turn, arm) = link_pose(w, body), _port(w, port)
+    return Pose(pose.rotation @ turn @ side.turn.T, pose.position + pose.rotation @ arm)
+
+
+def _port(w: Workspace, port: int) -> tuple[Real, Real]:
+    """Rotation (3,3) port -> link and position (3,) of a port of a link."""
+    return w.port["R"][port].reshape(3, 3), w.port["r"][port]

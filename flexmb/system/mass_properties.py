@@ -1,0 +1,95 @@
+"""Mass, mass centre and inertia of bodies with what they carry, at a state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flexmb.modal.cross import cross_matrix
+from flexmb.system.frames import AT_GROUND, body_pose, link_pose
+from flexmb.tables.arrays import Workspace
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.system.tree_system import System
+
+
+@dataclass(frozen=True, eq=False)
+class MassProperties:
+    """Of everything as if it were rigid where it is, wheels and point masses included.
+
+    mass kg; centre (3,) m, World; inertia (3,3) kg m² about the centre, World axes. The frame of the body, World for a
+    whole scene: rotation (3,3) R_World_body and origin (3,) m.
+    """
+
+    mass: float
+    centre: Real
+    inertia: Real
+    rotation: Real
+    origin: Real
+
+    @property
+    def centre_in_body(self) -> Real:
+        """Mass centre (3,) m in the body's frame."""
+        return self.rotation.T @ (self.centre - self.origin)
+
+    @property
+    def inertia_in_body(self) -> Real:
+        """Inertia (3,3) kg m² about the mass centre, body axes."""
+        return self.rotation.T @ self.inertia @ self.rotation
+
+    def about(self, point: Real) -> Real:
+        """Inertia (3,3) kg m² about a point (3,) m of World, World axes."""
+        arm = cross_matrix(self.centre - np.asarray(point, float))
+        return self.inertia - self.mass * arm @ arm
+
+    @cached_property
+    def principal(self) -> tuple[Real, Real]:
+        """Moments (3,) kg m², ascending, and their axes (3,3) in its columns, World, right-handed."""
+        moments, axes = np.linalg.eigh(self.inertia)
+        return moments, axes * np.array([1.0, 1.0, np.sign(np.linalg.det(axes))])
+
+
+def mass_properties(system: System, w: Workspace, inertias: Real, body: str | None) -> MassProperties:
+    """Of a body and all that it carries, or of all bodies: inertias (N,21) of links, which are where `w` has them."""
+    names, parent = system.body_names, system.constants.body["parent"]
+    if body is None:
+        counted, frame = list(range(len(names))), AT_GROUND
+    elif body in names:
+        first = names.index(body)
+        counted, frame = _carried(parent.tolist(), first), body_pose(system, w, first)
+    else:
+        raise ValueError(f'there is no body "{body}"; there are {", ".join(names)}')
+    found = zip(*(_of_link(inertias[k]) for k in counted), strict=True)
+    mass, first_moment, inertia = (np.array(each) for each in found)
+    poses = [link_pose(w, k) for k in counted]
+    R, origins = np.array([pose.rotation for pose in poses]), np.array([pose.position for pose in poses])
+    own = np.divide(first_moment, mass[:, None], out=np.zeros_like(first_moment), where=mass[:, None] > 0.0)
+    centres = origins + np.einsum("kab,kb->ka", R, own)
+    total = float(np.sum(mass))
+    centre = mass @ centres / total if total > 0.0 else frame.position.copy()
+    # Each about its own centre first: far from the World's origin, nothing is left of a difference of squares.
+    own_arm, arm = cross_matrix(own), cross_matrix(centres - centre)
+    about_own = inertia + mass[:, None, None] * own_arm @ own_arm
+    turned = R @ about_own @ np.swapaxes(R, 1, 2) - mass[:, None, None] * arm @ arm
+    return MassProperties(total, centre, np.sum(turned, axis=0), frame.rotation.copy(), frame.position.copy())
+
+
+def _carried(parent: list[int], first: int) -> list[int]:
+    """A body and all that it carries: parents stand before their children, point masses behind all bodies."""
+    found = {first}
+    for k in range(first + 1, len(parent)):
+        if parent[k] in found:
+            found.add(k)
+    return sorted(found)
+
+
+def _of_link(inertia: Real) -> tuple[float, Real, Real]:
+    """Mass, first moment (3,) and inertia about the origin (3,3) of a rigid inertia's 21 numbers."""
+    xx, yy, zz, xy, xz, yz = inertia[:6]
+    coupling = inertia[6:15]
+    s = np.array([coupling[7], coupling[2], coupling[3]])
+    return float(inertia[15]), s, np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])

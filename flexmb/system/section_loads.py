@@ -1,0 +1,242 @@
+"""Loads across the sections of a beam, by the momentum balance of the part beyond each: modes' stiffness is not asked.
+
+What acts on the part of a beam beyond x is what its points' accelerations need, less gravity, loads at nodes, wheels,
+connectors, and what outboard bodies and closures leave there; the rest is transmitted by the section. In statics this
+is exact with any number of modes, and at the root it is the load across the hinge. Forces by the modes' curvature
+converge slowly, if at all: no clamped eigenmode has a shear force at its tip.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from flexmb.building.connector_arrays import between_nodes
+from flexmb.building.links import closure_sides
+from flexmb.modal.beam_sections import beam_sections
+from flexmb.modal.flexible_model import SecondOrder
+from flexmb.scene.bodies import BeamBody
+from flexmb.scene.quaternions import rotation_by
+from flexmb.scene.tree import node_frame
+from flexmb.system.frames import Pose, body_pose, closure_frames_of, hinge_frames_of, link_pose
+from flexmb.system.turning_points import turning
+from flexmb.tables import arguments
+from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.system.observables import Evaluation
+    from flexmb.system.tree_system import System
+
+
+@dataclass(frozen=True, eq=False)
+class SectionLoads:
+    """Loads across the sections at x (X,) m of a beam, of one state or of T times.
+
+    load (...,X,6) [torque; force] of the part before the section on the part beyond it (toward x = length), about the
+    deformed axis there, in axes that turn with the section: as across a hinge. What sits at x itself counts as beyond.
+    The properties below have the signs of structures: what the part beyond exerts on the face that looks along +x, so
+    that tension is positive. EA (X,) N, EIy, EIz, GJ (X,) N m² are the beam's there.
+    """
+
+    body: str
+    x: Real
+    load: Real
+    EA: Real
+    EIy: Real
+    EIz: Real
+    GJ: Real
+
+    @property
+    def axial(self) -> Real:
+        """(...,X) N, positive in tension."""
+        return 0.0 - self.load[..., 3]
+
+    @property
+    def shear(self) -> Real:
+        """(...,X,2) N along the section's y and z."""
+        return 0.0 - self.load[..., 4:]
+
+    @property
+    def torsion(self) -> Real:
+        """(...,X) N m about the section's x."""
+        return 0.0 - self.load[..., 0]
+
+    @property
+    def bending(self) -> Real:
+        """(...,X,2) N m about the section's y and z."""
+        return 0.0 - self.load[..., 1:3]
+
+    def normal_stress(self, E: float, y: float, z: float) -> Real:
+        """(...,X) Pa, tension positive, in the fibre at y, z (m) of the section, with Young's modulus E (Pa).
+
+        E times the strain N/EA + z My/EIy - y Mz/EIz.
+        """
+        E, y, z = arguments.number("E", E), arguments.number("y", y), arguments.number("z", z)
+        bending = z * self.bending[..., 0] / self.EIy - y * self.bending[..., 1] / self.EIz
+        return E * (self.axial / self.EA + bending)
+
+    def torsion_stress(self, G: float, r: float) -> Real:
+        """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ."""
+        return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
+
+
+class _Outer(NamedTuple):
+    """What acts on the part beyond some of the cuts besides inertia: on the parts beyond the first `beyond` cuts."""
+
+    beyond: int
+    wrench: Real  # (6,) [torque about the body's origin; force], body axes
+
+
+class SectionBalance:
+    """Section loads of one beam of a system at fixed cuts, state by state."""
+
+    def __init__(self, system: System, body: str, x: Any) -> None:
+        self._system, self.body = system, body
+        self._beam = _beam(system, body)
+        cuts = arguments.finite("x", np.atleast_1d(arguments.array("x", x)))
+        if cuts.ndim != 1 or np.any(cuts < 0.0) or np.any(cuts > self._beam.length_m):
+            raise ValueError(f'x: give positions from 0 to {self._beam.length_m:g} m along beam "{body}", in a row')
+        self.x = cuts
+        self._cuts, self._places = np.unique(cuts, return_inverse=True)
+        self._k = system.body_names.index(body)
+        self._outboard = np.flatnonzero(system.constants.body["parent"] == self._k).tolist()
+        self.sections = beam_sections(self._beam, self._cuts)
+
+    def at(self, t: float, y: Real) -> Real:
+        """Loads (X,6) as `SectionLoads` has them at y = [q, u, work]."""
+        system, k = self._system, self._k
+        found = system._all_loads(t, y)
+        w = system._w
+        pose = body_pose(system, w, k)
+        m = system._links[k].mode_count
+        eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
+        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
+        for outer in self._outer(w, pose, found):
+            needed[: outer.beyond] -= outer.wrench
+        return self._in_sections(needed, eta)[self._places]
+
+    def loads(self, values: Real) -> SectionLoads:
+        """Loads (...,X,6) with what belongs to them."""
+        s, p = self.sections, self._places
+        return SectionLoads(self.body, self.x, values, s.EA[p], s.EIy[p], s.EIz[p], s.GJ[p])
+
+    def _inertial(self, motion: _Motion, eta: Real, etad: Real, etadd: Real) -> Real:
+        """(X,6) rate of momentum, less gravity, of the parts beyond each cut, about the body's origin, body axes."""
+        s, points = self.sections, self.sections.points
+        w, alpha, a = motion
+        r, v, bend = _field(points.translation, s.second, "translation", eta, etad, etadd)
+        r = points.position + r
+        acceleration = a + np.cross(alpha, r) + np.cross(w, np.cross(w, r)) + 2.0 * np.cross(w, v) + bend
+        torque = np.zeros_like(r)
+        if np.any(points.com_offset) or np.any(points.inertia):
+            R, spin, spin_rate = turning(*_field(points.rotation, s.second, "rotation", eta, etad, etadd))
+            omega, turn = w + spin, alpha + spin_rate + np.cross(w, spin)
+            arm = np.einsum("nab,nb->na", R, points.com_offset)
+            J = R @ points.inertia @ np.swapaxes(R, 1, 2)
+            r = r + arm
+            acceleration += np.cross(turn, arm) + np.cross(omega, np.cross(omega, arm))
+            torque = np.einsum("nab,nb->na", J, turn) + np.cross(omega, np.einsum("nab,nb->na", J, omega))
+        force = points.mass[:, None] * acceleration
+        each = np.hstack([np.cross(r, force) + torque, force])
+        between = np.zeros((len(s.x) + 1, 6))
+        np.add.at(between, s.beyond, each)
+        return np.cumsum(between[::-1], axis=0)[::-1][1:]
+
+    def _outer(self, w: Workspace, pose: Pose, exerted: Evaluation) -> list[_Outer]:
+        """All that others exert on the beam, with where along it."""
+        system, k, scene = self._system, self._k, self._system.scene
+        loads, wheels = exerted.loads, exerted.wheel_loads
+        constants = system.constants
+        found: list[_Outer] = []
+
+        def add(node: str, torque: Real, force: Real, point: Real, *, at: bool = True) -> None:
+            x = node_frame(self._beam, node).position[0]
+            beyond = int(np.searchsorted(self._cuts, x, side="right" if at else "left"))
+            about = torque + np.cross(point - pose.position, force)
+            found.append(_Outer(beyond, np.concatenate([pose.rotation.T @ about, pose.rotation.T @ force])))
+
+        own = system._links[k]
+        load = loads[own.hinge.name]  # a section at the hinge itself transmits its load: the hinge is not beyond
+        add(own.outboard_end.node, load[:3], load[3:], hinge_frames_of(system, w, k).point, at=False)
+        for j in self._outboard:
+            link, load = system._links[j], loads[system._links[j].hinge.name]
+            add(link.inboard_end.node, -load[:3], -load[3:], hinge_frames_of(system, w, j).point)
+        carrier = link_pose(w, k)
+        rows = range(int(constants.body[k]["wheel_start"]), int(constants.body[k]["wheel_stop"]))
+        for wheel, row in zip((each for each in scene.wheels if each.body == self.body), rows, strict=True):
+            centre = carrier.position + carrier.rotation @ w.port["r"][constants.wheel[row]["port"]]
+            add(wheel.node, -wheels[wheel.name][:3], -wheels[wheel.name][3:], centre)
+        rows = range(int(constants.body[k]["load_start"]), int(constants.body[k]["load_stop"]))
+        for load_of, row in zip((each for each in scene.loads if each.body == self.body), rows, strict=True):
+            table = constants.load[row]
+            port, value = table["port"], w.function[table["function"], 0] * table["direction"]
+            if table["frame"] == NODE_AXES:
+                value = carrier.rotation @ w.port["R"][port].reshape(3, 3) @ value
+            point, none = carrier.position + carrier.rotation @ w.port["r"][port], np.zeros(3)
+            torque, force = (value, none) if table["type"] == TORQUE else (none, value)
+            add(load_of.node, torque, force, point)
+        for i, connector in enumerate(between_nodes(scene)):
+            load, (body_b, port_b) = exerted.connectors[connector.name], constants.end[i][["body", "port"]][1]
+            on = link_pose(w, int(body_b))
+            point = constants.end[i]["position"][1] if body_b < 0 else on.position + on.rotation @ w.port["r"][port_b]
+            for node, body, sign in (
+                (connector.node_a, connector.body_a, -1.0), (connector.node_b, connector.body_b, 1.0),
+            ):  # fmt: skip
+                if body == self.body:
+                    add(node, sign * load[:3], sign * load[3:], point)
+        for i, closure in enumerate(scene.closures):
+            for side, sign in zip(closure_sides(closure), (-1.0, 1.0), strict=True):
+                if side.body == self.body:
+                    load = sign * loads[closure.name]
+                    add(side.node, load[:3], load[3:], closure_frames_of(system, w, i).point)
+        return found
+
+    def _in_sections(self, wrench: Real, eta: Real) -> Real:
+        """(X,6) about the body's origin, body axes, to the deformed sections and their axes."""
+        s, none = self.sections, np.zeros_like(eta)
+        axis = _field(s.motion[:, :3], s.second_motion, "translation", eta, none, none)[0]
+        theta = _field(s.motion[:, 3:], s.second_motion, "rotation", eta, none, none)[0]
+        axis[:, 0] += s.x
+        torque = wrench[:, :3] - np.cross(axis, wrench[:, 3:])
+        R = rotation_by(theta)
+        return np.hstack([np.einsum("nba,nb->na", R, each) for each in (torque, wrench[:, 3:])])
+
+
+class _Motion(NamedTuple):
+    """Angular velocity, angular acceleration, acceleration of the origin less gravity (3,) of a body, its own axes."""
+
+    omega: Real
+    alpha: Real
+    acceleration: Real
+
+
+def _motion_in(pose: Pose, link: Pose, w: Workspace, k: int) -> _Motion:
+    """The motion of body k in the scene's frame of it, from that of the frame of its link."""
+    turn = pose.rotation.T @ link.rotation
+    r = link.rotation.T @ (pose.position - link.position)
+    omega, (alpha, a) = w.body["velocity"][k, :3], w.body["accel"][k].reshape(2, 3)
+    at_origin = a + np.cross(alpha, r) + np.cross(omega, np.cross(omega, r))
+    return _Motion(turn @ omega, turn @ alpha, turn @ at_origin)
+
+
+def _field(
+    shapes: Real, second: SecondOrder | None, part: str, eta: Real, etad: Real, etadd: Real
+) -> tuple[Real, Real, Real]:
+    """Value, rate and second rate (n,3) of shapes (n,3,m) and, where there is one, a part of a second-order field."""
+    value, rate, again = shapes @ eta, shapes @ etad, shapes @ etadd
+    if second is not None:
+        G = getattr(second, part)
+        by_eta = G @ eta
+        value, rate = value + 0.5 * by_eta @ eta, rate + by_eta @ etad
+        again = again + G @ etad @ etad + by_eta @ etadd
+    return value, rate, again
+
+
+def _beam(system: System, body: str) -> BeamBody:
+    beams = {each.name: each for each in system.scene.bodies if isinstance(each, BeamBody)}
+    if body not in beams:
+        raise ValueError(f'"{body}" is no beam of the scene; these are: {", ".join(beams) or "none"}')
+    return beams[body]

@@ -1,0 +1,154 @@
+"""What a guest among the engines cannot represent is not applicable; nobody else may refuse, and nobody do nothing."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from rich.console import Console
+
+from crosscheck.judging.outcome import SessionOutcome
+from crosscheck.library.accepted import Figure, key
+from crosscheck.records.kinds import RunRecord
+from crosscheck.report.ci import write_junit, write_summary
+from crosscheck.terminal.verbosity import Verbosity
+from crosscheck.terminal.verdicts import print_outcome
+from tests.crosscheck.made_records import ONE_PAIR, TIP, ended, judged, ladder, way
+
+PAIR = [*ladder("one", {TIP: way()}), *ladder("two", {TIP: way()})]
+VELOCITY = "marker:tip.velocity"
+BOTH = ONE_PAIR.replace("marker:tip.position", "marker")
+THREE = ("one", "two", "guest")
+
+
+def without_result(engine: str, status: str = "refused", why: str = "it has no hinges") -> RunRecord:
+    return ended(ladder(engine, {TIP: way()})[-1], status, why, effort="", times=None, channels={})
+
+
+def junit(outcome: SessionOutcome, folder: Path) -> ElementTree.Element:
+    write_junit(outcome, folder / "junit.xml")
+    root = ElementTree.parse(folder / "junit.xml").getroot()
+    for what in ("failure", "skipped"):
+        attribute = "failures" if what == "failure" else what
+        assert sum(int(suite.get(attribute, "0")) for suite in root) == len(root.findall(f".//{what}"))
+    return root
+
+
+def told(outcome: SessionOutcome, verbosity: Verbosity = Verbosity.NORMAL) -> tuple[int, str]:
+    """The exit code, and what the terminal shows."""
+    text = io.StringIO()
+    return print_outcome(Console(file=text, width=200), outcome, verbosity), text.getvalue()
+
+
+def test_a_guest_that_refuses_is_listed_once_and_is_no_verdict() -> None:
+    elsewhere = judged(ONE_PAIR, [*PAIR, *ladder("guest", {TIP: way()})], asked=THREE)
+    assert (len(elsewhere.all), elsewhere.ok) == (3, True)
+    outcome = judged(ONE_PAIR, [*PAIR, without_result("guest")], asked=THREE)
+    (apart,) = outcome.inapplicable
+    assert (apart.engine, apart.where, apart.reason) == ("guest", "rigid", "it has no hinges")
+    assert (len(outcome.all), outcome.absences, outcome.unexpected) == (1, [], [])
+    assert outcome.never_applicable == {"guest": ["made/made"]}
+
+
+def test_a_guest_that_is_compared_elsewhere_leaves_the_session_green(tmp_path: Path) -> None:
+    """It has two variants here, and refuses one of them."""
+    text = ONE_PAIR + ONE_PAIR.replace('"rigid"', '"slow"').replace('"both"', '"again"')
+    slow = [*ladder("one", {TIP: way()}, variant="slow"), *ladder("two", {TIP: way()}, variant="slow")]
+    guest = [*ladder("guest", {TIP: way()}), without_result("guest")]
+    guest[-1] = ended(guest[-1], "refused", "too slow", variant="slow")
+    outcome = judged(text, [*PAIR, *slow, *guest], asked=("guest",))
+    assert (len(outcome.all), outcome.ok, outcome.never_applicable) == (2, True, {})
+    root = junit(outcome, tmp_path)
+    (skipped,) = (test for test in root.iter("testcase") if test.find("skipped") is not None)
+    assert skipped.get("name") == "slow by guest"
+    assert skipped.find("skipped").get("message") == "not applicable: too slow"  # type: ignore[union-attr]
+    write_summary(outcome, tmp_path / "summary.md")
+    assert "## Not applicable\n\n- made/made, slow, guest: too slow" in (tmp_path / "summary.md").read_text()
+    code, text = told(outcome, Verbosity.VERBOSE)
+    assert code == 0 and "made/made, slow, guest not applicable: too slow" in text
+
+
+def test_who_was_asked_for_and_compared_in_nothing_is_red(tmp_path: Path) -> None:
+    outcome = judged(ONE_PAIR, [*PAIR, without_result("guest")], asked=THREE)
+    assert (outcome.ok, outcome.uncompared) == (False, ["guest"])
+    assert outcome.headline == "guest was asked for and compared in nothing"
+    (failure,) = junit(outcome, tmp_path).findall(".//failure")
+    assert failure.get("message") == "it was asked for and compared in nothing"
+    code, text = told(outcome)
+    assert code == 1 and "✕ guest was asked for and compared in nothing: made/made: it has no hinges" in text
+    assert "1 agree, guest not applicable in 1" in text
+    only = judged(ONE_PAIR, [*PAIR, without_result("guest")], asked=("guest",))
+    assert (only.ok, only.all, only.idle) == (False, [], [])
+    assert only.headline == "Nothing was compared: guest was asked for and compared in nothing"
+    assert len(junit(only, tmp_path).findall(".//failure")) == 1
+
+
+def test_an_engine_that_the_case_names_beside_its_comparisons_only_is_compared_in_nothing() -> None:
+    beside = ONE_PAIR.replace('engines = ["one", "two"]', 'engines = ["one", "two"]\nalso = ["three"]', 1)
+    runs = [*PAIR, *ladder("three", {TIP: way()})]
+    assert judged(beside, runs).ok
+    assert judged(beside, runs, asked=("one", "two", "three")).uncompared == ["three"]
+
+
+@pytest.mark.parametrize("status", ["failed", "crashed", "did not finish", "did not run", "diverged"])
+def test_only_a_refusal_is_not_applicable(status: str) -> None:
+    outcome = judged(ONE_PAIR, [*PAIR, without_result("guest", status)], asked=THREE)
+    assert (outcome.ok, outcome.inapplicable, len(outcome.unexpected)) == (False, (), 2)
+
+
+def test_an_engine_that_the_case_names_may_not_refuse() -> None:
+    runs = [*PAIR[:3], without_result("two"), *ladder("guest", {TIP: way()})]
+    outcome = judged(ONE_PAIR, runs, asked=("guest",))
+    assert [verdict.status for verdict in outcome.unexpected] == ["refused"]
+    both = judged(ONE_PAIR, [*PAIR[:3], without_result("two"), without_result("guest")], asked=("guest",))
+    assert [verdict.engine_a for verdict in both.unexpected] == ["two"]
+
+
+@pytest.mark.parametrize("status", ["crashed", "failed", "did not run"])
+def test_a_partner_that_breaks_down_is_not_hidden_by_a_guest_that_refuses(status: str) -> None:
+    runs = [*PAIR[:3], without_result("two", status), without_result("guest")]
+    assert {verdict.status for verdict in judged(ONE_PAIR, runs, asked=("guest",)).unexpected} == {status}
+
+
+def test_a_channel_that_a_guest_does_not_offer_is_not_applicable_and_told_once() -> None:
+    two = [ladder(engine, {TIP: way(), VELOCITY: way()}) for engine in ("one", "two")]
+    outcome = judged(BOTH, [*two[0], *two[1], *ladder("guest", {TIP: way()})], asked=THREE)
+    assert (outcome.ok, len(outcome.all)) == (True, 4)
+    (apart,) = outcome.inapplicable
+    assert (apart.where, apart.reason) == (f"rigid, {VELOCITY}", "guest does not offer it")
+    named = judged(BOTH, [*two[0], *ladder("two", {TIP: way()}), *ladder("guest", {TIP: way()})], asked=THREE)
+    assert {verdict.pair for verdict in named.unexpected} == {"one – two"}
+
+
+def test_what_no_guest_offers_is_not_applicable_to_them() -> None:
+    text = ONE_PAIR.replace('goals = {', 'goals = { "drive" = 1e-3,')
+    guests = [*ladder("guest", {TIP: way()}), *ladder("second", {TIP: way()})]
+    outcome = judged(text, guests, asked=("guest", "second"))
+    assert (outcome.ok, len(outcome.all)) == (True, 1)
+    assert [(each.engine, each.channel) for each in outcome.inapplicable] == [("guest", "drive"), ("second", "drive")]
+    mixed = judged(text, [*ladder("one", {TIP: way()}), *ladder("guest", {TIP: way()})], asked=("one", "guest"))
+    assert [(verdict.channel, verdict.status) for verdict in mixed.unexpected] == [("drive", "did not run")]
+
+
+def test_a_guest_with_accepted_figures_is_expected_to_go_on() -> None:
+    accepted = {"both": {key(TIP, ("one", "rigid"), ("guest", "rigid")): Figure(1e-6, 1e-4)}}
+    outcome = judged(ONE_PAIR, [*PAIR, without_result("guest")], accepted, asked=THREE)
+    assert (outcome.inapplicable, {verdict.status for verdict in outcome.unexpected}) == ((), {"refused"})
+
+
+def test_a_recipe_without_reference_is_told_and_with_strict_an_error(tmp_path: Path) -> None:
+    outcome = judged(ONE_PAIR, PAIR, unreferenced=True)
+    assert (outcome.ok, outcome.unreferenced) == (True, ("made/made",))
+    said = "made/made has a recipe of a reference, no reference yet: crosscheck regenerate made/made"
+    assert f"! {said}" in told(outcome)[1]
+    (skipped,) = junit(outcome, tmp_path).findall(".//skipped")
+    assert skipped.get("message") == said
+    write_summary(outcome, tmp_path / "summary.md")
+    assert f"## No stored reference\n\n- {said}" in (tmp_path / "summary.md").read_text()
+    accepted = {"both": {key(TIP, ("one", "rigid"), ("two", "rigid")): Figure(1e-3, 1e-3)}}
+    strict = judged(ONE_PAIR, PAIR, accepted, strict=True, unreferenced=True)
+    assert (strict.ok, strict.headline) == (False, "1 case has a recipe and no reference")
+    assert told(strict)[0] == 1 and len(junit(strict, tmp_path).findall(".//failure")) == 1
+    assert judged(ONE_PAIR, PAIR, accepted, strict=True).ok

@@ -1,0 +1,118 @@
+"""Linear models of closed loops, and what small motions make of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.linalg import expm
+
+import flexmb as fm
+from tests.flexmb.control.scenes import INERTIA, pendulum, rotor, tossed
+
+SMALL = 1e-4  # rad: about an equilibrium that is symmetric, what is not linear is 1e-8 of it
+HANGING = np.pi / 2
+ONE = fm.ProfileSensor(name="one", function=fm.Constant(value=1.0))
+
+
+def test_the_closed_loop_has_the_poles_of_its_equations() -> None:
+    """PID: J s^2 = -(kp + ki / s + kd s / (1 + tau s))."""
+    kp, ki, kd, tau = 4.0, 2.0, 1.0, 0.1
+    law = fm.Pid(name="law", inputs=("angle",), kp=kp, ki=ki, kd=kd, filter_s=tau)
+    model = fm.linearize(rotor(law))
+    poles = np.roots([INERTIA * tau, INERTIA, kp * tau + kd, kp + ki * tau, ki])
+    assert np.sort_complex(model.eigenvalues) == pytest.approx(np.sort_complex(poles), rel=1e-9)
+    assert [name for name, _ in model.states[2:]] == ["law.state[0]", "law.state[1]"]
+    assert model.C.shape == (len(model.outputs), 4)
+
+
+def test_a_small_motion_follows_the_closed_loop() -> None:
+    """Of a double pendulum about where it hangs, with a lag in its loop."""
+    law = fm.StateSpace(
+        name="law", inputs=("angle", "rate", "one[0]"), A=((-2.0,),), B=((1.0, 0.5, -HANGING),), C=((-3.0,),)
+    )
+    system = fm.compile(pendulum(ONE, law, torque=fm.ControlSignal(source="law")).scene())
+    model = fm.linearize(system, system.state(np.array([HANGING, 0.0]), np.zeros(2)))
+    assert model.rates == pytest.approx([0.0, 0.0], abs=1e-12)
+    start = np.array([SMALL, -SMALL, 0.0, 0.0, 0.0])
+    run = fm.simulate(_started(system.scene, [HANGING + SMALL, -SMALL]), 2.0, samples=21, rtol=1e-12)
+    expected = np.array([(expm(model.A * t) @ start)[:2] for t in run.t])
+    assert np.abs(run.q - [HANGING, 0.0] - expected).max() < 1e-6 * SMALL
+
+
+def test_a_force_in_turning_axes_turns_with_its_body() -> None:
+    """Thrust along a body axis, held by a controller: attitude changes what it does, as in the model of a thruster."""
+    steady = fm.UserLaw(
+        name="law", inputs=("gyro[0]",), function="tests.flexmb.control.laws:proportional", parameters=(-2.0,)
+    )
+    parts = fm.MarkerSensor(name="gyro", marker="tip", quantity="angular_velocity"), steady
+    builder = tossed(*parts)
+    builder.force("thrust", "hub", direction=(0, 0, 1), frame="node", function=fm.ControlSignal(source="law"))
+    system = fm.compile(builder.scene())
+    model = fm.linearize(system)
+    fixed = tossed().force("thrust", "hub", direction=(0, 0, 1), frame="node", function=fm.Constant(value=2.0 * 0.4))
+    by_itself = fm.linearize(fixed.scene())
+    gyro = model.A - by_itself.A
+    assert np.abs(gyro).max() > 0.1
+    assert np.abs(gyro[:9]).max() < 1e-9  # all but the velocity along z, which the thrust drives
+    # World x of the angular velocity [0.4, -1, 2] in body axes that coincide with World's
+    assert gyro[11, 6:9] == pytest.approx([2.0 / 2.0, 0.0, 0.0], abs=1e-9)
+    assert gyro[11, :3] == pytest.approx([0.0, 2.0, 1.0], abs=1e-9)  # (theta x w)_x
+
+
+def test_a_sampled_loop_is_closed_on_the_model_of_the_open_one() -> None:
+    """Small motions of a double pendulum, by the discrete system that its linear model gives: 1e-6 of their size."""
+    period, delay, gains = 0.1, 0.05, np.array([4.0, 1.0])
+    law = fm.StateSpace(
+        name="law", inputs=("angle", "rate", "one[0]"), D=((-gains[0], -gains[1], gains[0] * HANGING),),
+        period_s=period, delay_s=delay,
+    )  # fmt: skip
+    scene = pendulum(ONE, law, torque=fm.ControlSignal(source="law")).scene()
+    plant = fm.compile(fm.open_loop(scene))
+    model = fm.linearize(plant, plant.state(np.array([HANGING, 0.0]), np.zeros(2)))
+    b = model.B[:, [name for name, _ in model.inputs].index("pivot.rotation")]
+
+    def flow(length: float, torque: float, x: Any) -> Any:
+        whole = np.zeros((5, 5))
+        whole[:4, :4], whole[:4, 4] = model.A, b
+        return (expm(whole * length) @ [*x, torque])[:4]
+
+    x, torque = np.array([SMALL, -SMALL, 0.0, 0.0]), 0.0
+    expected = [x]
+    for _ in range(20):
+        new = -float(gains @ [x[0], x[2]])
+        x = flow(period - delay, new, flow(delay, torque, x))
+        torque = new
+        expected.append(x)
+    started = _started(scene, [HANGING + SMALL, -SMALL])
+    run = fm.simulate(started, 2.0, samples=np.linspace(0.0, 2.0, 21), rtol=1e-12)
+    assert np.abs(run.q - [HANGING, 0.0] - np.array(expected)[:, :2]).max() < 1e-6 * SMALL
+
+
+def _started(scene: fm.Scene, q: Any) -> fm.Scene:
+    """The same scene with other angles at the start."""
+    hinges = tuple(
+        msgspec.structs.replace(hinge, rotation=msgspec.structs.replace(hinge.rotation, angle_rad=float(angle)))
+        for hinge, angle in zip(scene.hinges, q, strict=True)
+    )
+    return msgspec.structs.replace(scene, hinges=hinges)
+
+
+@pytest.mark.parametrize(("ask", "reason"), [
+    (fm.linearize, "is sampled"), (fm.equilibrium, "has controllers"),
+    (lambda s: fm.advise(s, 1e-3), "has controllers"), (lambda s: fm.simulate_batch([s], 1.0), "has controllers"),
+], ids=["linearize", "equilibrium", "advise", "batch"])  # fmt: skip
+def test_what_knows_of_no_controllers_says_so(ask: Any, reason: str) -> None:
+    scene = rotor(fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),), period_s=0.1))
+    with pytest.raises(NotImplementedError, match=f"{reason}.*open_loop"):
+        ask(scene)
+
+
+def test_an_open_loop_is_the_scene_without_its_controllers() -> None:
+    law = fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),))
+    opened = fm.open_loop(rotor(law, stiffness=2.0))
+    assert not opened.controllers and not opened.sensors
+    assert fm.linearize(opened).eigenvalues.imag.max() == pytest.approx(np.sqrt(2.0 / INERTIA))
+    assert fm.linearize(rotor(law, stiffness=2.0)).eigenvalues.imag.max() == pytest.approx(np.sqrt(3.0 / INERTIA))

@@ -1,0 +1,276 @@
+"""Loads across a beam's sections: the hinge's load at the root, nothing at a free end, statics, and closed forms."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.scene.shapes import beam_section
+from flexmb.system.frames import hinge_frames, node_pose
+from flexmb.system.turning_points import turning
+from tests.bounds import UNIT_ROUNDOFF
+
+ROUNDING = 2.0**12 * UNIT_ROUNDOFF
+LENGTH, E, RHO, AREA, IZ = 2.0, 7e10, 2700.0, 2e-4, 3e-9
+SECTION = beam_section(E=E, G=2.7e10, A=AREA, Iy=2e-9, Iz=IZ, rho=RHO)
+
+
+def everything(closed: bool = False, connected: bool = False, node: str = "origin", **beam: Any) -> fm.Scene:
+    """A beam with all that can act on one: tip mass, outboard body, wheel, slosh mass, loads, a closure, connectors."""
+    lump = fm.TipMass(x_m=1.3, mass_kg=0.4, com_m=(0.0, 0.05, 0.02),
+                      inertia_kg_m2=((2e-3, 0.0, 0.0), (0.0, 1e-3, 0.0), (0.0, 0.0, 1.5e-3)))  # fmt: skip
+    modes = beam.pop("modes", fm.Modes(count=5, static=True))
+    builder = (
+        fm.SceneBuilder("everything", gravity=(0.3, -9.81, 1.0))
+        .rigid_body("hub", mass=3.0, inertia=(1.0, 1.0, 1.0))
+        .beam("beam", length=LENGTH, elements=4, section=SECTION, modes=modes, nodes={"middle": 0.7},
+              tip_masses=[lump], **beam)
+        .rigid_body("hand", mass=0.5, inertia=(1e-3, 2e-3, 2e-3), com=(0.1, 0.0, 0.0))
+        .free("base", "ground", "hub")
+        .revolute("root", "hub", "beam", axis=(0.6, 0.0, 0.8), parent_position=(0.2, 0.1, 0.0), child_node=node,
+                  child_position=(0.03, 0.0, 0.02), child_quaternion=(np.cos(0.2), 0.0, np.sin(0.2), 0.0))
+        .universal("wrist", "beam", "hand", parent_node="tip")
+        .wheel("wheel", "beam", node="middle", axis=(0.0, 0.6, 0.8), mass=0.2, axial_inertia=1e-3,
+               transverse_inertia=6e-4, speed=100.0, offset=(0.0, 0.1, 0.0))
+        .point_mass("slosh", "beam", node="middle", mass=0.1, directions=[(0, 1, 0)])
+        .force("push", "beam", node="middle", direction=(0, 0, 1), function=fm.Constant(value=2.0), frame="node")
+        .torque("twist", "beam", node="tip", direction=(1, 0, 0), function=fm.Constant(value=0.3))
+    )  # fmt: skip
+    if closed:
+        builder.rigid_body("strut", mass=0.2, inertia=(1e-3, 1e-3, 1e-3))
+        builder.spherical("ball", "hub", "strut", parent_position=(0.0, 1.0, 0.0))
+        builder.closure("end", "spherical", "strut", "beam", node_b="middle", position_a=(0.9, 0.0, 0.0))
+    if connected:
+        stiff = tuple(tuple(30.0 * (i == j) for j in range(6)) for i in range(6))
+        builder.spring_damper("cable", "beam", "hub", node_a="middle", position_a=(0.1, 0.2, 0.0), stiffness=50.0,
+                              damping=3.0, free_length=0.3)  # fmt: skip
+        builder.bushing("mount", "ground", "beam", node_b="tip", position_b=(0.0, 0.1, 0.0), stiffness=stiff)
+    return builder.scene()
+
+
+def somewhere(system: fm.System, size: float = 3e-3) -> fm.State:
+    """Bent and moving; a closed chain where it starts."""
+    state, random = system.initial_state, np.random.default_rng(0)
+    if not system.scene.closures:
+        state.q[7:] += size * random.normal(size=system.nq - 7)
+        state.u[:] = random.normal(size=system.nu)
+    return state
+
+
+def at_root(system: fm.System, state: fm.State, load: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The load across the section at x = 0, and that across the hinge, both World about the hinge's point."""
+    system._all_loads(*system.layout.entering(state))
+    root, point = node_pose(system, system._w, "beam", "root"), hinge_frames(system, system._w)["root"].point
+    torque, force = root.rotation @ load[:3], root.rotation @ load[3:]
+    about = torque + np.cross(root.position - point, force)
+    return np.concatenate([about, force]), system.hinge_loads(state)["root"]
+
+
+VARIANTS: Mapping[str, dict[str, Any]] = {
+    "full": {}, "line": {"points": "line"}, "rotary": {"points": "rotary"}, "lumped": {"mass": "lumped"},
+    "rigid": {"level": "rigid"}, "ruthless": {"level": "ruthless"}, "closed": {"closed": True},
+    "connected": {"connected": True},
+    "timoshenko": {"theory": "timoshenko"},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("variant", VARIANTS)
+def test_the_root_transmits_what_the_hinge_does(variant: str) -> None:
+    """To rounding; rotating tensors are no polynomials, and the cuts refine their integrals: to quadrature."""
+    system = fm.compile(everything(**VARIANTS[variant]))
+    state = somewhere(system)
+    found = system.section_loads(state, "beam", [0.0, 0.5, 0.7, 1.3, 2.0])
+    section, hinge = at_root(system, state, found.load[0])
+    allowed = 1e-10 if variant == "rotary" else 64 * ROUNDING
+    for part in (slice(0, 3), slice(3, 6)):
+        assert np.linalg.norm(section[part] - hinge[part]) < allowed * np.linalg.norm(hinge[part])
+
+
+def test_levels_that_are_cut_off_are_off_by_what_they_neglect() -> None:
+    """linear by the second order of the deformation; stiffened, whose masses are equivalent ones, by the fourth."""
+    for level, order in (("linear", 2), ("stiffened", 3)):
+        errors = []
+        for size in (4e-4, 2e-4):
+            system = fm.compile(everything(level=level))
+            state = somewhere(system, size)
+            state.u[7:] = 0.0
+            section, hinge = at_root(system, state, system.section_loads(state, "beam", [0.0]).load[0])
+            errors.append(np.linalg.norm(section - hinge))
+        assert errors[1] < 1.2 * errors[0] / 2.0**order + 1e-11 * np.linalg.norm(hinge)
+
+
+@pytest.mark.parametrize("node", ["middle", "tip"])
+@pytest.mark.parametrize("boundary", ["clamped-free", "free-free"])
+def test_a_free_root_transmits_nothing(node: str, boundary: str) -> None:
+    """The beam hangs on another node: beyond x = 0 is all of it, hinge included."""
+    modes = fm.Modes(count=5, boundary=boundary)  # type: ignore[arg-type]
+    system = fm.compile(everything(node=node, modes=modes))
+    found = system.section_loads(somewhere(system), "beam", [0.0, 0.3, 0.7, 1.99])
+    assert np.max(np.abs(found.load[0])) < 64 * ROUNDING * np.max(np.abs(found.load))
+
+
+def test_a_cut_through_a_rigid_beam_is_a_weld() -> None:
+    """Two rigid beams welded where the one is cut: the weld's load, in the beams' axes, about the same point."""
+
+    def scene(pieces: tuple[float, ...]) -> fm.Scene:
+        builder = fm.SceneBuilder("cut", gravity=(0.0, -9.81, 0.0))
+        for i, length in enumerate(pieces):
+            builder.beam(f"piece {i}", length=length, elements=2, section=SECTION, modes=1, level="rigid")
+        builder.spherical("root", "ground", "piece 0", angular_velocity=(0.4, -2.0, 3.0))
+        if len(pieces) > 1:
+            builder.weld("cut", "piece 0", "piece 1", parent_node="tip")
+        return builder.scene()
+
+    whole, cut = fm.compile(scene((2.0,))), fm.compile(scene((0.7, 1.3)))
+    found = whole.section_loads(whole.initial_state, "piece 0", 0.7)
+    expected = cut.hinge_loads(cut.initial_state, axes="outboard")["cut"]
+    np.testing.assert_allclose(found.load[0], expected, atol=ROUNDING * np.linalg.norm(expected))
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_statics_are_exact_with_any_number_of_modes(count: int) -> None:
+    """A tip force: the same force across every section, its moment about the deformed section; modes' curvature is not.
+
+    Two modes off, the deflection is wrong by a few per cent, the loads by rounding.
+    """
+    modes = fm.Modes(count=count, families=("bending_y", "axial"))
+    scene = (
+        fm.SceneBuilder("cantilever")
+        .beam("beam", length=LENGTH, elements=6, section=SECTION, modes=modes, nodes={"a": 0.5, "b": 1.25})
+        .weld("clamp", "ground", "beam")
+        .force("pull", "beam", node="tip", direction=(0.6, -0.8, 0.0), function=fm.Constant(value=5.0))
+        .marker("a", "beam", node="a").marker("b", "beam", node="b").marker("tip", "beam", node="tip")
+        .scene()
+    )  # fmt: skip
+    system = fm.compile(scene)
+    rest = fm.equilibrium(system)
+    found = system.section_loads(rest, "beam", [0.5, 1.25])
+    seen = system.evaluate(0.0, rest.q, rest.u).markers
+    force = 5.0 * np.array([0.6, -0.8, 0.0])
+    for i, name in enumerate("ab"):
+        R = seen[name].rotation
+        moment = R.T @ np.cross(seen["tip"].position - seen[name].position, force)
+        inward = R.T @ force
+        np.testing.assert_allclose([found.axial[i], *found.shear[i]], inward, atol=1e-8)  # as well as it is at rest
+        np.testing.assert_allclose([found.torsion[i], *found.bending[i]], moment, atol=1e-8)
+
+
+def test_stresses_of_a_bent_pulled_and_twisted_beam() -> None:
+    """sigma = N/A + M c/I: the side toward which the force lifts the tip is compressed; and T r / J."""
+    pull, lift, twist, c = 0.1, 1e-3, 2e-3, 0.01
+    scene = (
+        fm.SceneBuilder("cantilever")
+        .beam("beam", length=LENGTH, elements=4, section=SECTION, modes=fm.Modes(count=0, static=True))
+        .weld("clamp", "ground", "beam")
+        .force("pull", "beam", node="tip", direction=(1, 0, 0), function=fm.Constant(value=pull))
+        .force("lift", "beam", node="tip", direction=(0, 1, 0), function=fm.Constant(value=lift))
+        .torque("twist", "beam", node="tip", direction=(1, 0, 0), function=fm.Constant(value=twist))
+        .scene()
+    )
+    system = fm.compile(scene)
+    found = system.section_loads(fm.equilibrium(system), "beam", [0.0, 1.0])
+    bent = 2e-3  # what the deflection changes: it takes pull * deflection from lift * arm
+    moment = lift * np.array([2.0, 1.0])
+    for y, sign in ((0.0, 0.0), (c, -1.0), (-c, 1.0)):
+        expected = pull / AREA + sign * moment * c / IZ
+        np.testing.assert_allclose(found.normal_stress(E, y=y, z=0.0), expected, rtol=bent)
+    GJ = scene.bodies[0].stations[0].GJ_Nm2
+    np.testing.assert_allclose(found.torsion_stress(2.7e10, 0.02), 2.7e10 * 0.02 * twist / GJ, rtol=bent)
+
+
+def test_loads_of_a_free_vibration_converge() -> None:
+    """A cantilever let go from its deflection under a tip force F: at first its root has the moment F L, the shear F.
+
+    Of sums of modes, the error of the moment falls as the square of their number, that of the shear as the number
+    itself: at the tip, shear jumps from F to 0 when it is let go, which sums of modes follow slowly.
+    """
+    force, errors = 1e-3, []
+    for count in (2, 4, 8):
+        wanted = fm.Modes(count=count, families=("bending_y",))
+        beam = fm.SceneBuilder("let go").beam("beam", length=LENGTH, elements=12, section=SECTION, modes=wanted)
+        system = fm.compile(beam.weld("clamp", "ground", "beam").scene())
+        link = system._links[0]
+        eta = force * link.node("tip").translation[1] / np.diag(link.model.stiffness)
+        found = system.section_loads(system.state(eta, np.zeros(count)), "beam", [0.0])
+        errors.append([abs(found.bending[0, 1] / (force * LENGTH) - 1.0), abs(found.shear[0, 0] / force - 1.0)])
+    moment, shear = np.array(errors).T
+    assert moment[0] < 0.05 and shear[0] < 0.4
+    assert np.all(moment[:-1] / moment[1:] > 3.0) and np.all(shear[:-1] / shear[1:] > 1.8), errors
+
+
+def test_one_mode_against_its_closed_form() -> None:
+    """The first mode of a clamped-free beam at its largest deflection: EI times its second and third derivatives."""
+    beta = 1.875104068711961
+    s = (np.cosh(beta) + np.cos(beta)) / (np.sinh(beta) + np.sin(beta))
+    x = np.linspace(0.0, LENGTH, 9)
+    z = beta * x / LENGTH
+    size = 1e-6 / 2.0  # m at the tip, where the shape cosh - cos - s (sinh - sin) is 2
+    second = (np.cosh(z) + np.cos(z) - s * (np.sinh(z) + np.sin(z))) * (beta / LENGTH) ** 2 * size
+    third = (np.sinh(z) - np.sin(z) - s * (np.cosh(z) + np.cos(z))) * (beta / LENGTH) ** 3 * size
+    wanted = fm.Modes(count=1, families=("bending_y",))
+    beam = fm.SceneBuilder("first mode").beam(
+        "beam", length=LENGTH, elements=12, section=SECTION, modes=wanted, points="line"
+    )
+    system = fm.compile(beam.weld("clamp", "ground", "beam").scene())
+    shape = system._links[0].node("tip").translation[1, 0]
+    found = system.section_loads(system.state(np.array([1e-6 / shape]), np.zeros(1)), "beam", x)
+    EI = E * IZ
+    np.testing.assert_allclose(found.bending[:, 1], EI * second, atol=1e-7 * EI * np.max(np.abs(second)))
+    np.testing.assert_allclose(found.shear[:, 0], -EI * third, atol=1e-7 * EI * np.max(np.abs(third)))
+
+
+def test_over_a_run() -> None:
+    """(T,X): the same as state by state, in the order asked for, at a cost of about a millisecond a state."""
+    system = fm.compile(everything())
+    trajectory = fm.simulate(system, 0.02, samples=5, rtol=1e-6, atol=1e-8)
+    x = [1.5, 0.0, 0.5]
+    found = trajectory.section_loads("beam", x)
+    assert found.load.shape == (5, 3, 6) and found.axial.shape == (5, 3) and found.shear.shape == (5, 3, 2)
+    at = system.section_loads(system.state(trajectory.q[3], trajectory.u[3], trajectory.t[3]), "beam", x)
+    np.testing.assert_array_equal(at.load, found.load[3])
+    begun = perf_counter()
+    trajectory.section_loads("beam", np.linspace(0.0, LENGTH, 21))
+    assert perf_counter() - begun < 1.0  # some 20 ms where nobody else is at work
+
+
+def test_a_turning_point_turns_as_its_path_does() -> None:
+    """Velocity and acceleration against differences of R(t), theta(t) a parabola; at rest and near half a turn too."""
+    random = np.random.default_rng(2)
+    theta, rate, again = random.normal(size=(3, 6, 3))
+    theta[0], theta[1] = 0.0, theta[1] / np.linalg.norm(theta[1]) * 3.0
+    R, omega, alpha = turning(theta, rate, again)
+    h = 1e-4
+
+    def at(t: float) -> tuple[np.ndarray, ...]:
+        return turning(theta + t * rate + 0.5 * t * t * again, rate + t * again, again)
+
+    ahead, behind = at(h), at(-h)
+    spin = (ahead[0] - behind[0]) / (2.0 * h) @ np.swapaxes(R, 1, 2)
+    np.testing.assert_allclose(spin[:, [2, 0, 1], [1, 2, 0]], omega, atol=1e-6)
+    np.testing.assert_allclose((ahead[1] - behind[1]) / (2.0 * h), alpha, atol=1e-6)
+
+
+def test_what_is_no_beam_and_not_on_it_is_refused() -> None:
+    system = fm.compile(everything())
+    state = system.initial_state
+    with pytest.raises(ValueError, match='"hub" is no beam of the scene; these are: beam'):
+        system.section_loads(state, "hub", [0.0])
+    for wrong in (-0.1, 2.1, [[0.0]], np.nan):
+        with pytest.raises(ValueError, match="x"):
+            system.section_loads(state, "beam", wrong)
+
+
+def test_a_run_with_controllers_is_refused() -> None:
+    """Their loads are known to the run alone: a state by itself has an open loop, and other loads."""
+    strip = fm.SceneBuilder("fed back").beam("beam", length=LENGTH, elements=2, section=SECTION, modes=1)
+    strip.revolute("pivot", "ground", "beam", angle=0.1, torque=fm.ControlSignal(source="hold"))
+    strip.add(fm.CoordinateSensor(name="angle", of="pivot"))
+    strip.add(fm.Pid(name="hold", inputs=("angle",), kp=1.0))
+    run = fm.simulate(strip.scene(), 0.01, samples=2, rtol=1e-6, atol=1e-8)
+    with pytest.raises(NotImplementedError, match="controllers"):
+        run.section_loads("beam", 0.0)
