@@ -97,12 +97,14 @@ def end_at_crossing(problem, step, y, k, trial, counts, watch):
 
 
 @helper
-def _detour(problem, trouble, target, last, y, k, trial, times, out, accuracy, counts):
-    """From the last good state to `target` or further, by shorter steps and leaps, where a step there met `trouble`.
+def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
+    """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
 
     Returns a status code and the time of y, which is again the last good state. Without a leap it is still `trouble`:
-    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be.
+    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be. scratch:
+    slopes (4,n) and a state (n,); output: times of samples, and samples.
     """
+    (k, trial), (times, out), target, last = scratch, output, step.end, step.last
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
@@ -158,9 +160,8 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                     return status, t
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
                 if may_leap(status):
-                    status, t = _detour(
-                        problem, status, min(t + h, end), last, y, k, trial, times, out, accuracy, counts
-                    )
+                    failed = Interval(t, min(t + h, end), last)
+                    status, t = _detour(problem, status, failed, y, (k, trial), (times, out), accuracy, counts)
                     if status == OK:
                         break
                 if status != OK:
