@@ -38,7 +38,7 @@ def mutate(
     goals and with its uncertainty. Faults of an adapter are planted in the true answer.
 
     **Shows** for each case the share that was noticed, *at goals* the share that differs by more than a goal, which a
-    code that just meets the goals would show too, *by reference* the share that the stored reference notices, without
+    code that just meets the goals would show too, *reference* the share that the stored reference notices, without
     any true run, and every fault that was missed.
 
     **Writes** into `--out` `mutation.json`, and the records `mutants.jsonl`, from which a stopped campaign resumes.

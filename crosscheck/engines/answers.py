@@ -30,7 +30,7 @@ from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
 
 RUNGS = 3
-LATER = ("connectors", "controllers")
+LATER = ("connectors", "controllers", "events")
 """Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold

@@ -157,7 +157,8 @@ class Engine(Protocol):
     An engine may have a `summary`, one line that `crosscheck engines` shows; and for timing reports an `algorithm`, in
     a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
     switched off, whose loop steps it, and what its `wall_s` contains. `takes` names the collections of a scene beyond
-    the first contract that its adapter knows, such as "connectors"; a scene that has others is refused for it.
+    the first contract that its adapter knows, such as "connectors" or "controllers"; a scene that has others is refused
+    for it.
     """
 
     name: str

@@ -140,12 +140,7 @@ def obstacle(
             return f'body "{body.name}": its SID file is read by flexmb alone: convert it by flexmb import'
         if not isinstance(body, RigidBody) and body.level != "rigid":
             return f'{engine} has no flexible bodies ("{body.name}"): use the finite-segment surrogate'
-    return eventful(scene, engine)
-
-
-def eventful(scene: Scene, engine: str) -> str:
-    """Why an engine that knows no events cannot represent the scene; empty where there are none."""
-    return f'event "{scene.events[0].name}": events happen in flexmb alone, not in {engine}' if scene.events else ""
+    return ""
 
 
 def links(scene: Scene) -> tuple[Link, ...]:

@@ -51,7 +51,7 @@ class NativeEngine:
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
 
-    takes = ("connectors", "controllers")
+    takes = ("connectors", "controllers", "events")
 
     def __init__(
         self,

@@ -31,7 +31,7 @@ def print_bites(console: Console, bites: Sequence[CaseBite], verbose: bool = Fal
 
 
 def _table(bites: Sequence[CaseBite]) -> Table:
-    headings = ("noticed", "score", "at goals", "by reference")
+    headings = ("noticed", "score", "at goals", "reference")
     table = Table(
         Column("case", no_wrap=True),
         *(Column(name, justify="right", no_wrap=True) for name in headings),

@@ -78,11 +78,18 @@ def linearize(
             with console.status(Text(f"linearising {scene} (the first time after an update compiles)")):
                 model = linear(compile(loaded))
                 bends = any(isinstance(body, BeamBody) and body.level != "rigid" for body in loaded.bodies)
-                missing = truncation(model, loaded, linear) if cut and bends else None
+                missing, note = None, ""
+                if cut and bends:
+                    try:
+                        missing = truncation(model, loaded, linear)
+                    except ArithmeticError as error:  # no equilibrium, or no accelerations: more modes may buckle
+                        note = f"truncation is not known, for with twice the modes of every beam: {error}"
         except EquilibriumError as error:
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
         console.print(modes_table(model, missing))
+        if note:
+            console.print(Text(printable(note), style="yellow"))
         if export is not None:
             with writing(export):
                 console.print("wrote", str(model.save(export)), soft_wrap=True)

@@ -123,27 +123,27 @@ def simulate(
             except Interrupted as stopped:
                 trajectory, interrupted = stopped.trajectory, True
         console.print(summary(trajectory))  # first: a full disk takes the files only
-        if error and not interrupted:
-            with console.status(Text("running again, tighter")):
-                estimated = errors_table(trajectory, trajectory.error_estimate())
-            console.print(estimated)
-        cut = {name: trajectory.section_loads(name, x) for name, x in wanted.items()}
         folder(out)
         with writing(out / "trajectory.csv"):
             trajectory.to_csv(out / "trajectory.csv")
-        for name, loads in cut.items():
-            with writing(out / f"sections-{name}.csv"):
-                write_sections(out / f"sections-{name}.csv", trajectory.t, loads)
         with writing(out):
             others = [out / f"trajectory.{word}" for word in dict.fromkeys(also or ())]
             for path in others:
                 getattr(trajectory, FORMATS[path.suffix[1:]])(path)
-            written = [out / "trajectory.csv", *(out / f"sections-{name}.csv" for name in cut), *others]
-            written += trajectory.plot(out) if plots else []
+            written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
             if trajectory.restart is not None:
                 written.append(out / "restart.npz")
                 trajectory.restart.save(written[-1])
-    console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+        console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
+        for name, x in wanted.items():  # from here on the run itself is safe
+            loads, path = trajectory.section_loads(name, x), out / f"sections-{name}.csv"
+            with writing(path):
+                write_sections(path, trajectory.t, loads)
+            console.print("wrote", str(path), soft_wrap=True)
+        if error and not interrupted:
+            with console.status(Text("running again, tighter")):
+                estimated = errors_table(trajectory, trajectory.error_estimate())
+            console.print(estimated)
     if interrupted:
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:

@@ -19,6 +19,7 @@ from flexmb.linear.linear_model import Complex, LinearModel
 from flexmb.linear.linearize import linearize
 from flexmb.modal.flexible import flexible_model
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
+from flexmb.scene.check.beams import available_modes, mode_count
 from flexmb.scene.schema import ModalState, Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -83,11 +84,14 @@ def _bends(body: Body) -> TypeGuard[BeamBody]:
 
 def _finer(body: BeamBody) -> BeamBody:
     count = MORE * max(body.modes.count, 1)
+    attached = mode_count(body) - body.modes.count
+    finer = msgspec.structs.replace(body, elements=max(MORE * body.elements, count + attached))
+    count = min(count, available_modes(finer) - attached)  # a shaft of two lumps has two modes of torsion
     ratio = body.modes.damping_ratio
     if isinstance(ratio, tuple):
         ratio = (*ratio, *[ratio[-1]] * (count - body.modes.count))
     modes = msgspec.structs.replace(body.modes, count=count, damping_ratio=ratio)
-    return msgspec.structs.replace(body, modes=modes, elements=max(MORE * body.elements, count))
+    return msgspec.structs.replace(finer, modes=modes)
 
 
 def _moved(state: ModalState, scene: Scene, finer: dict[str, BeamBody]) -> ModalState:

@@ -71,13 +71,17 @@ def _path(a: MarkerPath, b: MarkerPath, kept: int) -> MarkerPath:
 
 
 def _of_some(first: Trajectory, later: Trajectory, kept: int, key: str) -> dict[str, Real]:
-    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it."""
+    """Drives, signals, powers: one of the runs alone may have a name, or another number of columns under it.
+
+    What is not driven takes no load and no power, and is zero then; a signal that there is not is NaN.
+    """
+    missing = np.nan if key == "signals" else 0.0
     a, b, found = getattr(first, key), getattr(later, key), {}
     for name in {**a, **b}:
         width = max(each[name].shape[1] for each in (a, b) if name in each)
         parts = []
         for values, count in ((a, kept), (b, len(later.t))):
-            part = np.full((count, width), np.nan)
+            part = np.full((count, width), missing)
             if name in values:
                 part[:, : values[name].shape[1]] = values[name][:count]
             parts.append(part)

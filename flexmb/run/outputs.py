@@ -16,10 +16,10 @@ from flexmb.typing import Real
 
 
 def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
-    """Evaluate everything observable at the samples reached, of a run by `solve`."""
+    """Evaluate everything observable at the samples reached."""
     start = perf_counter()
     rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
-    status, stopped_at, message = raw.status, raw.t, _message(system, raw)
+    status, stopped_at, message = raw.status, raw.t, ending(system, raw)
     if trouble is not None and not (isinstance(trouble, NotFiniteError) and status is not Status.OK):
         status, stopped_at = _why(trouble), float(times[len(rows)])
         message = f"stopped at t = {stopped_at:g} s" + (
@@ -63,7 +63,8 @@ def _why(trouble: DynamicsError | KeyboardInterrupt) -> Status:
     return Status.NONFINITE if isinstance(trouble, NotFiniteError) else Status.NOT_POSITIVE_DEFINITE
 
 
-def _message(system: System, raw: Raw) -> str:
+def ending(system: System, raw: Raw) -> str:
+    """How a run ended, in words."""
     if raw.status is Status.OK:
         return f"finished at t = {raw.t:g} s"
     place = system.fault_name(raw.status, raw.fault)

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
-    y (nq+nu+1,): the last good state; memory, controllers: how it can be taken up there; paused: whether it stopped at
-    a level.
+    y (n,): the last good state; memory, controllers: how it can be taken up there; paused: whether it stopped at a
+    level.
     """
 
     states: Real

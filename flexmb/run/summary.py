@@ -12,6 +12,8 @@ from flexmb.run.channels import channels_of, signal_range, unit
 from flexmb.run.trajectory import Trajectory
 from flexmb.typing import Real
 
+MOST_EVENTS = 8  # that are told one by one
+
 
 def summary(trajectory: Trajectory) -> Table:
     """Status, drift of energy and momentum, steps, and where the time went."""
@@ -48,6 +50,8 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("status", Text(trajectory.message, style="green" if trajectory.finished else "bold red")),
         ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),
     ]
+    if trajectory.events:
+        rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
         rows += [("energy drift", _energy(trajectory)), *_momentum(trajectory)]
     return [
@@ -55,6 +59,13 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("steps", steps),
         ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run, {cost.output_s:.2f} s output"),
     ]
+
+
+def _events(trajectory: Trajectory) -> str:
+    """The first few by name and time."""
+    told = [f"{event.name} at {event.t:.6g} s" for event in trajectory.events[:MOST_EVENTS]]
+    left = len(trajectory.events) - len(told)
+    return ", ".join(told) + (f", and {left} more" if left else "")
 
 
 def _energy(trajectory: Trajectory) -> str:

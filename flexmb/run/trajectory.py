@@ -81,9 +81,9 @@ class Trajectory:
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
-    connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
-    `events`: what happened, in the order of time. signals (T,k) by sensor and controller, power (T,k) W that each
-    output of a controller puts into the motion, of a scene that has some.
+    connectors along hinges, along their coordinates. signals (T,k) by sensor and controller, power (T,k) W that each
+    output of a controller puts into the motion. `restart`: how the run is taken up there, None if it failed. `events`:
+    what happened, in the order of time.
     """
 
     scene: str
@@ -141,10 +141,11 @@ class Trajectory:
     def section_loads(self, body: str, x: ArrayLike) -> SectionLoads:
         """Axial force, shear, bending and torsion across sections at x (X,) m of a beam, over time: arrays (T,X,...).
 
-        See `System.section_loads`. Raises DynamicsError where a state has no accelerations.
+        See `System.section_loads`. Raises DynamicsError where a state has no accelerations, NotImplementedError for a
+        scene with controllers, of whose loads a state by itself knows nothing.
         """
         system = self._making("a section's load").system
-        refuse_feedback(system.scene, "a section's load")
+        refuse_feedback(system.scene, "section_loads")
         balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
@@ -181,7 +182,7 @@ class Trajectory:
         """This run and a later one as one: output times of this one, as far as the later one does not have them.
 
         Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
-        them lacks are NaN there. ValueError where coordinates, markers or hinges differ, or the later one begins after
+        them lacks are zero there. ValueError where coordinates, markers or hinges differ, or the later one begins after
         the last time of this one.
         """
         if len(later.t) and later.t[0] > self.stopped_at:

@@ -17,7 +17,7 @@ ROOT = Place()
 KINDS = {
     "bodies": "body", "hinges": "hinge", "closures": "closure", "connectors": "connector", "wheels": "wheel",
     "point_masses": "point mass", "loads": "load", "markers": "marker", "modal_states": "modal state of body",
-    "nodes": "node", "events": "event", "sensors": "sensor", "controllers": "controller",
+    "nodes": "node", "sensors": "sensor", "controllers": "controller", "events": "event",
 }  # fmt: skip
 
 

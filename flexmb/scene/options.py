@@ -110,45 +110,6 @@ class ClosureFrames(TypedDict, total=False):
     quaternion_b: ArrayLike
 
 
-class Sampling(TypedDict, total=False):
-    """When a controller acts: every `period` (s) from `offset` (s) on, its outputs changing `delay` (s) later; without
-    a period always."""
-
-    period: float | None
-    offset: float
-    delay: float
-
-
-class LinearLaw(Sampling, total=False):
-    """Matrices `A`, `B`, `C`, `D` and `initial` states of a linear controller."""
-
-    A: ArrayLike
-    B: ArrayLike
-    C: ArrayLike
-    D: ArrayLike
-    initial: ArrayLike
-
-
-class PidLaw(Sampling, total=False):
-    """Gains `kp`, `ki`, `kd`, constant `setpoint`, time constant `filter` (s) of the derivative, limits `lower` and
-    `upper`, time `tracking` (s) in which a limit takes back the integral."""
-
-    kp: float
-    ki: float
-    kd: float
-    setpoint: float
-    filter: float
-    lower: float | None
-    upper: float | None
-    tracking: float | None
-
-
-class OwnLaw(Sampling, total=False):
-    """Number of `outputs`, `initial` state and `parameters` of a function of one's own."""
-
-    outputs: int
-    initial: ArrayLike
-    parameters: ArrayLike
 class SpringEnds(TypedDict, total=False):
     """Where a spring's ends are: nodes of its two bodies, and fixed offsets from them (node axes, m)."""
 
@@ -197,6 +158,47 @@ class FrictionOptions(TypedDict, total=False):
     coordinate: str
     static: float | None
     stribeck: float | None
+
+
+class Sampling(TypedDict, total=False):
+    """When a controller acts: every `period` (s) from `offset` (s) on, its outputs changing `delay` (s) later; without
+    a period always."""
+
+    period: float | None
+    offset: float
+    delay: float
+
+
+class LinearLaw(Sampling, total=False):
+    """Matrices `A`, `B`, `C`, `D` and `initial` states of a linear controller."""
+
+    A: ArrayLike
+    B: ArrayLike
+    C: ArrayLike
+    D: ArrayLike
+    initial: ArrayLike
+
+
+class PidLaw(Sampling, total=False):
+    """Gains `kp`, `ki`, `kd`, constant `setpoint`, time constant `filter` (s) of the derivative, limits `lower` and
+    `upper`, time `tracking` (s) in which a limit takes back the integral."""
+
+    kp: float
+    ki: float
+    kd: float
+    setpoint: float
+    filter: float
+    lower: float | None
+    upper: float | None
+    tracking: float | None
+
+
+class OwnLaw(Sampling, total=False):
+    """Number of `outputs`, `initial` state and `parameters` of a function of one's own."""
+
+    outputs: int
+    initial: ArrayLike
+    parameters: ArrayLike
 
 
 class SectionShape(TypedDict, total=False):

@@ -10,7 +10,7 @@ import math
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable
+from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable, without_events
 from crosscheck.library.time_functions import in_functions
 from flexmb.scene.functions import Constant, Function, Ramp, Sine
 from flexmb.scene.schema import Scene
@@ -20,6 +20,7 @@ TURNS = 1
 
 
 def _rewritten(scene: Scene) -> Counterpart:
+    without_events(scene)
     found: list[Function] = []
 
     def on_another_clock(function: Function) -> Function:

@@ -41,6 +41,12 @@ class Invariance:
     of: Callable[[Scene], Counterpart]
 
 
+def without_events(scene: Scene) -> None:
+    """`NotApplicable` for a scene with events, whose levels the invariance would have to tell in its own terms."""
+    if scene.events:
+        raise NotApplicable(f'event "{scene.events[0].name}" has a level, which is not told in other terms')
+
+
 def by_kind(
     channels: Channels,
     polar: Callable[[Real], Real],

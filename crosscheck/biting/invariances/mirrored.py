@@ -18,6 +18,7 @@ from crosscheck.biting.invariances.counterpart import (
     NotApplicable,
     by_kind,
     is_prescribed,
+    without_events,
 )
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
@@ -53,6 +54,7 @@ QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quate
 
 
 def _mirrored(scene: Scene) -> Counterpart:
+    without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')

@@ -2,27 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, get_args
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Channels, Counterpart, Invariance, NotApplicable, is_prescribed
+from crosscheck.biting.invariances.counterpart import (
+    Channels,
+    Counterpart,
+    Invariance,
+    NotApplicable,
+    is_prescribed,
+    without_events,
+)
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
-from flexmb.scene.check import check_scene
 from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
-from flexmb.scene.problems import SceneError
-from flexmb.scene.schema import Load, ModalState, Scene
+from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
 from flexmb.typing import Real
 
-# Speeds, accelerations, forces, energies and all else have another factor than 1, and speeds one that leaves a material
-# one that exists, as the checks of a scene demand.
+# Speeds, accelerations, forces, energies and all else have another factor than 1.
 LENGTH, MASS, TIME = 0.5, 8.0, 0.25
+UNUSUAL = get_args(Waiver)  # a scene in other units than SI says that its numbers are meant
 
 
 class Dimension(NamedTuple):
@@ -60,6 +65,7 @@ OF_CHANNEL = {
 
 
 def _rescaled(scene: Scene) -> Counterpart:
+    without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
@@ -73,19 +79,7 @@ def _rescaled(scene: Scene) -> Counterpart:
     def back(times: Real, channels: Channels) -> Channels:
         return {name: rows / _factor(name, drives) for name, rows in channels.items()}
 
-    found = _in_units(scene)
-    _refuse_what_no_material_does(found)
-    return Counterpart(found, back, clock=TIME)
-
-
-def _refuse_what_no_material_does(scene: Scene) -> None:
-    """NotApplicable where the checks, which know SI, take the other units for a slip, and nothing else for a fault."""
-    try:
-        check_scene(scene)
-    except SceneError as error:
-        if all("check the units" in problem.remedy for problem in error.problems):
-            text = f"its numbers in other units look like a slip to the checks: {error.problems[0].what}"
-            raise NotApplicable(text) from None
+    return Counterpart(msgspec.structs.replace(_in_units(scene), allow=UNUSUAL), back, clock=TIME)
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:

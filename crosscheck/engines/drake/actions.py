@@ -5,26 +5,32 @@ from __future__ import annotations
 import numpy as np
 from pydrake.common.value import Value
 from pydrake.math import RigidTransform
-from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.math import SpatialForce, SpatialVelocity
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.multibody.tree import BodyIndex
 from pydrake.systems.framework import BasicVector, Context, LeafSystem
 
+from crosscheck.engines.connections import WORLD, Along, Exerted, Moving, along_hinges, connections
 from crosscheck.engines.conventions import quaternion_of, rotation_vector
 from crosscheck.engines.drake.tree import BALLAST, DrakeSlot, DrakeTree, ball_rotation
 from crosscheck.engines.functions_of_time import profile
-from crosscheck.engines.links import Scalar, attachment
+from crosscheck.engines.links import Attachment, Scalar, attachment
 from flexmb.scene.schema import Load, Scene
 from flexmb.typing import Real
 
 
 class JointActions:
-    """Generalised forces (nv,) of motors, of balls' springs, and of negative springs and dampers.
+    """Generalised forces (nv,) of motors, connectors along hinges, balls' springs, and negative springs and dampers.
 
     `turned` are the inboard frames of the ball joints, as in `DrakeState`.
     """
 
-    def __init__(self, tree: DrakeTree) -> None:
+    def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         scalars = [slot for slot in tree.slots if isinstance(slot.freedom, Scalar)]
+        self._held = [
+            (name, [slot for slot in scalars if slot.link.joint == item][number], load)
+            for name, item, number, load in along_hinges(scene)
+        ]
         self._nv = tree.plant.num_velocities()
         self._motors = [(slot.v, profile(slot.freedom.effort)) for slot in scalars if slot.freedom.effort is not None]
         self._springs = [slot for slot in scalars if slot.freedom.stiffness < 0.0]
@@ -37,12 +43,18 @@ class JointActions:
         self._sprung = [slot for slot in scalars if slot.freedom.stiffness]
 
     def __bool__(self) -> bool:
-        return bool(self._motors or self._springs or self._dampers or self._balls)
+        return bool(self._motors or self._springs or self._dampers or self._balls or self._held)
+
+    def held(self, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
+        """By name the speed that a connector along a hinge acts on, and what it does."""
+        return {name: (slot.v, load(float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._held}
 
     def forces(self, t: float, q: Real, v: Real, turned: tuple[Real, ...]) -> Real:
         tau = np.zeros(self._nv)
         for index, motor in self._motors:
             tau[index] += motor(t).value
+        for speed, each in self.held(q, v).values():
+            tau[speed] += each.load
         for slot in self._springs:
             tau[slot.v] -= slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)
         for slot in self._dampers:
@@ -84,17 +96,42 @@ class Drives:
 
 
 class DrakeLoads:
-    """Forces and torques at nodes of bodies, in World axes at points of the bodies."""
+    """Forces and torques at nodes of bodies, and of connectors between them, in World axes at points of the bodies.
+
+    `poses` are X_WB of all bodies by their index, `speeds` their spatial velocities V_WB.
+    """
 
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._loads = [_DrakeLoad(tree, scene, load) for load in scene.loads]
+        self._between, self._bodies = connections(scene, tree.links), tree.bodies
 
     def __bool__(self) -> bool:
-        return bool(self._loads)
+        return bool(self._loads or self._between)
 
-    def applied(self, t: float, poses: list[RigidTransform]) -> list[ExternallyAppliedSpatialForce]:
-        """`poses` are X_WB of all bodies by their index."""
-        return [load.applied(t, poses) for load in self._loads]
+    def applied(
+        self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]
+    ) -> list[ExternallyAppliedSpatialForce]:
+        """All of them."""
+        found, exerted = [load.applied(t, poses) for load in self._loads], self.exerted(t, poses, speeds)
+        for each in self._between:
+            for at, load in ((each.a, exerted[each.name].on_a), (each.b, exerted[each.name].on_b)):
+                if at.link >= 0:
+                    body, point = self._bodies[at.link].index(), at.frame.position
+                    found.append(_wrench(body, point, SpatialForce(load[:3], load[3:])))
+        return found
+
+    def exerted(self, t: float, poses: list[RigidTransform], speeds: list[SpatialVelocity]) -> dict[str, Exerted]:
+        """What connectors between nodes do, by name."""
+
+        def frame(at: Attachment) -> Moving:
+            if at.link < 0:
+                return WORLD.carrying(at.frame)
+            k = int(self._bodies[at.link].index())
+            pose, V = poses[k], speeds[k]
+            moving = Moving(pose.translation(), pose.rotation().matrix(), V.rotational(), V.translational())
+            return moving.carrying(at.frame)
+
+        return {each.name: each.exerted(t, frame(each.a), frame(each.b)) for each in self._between}
 
 
 class _DrakeLoad:
@@ -112,11 +149,15 @@ class _DrakeLoad:
         R = poses[int(self._body)].rotation().matrix()
         vector = self._size(t).value * (self._direction if self._in_world else R @ self._direction)
         nothing = np.zeros(3)
-        found = ExternallyAppliedSpatialForce()
-        found.body_index = self._body
-        found.p_BoBq_B = self._point
-        found.F_Bq_W = SpatialForce(nothing, vector) if self._is_force else SpatialForce(vector, nothing)
-        return found
+        load = SpatialForce(nothing, vector) if self._is_force else SpatialForce(vector, nothing)
+        return _wrench(self._body, self._point, load)
+
+
+def _wrench(body: BodyIndex, point: Real, load: SpatialForce) -> ExternallyAppliedSpatialForce:
+    """A load about a point (3,) of a body, World axes."""
+    found = ExternallyAppliedSpatialForce()
+    found.body_index, found.p_BoBq_B, found.F_Bq_W = body, point, load
+    return found
 
 
 class DrakeActions(LeafSystem):
@@ -136,6 +177,7 @@ class DrakeActions(LeafSystem):
         self.state = self.DeclareVectorInputPort("state", states)
         self.poses = self.DeclareAbstractInputPort("poses", Value[list[RigidTransform]]())
         self.forces = self.DeclareVectorOutputPort("forces", tree.plant.num_velocities(), self._give_forces)
+        self.speeds = self.DeclareAbstractInputPort("speeds", Value[list[SpatialVelocity]]())
         wrenches = Value[list[ExternallyAppliedSpatialForce]]
         self.wrenches = self.DeclareAbstractOutputPort("wrenches", wrenches, self._give_wrenches)
 
@@ -147,7 +189,7 @@ class DrakeActions(LeafSystem):
 
     def _give_wrenches(self, context: Context, output: object) -> None:
         t = min(context.get_time(), self.before_end)
-        output.set_value(self._loads.applied(t, self.poses.Eval(context)))
+        output.set_value(self._loads.applied(t, self.poses.Eval(context), self.speeds.Eval(context)))
 
 
 def _ball_turn(slot: DrakeSlot, q: Real, frame: Real) -> Real:

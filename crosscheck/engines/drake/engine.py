@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Link, links, obstacle
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Connector, Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.drake.model import DrakeModel
@@ -19,6 +19,7 @@ class DrakeEngine:
     """Rigid trees in continuous time, exact but for the artifice of prescribed coordinates (see `drake.tree`)."""
 
     name = "drake"
+    takes = ("connectors",)
     summary = "rigid trees in minimal coordinates, error-controlled Runge-Kutta 5"
 
     def version(self) -> str:
@@ -29,7 +30,7 @@ class DrakeEngine:
         return version("drake")
 
     def supports(self, scene: Scene) -> Support:
-        reason = _open_loops_only(scene) or obstacle(scene, "Drake", ())
+        reason = _open_loops_only(scene) or obstacle(scene, "Drake", (), get_args(Connector))
         if not reason:
             reason = next(filter(None, map(_refusal, links(scene))), "")
         return Support("no", reason) if reason else Support("exact")

@@ -27,7 +27,7 @@ class DrakeModel:
         chain = links(scene)
         self._tree = build_tree(scene, chain, ballasted=True)
         self._drives = Drives(self._tree)
-        joints, loads = JointActions(self._tree), DrakeLoads(self._tree, scene)
+        joints, loads = JointActions(self._tree, scene), DrakeLoads(self._tree, scene)
         self._actions = DrakeActions(self._tree, joints, self._drives, loads)
         self._diagram = self._connected(bool(joints or self._drives), bool(loads))
         self._observer = DrakeObserver(build_tree(scene, chain, ballasted=False), scene)
@@ -60,6 +60,7 @@ class DrakeModel:
             builder.AddSystem(actions)
             builder.Connect(plant.get_state_output_port(), actions.state)
             builder.Connect(plant.get_body_poses_output_port(), actions.poses)
+            builder.Connect(plant.get_body_spatial_velocities_output_port(), actions.speeds)
         if has_forces:
             builder.Connect(actions.forces, plant.get_applied_generalized_force_input_port())
         if has_loads:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.tree import MultibodyForces
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
@@ -24,7 +26,8 @@ class DrakeObserver:
     def __init__(self, tree: DrakeTree, scene: Scene) -> None:
         self._tree = tree
         self._context = tree.plant.CreateDefaultContext()
-        self._joints, self._drives, self._loads = JointActions(tree), Drives(tree), DrakeLoads(tree, scene)
+        self._joints, self._drives = JointActions(tree, scene), Drives(tree)
+        self._loads = DrakeLoads(tree, scene)
         self._gravity = np.array(scene.gravity_m_s2, dtype=float)
         self._names = [(link.kind, link.joint) for link in tree.links]
         self._markers = {marker.name: attachment(scene, tree.links, marker) for marker in scene.markers}
@@ -36,6 +39,8 @@ class DrakeObserver:
         place(self._tree, context, state)
         drives = self._act(t, state, acceleration)
         loads = dict(zip(self._names, self._reactions(), strict=True))
+        exerted, held = self._loads.exerted(t, *self._motion()), self._joints.held(state.q, state.v)
+        stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
         momentum = plant.CalcSpatialMomentumInWorldAboutPoint(context, np.zeros(3))
         centre = plant.CalcCenterOfMassPositionInWorld(context)
         return Snapshot(
@@ -46,17 +51,19 @@ class DrakeObserver:
             energy={
                 "kinetic": plant.CalcKineticEnergy(context),
                 "strain": 0.0,
-                "spring": self._joints.spring_energy(state.q, state.turned),
+                "spring": self._joints.spring_energy(state.q, state.turned) + stored,
                 "gravity": -float(plant.CalcTotalMass(context) * (centre @ self._gravity)),
             },
             momentum=np.concatenate([momentum.rotational(), momentum.translational()]),
+            connectors={name: each.on_b for name, each in exerted.items()},
+            hinge_forces={name: np.array([each.load]) for name, (_, each) in held.items()},
         )
 
     def _act(self, t: float, state: DrakeState, acceleration: Real) -> dict[str, Real]:
         """Apply motors, loads and drives to the plant; the drives, by joint name, from inverse dynamics."""
         plant, context = self._tree.plant, self._context
         tau = self._joints.forces(t, state.q, state.v, state.turned)
-        applied = self._loads.applied(t, plant.get_body_poses_output_port().Eval(context))
+        applied = self._loads.applied(t, *self._motion())
         forces = MultibodyForces(plant)
         plant.CalcForceElementsContribution(context, forces)  # gravity, springs and dampers
         for load in applied:
@@ -71,6 +78,12 @@ class DrakeObserver:
         plant.get_applied_generalized_force_input_port().FixValue(context, tau)
         plant.get_applied_spatial_force_input_port().FixValue(context, applied)
         return {name: np.array(values) for name, values in named.items()}
+
+    def _motion(self) -> tuple[list[RigidTransform], list[SpatialVelocity]]:
+        """X_WB and V_WB of all bodies by their index."""
+        plant, context = self._tree.plant, self._context
+        speeds = plant.get_body_spatial_velocities_output_port().Eval(context)
+        return plant.get_body_poses_output_port().Eval(context), speeds
 
     def _reactions(self) -> list[Real]:
         """[torque; force] (6,) on every link about its frame's origin."""

@@ -12,7 +12,6 @@ from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
-from crosscheck.engines.links import eventful
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
@@ -58,8 +57,6 @@ def _refusals(scene: Scene) -> Iterator[str]:
     if len(scene.bodies) != 1 or not isinstance(scene.bodies[0], BeamBody):
         yield "it takes scenes with one beam and nothing else"
         return
-    if scene.events:
-        yield eventful(scene, "Exudyn")
     beam, hinge = scene.bodies[0], scene.hinges[0]
     if scene.wheels or scene.point_masses or scene.closures or scene.connectors or beam.tip_masses:
         yield "it takes a bare beam: no wheels, point masses, tip masses, closures or connectors"

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
-from crosscheck.engines.links import eventful
 from flexmb.scene.connectors import SpringDamper
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
@@ -28,8 +27,6 @@ def supports(scene: Scene) -> Support:
 
 
 def _refusals(scene: Scene) -> Iterator[str]:
-    if scene.events:
-        yield eventful(scene, "Exudyn")
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'

@@ -13,7 +13,9 @@ from flexmb.scene.schema import Load, Scene, Wheel
 
 X, Y, Z = AXES = (0, 1, 2)
 EPS = 1e-12
-KNOWN = frozenset(("name", "description", "gravity_m_s2", "bodies", "hinges", "closures", "wheels", "loads", "markers"))
+KNOWN = frozenset(
+    ("name", "description", "allow", "gravity_m_s2", "bodies", "hinges", "closures", "wheels", "loads", "markers")
+)
 
 
 def mirrors(scene: Scene) -> tuple[int, ...]:

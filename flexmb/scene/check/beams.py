@@ -111,7 +111,7 @@ def _modes(place: Place, body: BeamBody) -> Iterator[Defect]:
     if modes.count < 0 or mode_count(body) < 1:
         remedy = 'give one at least, or "static" ones, or make the level "rigid"'
         yield Defect(str(place.key("count")), f"{modes.count} modes", remedy)
-    elif body.elements >= 1 and mode_count(body) > (available := _available(body)):
+    elif body.elements >= 1 and mode_count(body) > (available := available_modes(body)):
         what = f"{mode_count(body)} modes, but {body.elements} elements give {available} of these families"
         yield Defect(str(place.key("count")), what, "use more elements, more families, or fewer modes")
     yield from _damping(place.key("damping_ratio"), modes, mode_count(body))
@@ -133,7 +133,7 @@ def _attachments(body: BeamBody) -> int:
     return sum(counts[family] for family in body.modes.families)
 
 
-def _available(body: BeamBody) -> int:
+def available_modes(body: BeamBody) -> int:
     """Coordinates with inertia of the wanted families.
 
     A free-free beam has the root's coordinates in addition, but just as many rigid motions, which are not modes.

@@ -15,8 +15,8 @@ from flexmb.scene.tree import GROUND, rest_frames
 # Hinges, wheels, point masses, closures and connectors share tables of loads, drive loads and coordinates, hence one
 # set of names.
 NAMESPACES = (
-    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "connectors"), ("loads",), ("markers",), 
-    ("events",), ("sensors", "controllers"),
+    ("bodies",), ("hinges", "wheels", "point_masses", "closures", "connectors"), ("loads",), ("markers",),
+    ("sensors", "controllers"), ("events",),
 )  # fmt: skip
 IMPLICIT: dict[type, tuple[str, ...]] = {RigidBody: ("origin",), BeamBody: ("origin", "root", "tip")}
 

@@ -108,6 +108,25 @@ def test_with_the_modes_for_its_load_nothing_is_open() -> None:
     assert truncation(model, loaded(6, static=True)).change[0] < 1e-9
 
 
+@pytest.mark.parametrize("families", [("axial",), ("torsion",), ("bending_y", "axial", "torsion")])
+@pytest.mark.parametrize("static", [False, True])
+def test_a_finer_beam_has_the_modes_that_it_is_asked_for(families: tuple, static: bool) -> None:
+    """Of one element, and of a shaft without rotary inertia, whose lumps alone turn."""
+    lump = fm.TipMass(x_m=2.0, mass_kg=1.0, inertia_kg_m2=((0.1, 0.0, 0.0), (0.0, 0.1, 0.0), (0.0, 0.0, 0.1)))
+    wanted = fm.Modes(count=1, families=families, static=static)
+    if families == ("torsion",) and static:
+        wanted = fm.Modes(count=0, families=families, static=True)
+    scene = (
+        fm.SceneBuilder("shaft")
+        .beam("beam", length=2.0, elements=2, section=SECTION, modes=wanted, points="line", tip_masses=[lump])
+        .weld("clamp", "ground", "beam")
+        .scene()
+    )
+    fm.check_scene(finer_scene(scene))
+    found = truncation(fm.linearize(scene), scene)
+    assert np.all(np.isfinite(found.change))
+
+
 def test_a_bent_start_is_the_same_shape_in_more_modes() -> None:
     """The tip is where it was, to what the modes of a shorter list leave of each other: rounding."""
     bent = fm.scene.schema.ModalState(body="beam", coordinates=(0.02, -0.01), rates=(0.3, 0.1))

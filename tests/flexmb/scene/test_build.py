@@ -47,13 +47,13 @@ METHODS = {
     "revolute": s.Revolute, "prismatic": s.Prismatic, "cylindrical": s.Cylindrical, "universal": s.Universal,
     "gimbal": s.Gimbal, "spherical": s.Spherical, "planar": s.Planar, "free": s.Free, "closure": s.Closure,
     "wheel": s.Wheel, "point_mass": s.PointMass, "force": s.Load, "torque": s.Load, "marker": s.Marker,
-    "modal_state": s.ModalState, "sense_coordinate": s.CoordinateSensor, "sense_marker": s.MarkerSensor,
+    "modal_state": s.ModalState, "spring_damper": s.SpringDamper, "bushing": s.Bushing,
+    "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
+    "linear_friction": s.LinearFriction, "event": s.SceneEvent,
+    "sense_coordinate": s.CoordinateSensor, "sense_marker": s.MarkerSensor,
     "sense_load": s.LoadSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
     "state_space": s.StateSpace, "pid": s.Pid, "saturation": s.Saturation, "gain_table": s.GainTable,
     "user_law": s.UserLaw,
-    "spring_damper": s.SpringDamper, "bushing": s.Bushing,
-    "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
-    "linear_friction": s.LinearFriction, "event": s.SceneEvent,
 }  # fmt: skip
 # Keys that a method says in its own way: the section of a beam, the one coordinate of a hinge, the type of a load.
 REPLACED = {"beam": {"stations"}, "revolute": {"rotation"}, "prismatic": {"translation"},

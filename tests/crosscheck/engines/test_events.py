@@ -1,0 +1,33 @@
+"""Scenes with events run in flexmb; engines that know no events say so before anything runs."""
+
+import pytest
+
+import flexmb as fm
+from crosscheck.engines.answers import support_of
+from crosscheck.engines.registry import engine
+from flexmb.run.warm_up import pendulum
+from flexmb.scene.schema import Scene
+
+LATCH = fm.SceneEvent(
+    name="caught", watch="pivot.rotation", level=-1.0, actions=(fm.Latch(coordinate="pivot.rotation"),)
+)
+
+
+def eventful() -> Scene:
+    return fm.SceneBuilder("caught").add(*pendulum().bodies, *pendulum().hinges, *pendulum().markers, LATCH).scene()
+
+
+@pytest.mark.parametrize("name", ["pinocchio", "mujoco", "exudyn", "exudyn-beam", "drake"])
+def test_peers_refuse_scenes_with_events(name: str) -> None:
+    support = support_of(engine(name), eventful())
+    assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason
+
+
+@pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch"])
+def test_our_own_algorithms_run_them(name: str) -> None:
+    assert support_of(engine(name), eventful()).kind == "exact"
+
+
+def test_a_method_that_finds_no_place_refuses() -> None:
+    support = support_of(engine("native-generalised-alpha"), eventful())
+    assert support.kind == "no" and "does not find where an event happens" in support.reason
