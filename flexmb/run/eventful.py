@@ -74,10 +74,10 @@ class EventfulRun:
                 return self._ended(raw), raw
             self._paused_at.append(raw.t)
             y, controlled = self._apart(raw.y)
-            for event in self._arriving(found, watched, levels, y):
-                self._happened.append(self._situation.happen(event, raw.t, y))
+            arrived = self._arriving(found, watched, levels, y)
+            self._happened += [self._situation.happen(event, raw.t, y) for event in arrived]
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
-            ends = any(isinstance(action, EndRun) for event in found for action in event.actions)
+            ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
             sides = self._sides_after(watched, levels, y)
@@ -99,11 +99,18 @@ class EventfulRun:
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
         times = np.unique([start, *wanted, stop])
         with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
-            raw = integrate(system, solve, begin, times, self._settings, levels)
+            raw = integrate(system, solve, begin, times, self._left(), levels)
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
             self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
         return raw, stop
+
+    def _left(self) -> Settings:
+        """The settings with as many steps as the pieces before have left."""
+        if self._whole is None:
+            return self._settings
+        done = self._whole.statistics.accepted_steps + self._whole.statistics.rejected_steps
+        return replace(self._settings, max_steps=max(self._settings.max_steps - done, 0))
 
     def _found(self, raw: Raw, stop: float, watched: Sequence[SceneEvent], levels: Watch | None) -> list[SceneEvent]:
         """What happens where a piece ended, in the order of the scene."""

@@ -180,6 +180,16 @@ def test_chattering_is_told(restitution):
     assert run.stopped_at == pytest.approx(rest, rel=1e-5) and run.q.min() > -1e-9
 
 
+def test_steps_are_counted_over_all_pieces_and_a_stopped_run_goes_on():
+    whole = fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31)
+    steps = whole.statistics.accepted_steps + whole.statistics.rejected_steps
+    assert fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31, max_steps=steps).finished
+    run = fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31, max_steps=steps - 1)
+    assert run.status is fm.Status.MAX_STEPS and run.events and run.stopped_at < 3.0
+    rest = fm.simulate(run.restart.scene, 3.0, state=run.restart, samples=[run.stopped_at, 3.0])
+    assert np.array_equal(rest.q[-1], whole.q[-1])
+
+
 def test_what_events_cannot_do_is_refused():
     with pytest.raises(NotImplementedError, match="does not find where"):
         fm.simulate(ball(1.0, impact(1.0)), 1.0, "generalised_alpha", step=1e-3)
