@@ -112,6 +112,9 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
         if true.scene is None:
             without[invariance.name] = f"the case's own scene cannot be made: {true.error}"
             continue
+        if true.scene.controllers:
+            without[invariance.name] = "the scene has controllers, which would have to be told in the other frame too"
+            continue
         try:
             counterpart = invariance.of(true.scene)
         except NotApplicable as error:

@@ -26,7 +26,7 @@ from crosscheck.engines.contract import (
     Trajectory,
 )
 from flexmb.scene.connectors import BetweenNodes
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
 
 RUNGS = 3
@@ -57,11 +57,18 @@ def checked_version(found: Any) -> str:
 
 
 def support_of(engine: Engine, scene: Scene) -> Support:
-    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out."""
+    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out.
+
+    Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
+    would not know.
+    """
     for collection in LATER:
         items, known = getattr(scene, collection), getattr(engine, "takes", ())
         if items and collection not in known:
             return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
+    for law in scene.controllers:
+        if isinstance(law, UserLaw) and not law.function.startswith("flexmb."):
+            return Support("no", f'the function "{law.function}" is not of flexmb: a record would not know its changes')
     return checked_support(engine.supports(scene))
 
 

@@ -9,7 +9,9 @@ So every evaluation of a step compares its Q with that of the state from which t
 has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
 their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
 branches apart: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
-to 2^-44. So a run ends where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
+come closer than `TO_LEAP` only where there was no leap.
 """
 
 from math import inf
@@ -18,8 +20,10 @@ from flexmb.closure.factor import entry
 from flexmb.jit.kernel import helper
 
 TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
+TO_LEAP = 2.0**-12
 AT_CROSSING = 2.0**-20
 ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
+FASTEST = 2.0**10  # fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large
 
 
 @helper
@@ -35,21 +39,39 @@ def is_further(t, cw):
 
 
 @helper
+def passing_time(cc, cw, g):
+    """The least time (s) in which a closure of group g moves as far as it is large; inf at rest.
+
+    Speeds are the larger ones of those now and of those where the step started: where a port turns back, it has none.
+    """
+    least = inf
+    for r in range(cc.group[g].row_start, cc.group[g].row_stop):
+        closure = cw.closure[cc.row[r].closure]
+        speed = max(closure.speed, closure.former_speed)
+        if speed > 0.0:
+            least = min(least, closure.size / speed)
+    return least
+
+
+@helper
 def at_crossing(t, cc, cw):
     """The first chosen row that is about to vanish, or -1. Needs `factorise`, and a state from which the step starts.
 
-    At the rate at which it has fallen since the step started, a pivot vanishes after some time. This time is short
-    beside that in which the ports move as far as the mechanism is large. Their speed is the larger of those now and
-    where the step started: where they come to rest, they have none.
+    At the rate at which it has fallen since the step started, a pivot vanishes after some time, which is compared with
+    that in which its mechanism moves as far as it is large. What falls faster than ports move has been put right by the
+    projection: of a mechanism that comes to rest that is all.
     """
+    near = AT_CROSSING if cw.closer[0] != 0 else TO_LEAP
     for g in range(cc.group.shape[0]):
+        moment, passed = passing_time(cc, cw, g), t - cw.time[0]
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
-            i, left = cc.row[cw.chosen[place]].closure, cw.factor[entry(cc, g, a, a)]
+            r = cw.chosen[place]
+            left = cw.factor[entry(cc, g, a, a)]
             fallen = cw.former_pivot[place] - (1.0 + ROUND_OFF) * left
-            speed = max(cw.closure[i].speed, cw.closure[i].former_speed)
-            if left * (t - cw.time[0]) * speed < AT_CROSSING * fallen * cw.closure[i].size:
-                return cw.chosen[place]
+            moved = moment * cc.weight[r] * fallen < FASTEST * passed * cw.size[r]
+            if moved and left * passed < near * moment * fallen:
+                return r
     return -1
 
 
@@ -68,9 +90,11 @@ def turned_over(cc, cw):
 
 
 @helper
-def remember(t, cc, cw):
-    """Take the state that was factorised last for the one from which the next step starts."""
+def remember(t, y, cc, cw):
+    """Take the state y, factorised last, for the one from which the next step starts."""
     cw.time[0] = t
+    for i in range(y.shape[0]):
+        cw.state[i] = y[i]
     for i in range(cw.closure.shape[0]):
         cw.closure[i].former_speed = cw.closure[i].speed
     for r in range(cw.chosen.shape[0]):

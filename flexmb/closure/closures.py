@@ -19,10 +19,11 @@ from flexmb.levels.body import LEVELS
 from flexmb.scene.schema import Closure
 from flexmb.tables.arrays import Constants, Workspace
 from flexmb.tables.state import Layout
-from flexmb.tables.status import OUT_OF_RANGE
+from flexmb.tables.status import CLOSURE_SINGULAR, OUT_OF_RANGE
 from flexmb.typing import Index, Real
 
 STIFF = 100.0  # periods of the slowest mode, over 2 pi, for which bodies resist being bent by the closing of loops
+BESIDE = 2.0**-11  # sizes of the mechanism, from a singular position to where its closure loads are found
 SAME = 1e-7  # loads that differ by less, in the size of the loads, are the same
 
 
@@ -72,13 +73,15 @@ class Closures:
         self._size = np.zeros(len(own.row))  # of the rows' ports there
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
+        self.is_singular = False
+        """Whether the last motion failed because fewer rows are independent there than elsewhere."""
 
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants
-        own = workspace(cc, c)
-        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
         w, route = self._tree(), self._route(algorithm)
+        own = workspace(cc, c, len(w.q))
+        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
     def _route(self, algorithm: str) -> Recursion | Response | Matrices:
@@ -116,10 +119,22 @@ class Closures:
             self._composite = self.chain("composite")
         return self._motion(t, y, self._composite)
 
+    def beside(self, t: float, y: Real, rates: Real, side: int) -> tuple[float, Real]:
+        """Time and closed state a little before (side -1) or after (1) a singular one with these rates dq/dt (nq,)."""
+        moving = self._evaluated.cw.closure
+        moving = moving[moving["speed"] > 0.0]
+        step = side * BESIDE * float(np.min(moving["size"] / moving["speed"], initial=1.0))
+        there = y.copy()
+        there[: len(rates)] += step * rates
+        dynamics.project(t + step, there, self.chain("articulated"))
+        return t + step, there
+
     def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
         s.cw.rank[:], self._evaluated = self._ranks, s
         self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
-        self._check(dynamics.closure_loads(s.w, s.cc, s.cw), int(s.fault[0]))
+        status = dynamics.closure_loads(s.w, s.cc, s.cw)
+        self.is_singular = status == CLOSURE_SINGULAR
+        self._check(status, int(s.fault[0]))
         least = s.cw.row["load"].copy()
         for rows, null in null_loads(s.cc, s.cw):
             least[rows] -= null @ (null.T @ least[rows])  # without their shadow on null loads they are the least of all

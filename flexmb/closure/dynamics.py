@@ -1,7 +1,7 @@
 """Entry points of closed chains: right-hand side, what is observable at one state, linearised closures, projection."""
 
 from flexmb.closure.factor import choose_rows
-from flexmb.closure.forces import accelerate, choose, free_tree, locate, on_branch, respond, row_loads, transmit
+from flexmb.closure.forces import accelerate, choose, free_tree, locate, on_branch, refine, respond, row_loads, transmit
 from flexmb.closure.projection import displace, project_closed
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.sizes import measure_ports
@@ -34,6 +34,7 @@ def rhs(t, y, dy, s, _):
     if status != OK:
         return status
     accelerate(s.route, s)
+    refine(s.route, s)
     store_slope(c, w, power(c, w), dy)
     return OK
 

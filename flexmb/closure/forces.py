@@ -5,7 +5,7 @@ By unit loads that pass through the articulated quantities, `Recursion`; all oth
 
 from flexmb.closure import generalised
 from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
-from flexmb.closure.factor import choose_rows, factorise, solve
+from flexmb.closure.factor import choose_rows, entry, factorise, solve, sum_rows
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.tables import Recursion
 from flexmb.closure.unit_loads import apply_load, half_solve, pass_inward
@@ -19,6 +19,8 @@ from flexmb.jit.kernel import by_bundle, helper
 from flexmb.motion.coordinates import load_state
 from flexmb.spatial.spatial_vector import add6, vec6
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_SINGULAR, OK
+
+DELICATE = 2.0**-10  # pivots, as part of their ports' responses, of bodies a million times lighter than others
 
 
 @helper
@@ -73,6 +75,35 @@ def _locate(route, t, y, s):
     evaluate_rows(s.c, s.w, s.cc, s.cw, False)
 
 
+@helper
+def _refine(route, s):
+    """What rounding has left of the rows' accelerations is taken from those of the speeds; needs `accelerate`."""
+    if not _is_delicate(s.cc, s.cw):
+        return
+    evaluate_rows(s.c, s.w, s.cc, s.cw, True)
+    _stop_rows(s.cc, s.cw)
+    sum_rows(s.cc, s.cw, s.cw.coefficient)
+    _pass_outward(route, s, s.cw.coefficient, s.cw.step)
+    for j in range(s.cw.step.shape[0]):
+        s.w.speed[j].acceleration += s.cw.step[j]
+
+
+@helper
+def _is_delicate(cc, cw):
+    """Whether loads that nearly cancel accelerate what is light between closures: pivots far below their ports'."""
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            r = cw.chosen[cc.group[g].row_start + a]
+            if cc.weight[r] * cw.factor[entry(cc, g, a, a)] < DELICATE * cw.size[r]:
+                return True
+    return False
+
+
+@helper
+def _as_it_is(route, s):
+    pass
+
+
 # By unit loads where the route is the Recursion, else by generalised forces. Each takes s.route, then:
 # (s): the tree without closure loads, its accelerations, the rows, and x of a unit load of every row; a status code.
 free_tree = by_bundle(Recursion, _tree_and_rows, generalised.tree_and_rows)
@@ -82,6 +113,8 @@ pass_load = by_bundle(Recursion, _pass_load, generalised.pass_load)
 respond = by_bundle(Recursion, _pass_outward, generalised.respond)
 # (s): let cw.row.load act beside everything else: accelerations and drive loads.
 accelerate = by_bundle(Recursion, _accelerate, generalised.accelerate)
+# (s): after `accelerate`, accelerations of the speeds alone once more, where rounding matters.
+refine = by_bundle(Recursion, _refine, _as_it_is)
 # (s): loads across hinges, body axes, into w.body.load, after `accelerate`.
 transmit = by_bundle(Recursion, _hinge_loads, generalised.hinge_and_drive_loads)
 # (t, y, s): rows' values and rates at y; the factors of the last forward dynamics stay.
@@ -121,6 +154,13 @@ def row_loads(w, cc, cw):
     status = factorised(w, cc, cw)
     if status != OK:
         return status
+    _stop_rows(cc, cw)
+    return OK
+
+
+@helper
+def _stop_rows(cc, cw):
+    """Loads that remove the rows' accelerations, and let what is stabilised decay."""
     for g in range(cc.group.shape[0]):
         first = cc.group[g].row_start
         for place in range(first, first + cw.rank[g]):
@@ -128,7 +168,6 @@ def row_loads(w, cc, cw):
             damped = cw.gain[0] * cw.row[r].rate + cw.gain[1] * cw.row[r].value
             cw.scratch[place] = -(cw.row[r].acceleration + damped)
     solve(cc, cw)
-    return OK
 
 
 @helper

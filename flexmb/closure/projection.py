@@ -35,7 +35,7 @@ def project_closed(t, y, s):
         s.cw.time[1] = np.nextafter(t, -np.inf)  # the last stage of a segment is evaluated that much earlier
         recall(s.cw)
     elif is_further(t, s.cw):
-        remember(t, s.cc, s.cw)
+        remember(t, y, s.cc, s.cw)
 
 
 @helper
@@ -52,7 +52,7 @@ def _project(t, y, s):
     if cw.gain[1] > 0.0:  # stabilised: errors decay by themselves
         gap, at = largest_gap(cc, cw)
         return OK if gap <= ADRIFT else _open(s, at)
-    _close(t, y, s)
+    close(t, y, CLOSED, s)
     gap, at = largest_gap(cc, cw)
     if not gap <= OPEN:
         return _open(s, at)
@@ -80,11 +80,11 @@ def _open(s, closure):
 
 
 @helper
-def _close(t, y, s):
-    """Positions, then speeds."""
+def close(t, y, closed, s):
+    """Close positions up to gaps of `closed` sizes, then speeds, with the factors that were found last."""
     cc, cw = s.cc, s.cw
     for _ in range(REPEATS):
-        if largest_gap(cc, cw)[0] <= CLOSED:
+        if largest_gap(cc, cw)[0] <= closed:
             break
         for place in range(cw.chosen.shape[0]):
             cw.scratch[place] = -cw.row[cw.chosen[place]].value

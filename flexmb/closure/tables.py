@@ -117,6 +117,10 @@ class ClosureWorkspace:
     former: Real  # `basis` of the last state that a run has accepted, `flexmb.closure.branch`
     former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
+    state: Real  # (nq+nu+1,) that state
+    closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
+    vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
+    demand: Real  # (G,) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along the rows of Q
     time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
     failure: Index  # (2,) status of the last projection, and where
@@ -150,8 +154,8 @@ class Closed:
         return self.w.fault
 
 
-def workspace(c: ClosureConstants, tree: Constants) -> ClosureWorkspace:
-    """A workspace of the right sizes for closures on a tree."""
+def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> ClosureWorkspace:
+    """A workspace of the right sizes for closures on a tree with so many coordinates."""
     rows, nu = len(c.row), len(tree.speed)
     heights, widths = (c.group[f"{side}_stop"] - c.group[f"{side}_start"] for side in ("row", "column"))
     size = int(heights @ widths)
@@ -173,6 +177,10 @@ def workspace(c: ClosureConstants, tree: Constants) -> ClosureWorkspace:
         former=np.zeros(size),
         former_pivot=np.zeros(rows),
         former_rows=np.arange(rows),
+        state=np.zeros(coordinates + nu + 1),
+        closer=np.zeros(1, np.int64),
+        vanishing=np.zeros(rows),
+        demand=np.zeros(rows),
         time=np.full(2, -np.inf),
         gain=np.zeros(2),
         failure=np.zeros(2, np.int64),

@@ -113,6 +113,12 @@ class Feedback:
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
 
+    def look(self, begin: Starting) -> None:
+        """At one state, as at the only sample of a run that is over."""
+        t = begin.state.t
+        self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
+        self.replay()
+
     def remember(self) -> LoopMemory:
         """At the end of a run, before it is replayed."""
         s = self.running

@@ -30,6 +30,7 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.leap import leap, may_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
@@ -243,6 +244,12 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
             step, length = Interval(t, t_new, last), t_new - t
             status, error = attempt(problem, step, y, s, accuracy, counts)
             trouble = reason(status)
+            if may_leap(status):
+                far = leap(problem, last, y, s.k[0], s.y_new, s.k[END], counts)
+                if far > 0.0:
+                    t_new, length, status, error = t + far, far, OK, CALM
+                    step = Interval(t, t_new, last)
+                    store_leapt(step, y, s.k[0], s.y_new, s.k[END], times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
                 if watch is not None and is_crossed(watch, s.y_new):

@@ -5,11 +5,13 @@ Functions and tables are given by address, so that each integrator is compiled o
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from flexmb.jit.bundle import AnyBundle
+from flexmb.jit.kernel import kernel
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, Pointer, pointer
 
 
@@ -17,13 +19,16 @@ class Problem(NamedTuple):
     """y' = f(t, y) for y (n,) on a manifold.
 
     rhs(t, y, dy, constants, workspace) puts f into dy and returns a status code; project(t, y, constants) puts y back
-    on its manifold.
+    on its manifold. Where a step fails, back(y, constants) puts the last good state into y and returns its time, and
+    leap(end, y, dy, y_new, dy_new, constants) may go on from there: see `flexmb.integrate.leap`.
     """
 
     rhs: Pointer
     project: Pointer
     constants: AnyBundle
     workspace: AnyBundle
+    back: Pointer
+    leap: Pointer
 
 
 class StiffProblem(NamedTuple):
@@ -38,6 +43,8 @@ class StiffProblem(NamedTuple):
     project: Pointer
     constants: AnyBundle
     workspace: AnyBundle
+    back: Pointer
+    leap: Pointer
     jacobian: Pointer
     move: Pointer
     exact: AnyBundle
@@ -78,13 +85,35 @@ class Accuracy(NamedTuple):
     coordinates: int = 0
 
 
-def problem(rhs: Any, project: Any, constants: Any, workspace: Any) -> Problem:
-    """Of kernels and bundles."""
+class Leaping(NamedTuple):
+    """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails."""
+
+    back: Any
+    leap: Any
+
+
+@kernel
+def _no_way_back(y, _):
+    return -math.inf
+
+
+@kernel
+def _no_leap(end, y, dy, y_new, dy_new, _):
+    return 0.0
+
+
+def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Leaping | None = None) -> Problem:
+    """Of kernels and bundles; without `leaping` nothing goes on from where a step fails."""
+    anything = AnyBundle._numba_type_
+    back, leap = leaping or (_no_way_back, _no_leap)
+    known = constants if leaping else anything
     return Problem(
         pointer(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace),
         pointer(project, NOTHING, REAL, VECTOR, constants),
         AnyBundle(constants),
         AnyBundle(workspace),
+        pointer(back, REAL, VECTOR, known),
+        pointer(leap, REAL, REAL, VECTOR, VECTOR, VECTOR, VECTOR, known),
     )
 
 

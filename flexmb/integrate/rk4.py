@@ -6,8 +6,21 @@ import math
 
 import numpy as np
 
-from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, all_finite, copy, derivative, permitted, stretch
+from flexmb.integrate.control import (
+    ACCEPTED,
+    REJECTED,
+    RETREAT,
+    SAMPLES,
+    Interval,
+    all_finite,
+    copy,
+    derivative,
+    permitted,
+    step_end,
+    stretch,
+)
 from flexmb.integrate.integrator import Integrator
+from flexmb.integrate.leap import leap, may_leap, store_leapt
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
 from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel, written_out
@@ -83,6 +96,47 @@ def end_at_crossing(problem, step, y, k, trial, counts, watch):
     return CROSSED, t + shortest
 
 
+@helper
+def _detour(problem, trouble, target, last, y, k, trial, times, out, accuracy, counts):
+    """From the last good state to `target` or further, by shorter steps and leaps, where a step there met `trouble`.
+
+    Returns a status code and the time of y, which is again the last good state. Without a leap it is still `trouble`:
+    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be.
+    """
+    t = problem.back(y, problem.constants)
+    if not t > -math.inf:
+        return trouble, target
+    h, failed, outcome = RETREAT * (target - t), True, trouble
+    while t < target:
+        status = permitted(accuracy.max_steps, counts)
+        if status != OK:
+            return status, t
+        far = leap(problem, last, y, k[0], trial, k[1], counts) if failed else 0.0
+        if far > 0.0:
+            store_leapt(Interval(t, t + far, last), y, k[0], trial, k[1], times, out, counts)
+            t, h, outcome = t + far, far, OK
+        else:
+            status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
+            if status != OK:
+                return status, t
+            status = rk4_step(problem, t, last, y, t_new - t, k, trial, counts)
+            if status == OK:
+                problem.project(t_new, trial, problem.constants)
+                status = derivative(problem, min(t_new, last), trial, k[0], counts)
+            if status != OK and not may_leap(status):
+                return status, t
+            failed = status != OK
+            if failed:
+                trouble, h = status, RETREAT * h
+                counts[REJECTED] += 1
+                continue
+            t, h = t_new, 2.0 * h
+        copy(trial, y)
+        counts[ACCEPTED] += 1
+        failed = False
+    return outcome, t
+
+
 @kernel
 def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`.
@@ -103,6 +157,12 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                     keep_place(memory, t, y, start, j)
                     return status, t
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
+                if may_leap(status):
+                    status, t = _detour(
+                        problem, status, min(t + h, end), last, y, k, trial, times, out, accuracy, counts
+                    )
+                    if status == OK:
+                        break
                 if status != OK:
                     return status, t
                 if watch is not None and is_crossed(watch, trial):
@@ -114,8 +174,9 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
             start, done = t, 0
             if t == segment_ends[segment]:
                 segment += 1
-        copy(y, out[sample])
-        counts[SAMPLES] = sample + 1
+        if counts[SAMPLES] == sample:  # not met within a leap
+            copy(y, out[sample])
+            counts[SAMPLES] = sample + 1
     keep_place(memory, t, y, t, 0)
     return OK, t
 

@@ -13,7 +13,7 @@ from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import Watch, watch
 from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
-from flexmb.run.outputs import ending, observed
+from flexmb.run.outputs import observed
 from flexmb.run.propagate import Raw, integrate, integration
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
@@ -81,13 +81,17 @@ class EventfulRun:
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
             sides = self._sides_after(watched, levels, y)
-            state = self._situation.system.layout.known(raw.t, np.r_[y[:-1], 0.0])
-            begin = Beginning(state, raw.y, None, raw.controllers)
+            begin = self._going_on(raw)
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
         """[q, u, work], and the states of controllers, which events do not touch."""
         motion = self.system.nq + self.system.nu
         return np.r_[y[:motion], y[-1]], y[motion:-1]
+
+    def _going_on(self, raw: Raw) -> Beginning:
+        """From where a piece ended; controllers know what they knew."""
+        state = self.system.layout.known(raw.t, np.r_[self._apart(raw.y)[0][:-1], 0.0])
+        return Beginning(state, raw.y, None, raw.controllers)
 
     def _piece(self, begin: Beginning, levels: Watch | None) -> tuple[Raw, float]:
         """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
@@ -166,21 +170,19 @@ class EventfulRun:
         return self._paused_at[-1] - self._paused_at[-MANY] < SHORT * (self._times[-1] - self._times[0])
 
     def _last(self, raw: Raw, ends: bool) -> Raw:
-        """The state after the last event is an output too; of a closed loop only how the run ended is."""
-        assert self._whole is not None  # there was a piece
-        last = raw._replace(states=self._apart(raw.y)[0][None])
+        """The state after the last event is an output too."""
+        last = raw._replace(states=raw.y[None])
         if not ends and raw.t < self._times[-1]:
             last = last._replace(status=Status.CHATTERING)
         system = self.system
-        message = ending(system, last)
+        with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            if solve.feedback is not None:
+                solve.feedback.look(self._going_on(raw))
+            found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
         if ends:
-            message = f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s'
-        if not system.scene.controllers:
-            with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
-                found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
-            cost = {name: 0 for name in vars(found.statistics)}
-            self._join(replace(found, statistics=replace(found.statistics, **cost)))
-        self._whole = replace(self._whole, status=last.status, message=message, stopped_at=raw.t)
+            found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
+        cost = {name: 0 for name in vars(found.statistics)}
+        self._join(replace(found, statistics=replace(found.statistics, **cost)))
         return last
 
     def _join(self, part: Trajectory) -> None:

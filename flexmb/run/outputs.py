@@ -16,7 +16,7 @@ from flexmb.typing import Real
 
 
 def observed(system: System, times: Real, raw: Raw, algorithm: Algorithm, solve: Integration) -> Trajectory:
-    """Evaluate everything observable at the samples reached."""
+    """Evaluate everything observable at the samples reached, of a run by `solve`."""
     start = perf_counter()
     rows, trouble = observe(solve.feedback or system, algorithm, times, raw.states, solve.batch)
     status, stopped_at, message = raw.status, raw.t, ending(system, raw)

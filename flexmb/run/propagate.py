@@ -82,7 +82,7 @@ class Integration:
             if self.feedback is not None:
                 self.feedback.with_retraction()
         else:
-            self._problem = problem(*motion)
+            self._problem = problem(*motion, route.leaping)
         self.batch: Sampler | None = None
         """Observes many samples at once."""
         self._batched = algorithm.observing is not None and not system.scene.closures

@@ -81,9 +81,9 @@ class Trajectory:
     by kind (T,) J; momentum (T,6) [angular about the World origin; linear]; work (T,) J done since the start by drives,
     motors, dampers, friction, actuators and loads. `stopped_at` is the time of the last good state: the end of the run
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
-    connectors along hinges, along their coordinates. signals (T,k) by sensor and controller, power (T,k) W that each
-    output of a controller puts into the motion. `restart`: how the run is taken up there, None if it failed. `events`:
-    what happened, in the order of time.
+    connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
+    `events`: what happened, in the order of time. signals (T,k) by sensor and controller, power (T,k) W that each
+    output of a controller puts into the motion, of a scene that has some.
     """
 
     scene: str
@@ -145,7 +145,7 @@ class Trajectory:
         scene with controllers, of whose loads a state by itself knows nothing.
         """
         system = self._making("a section's load").system
-        refuse_feedback(system.scene, "section_loads")
+        refuse_feedback(system.scene, "a section's load")
         balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):

@@ -407,6 +407,7 @@ class SceneBuilder:
     ) -> Self:
         """Dry friction (N) along a displacement of a hinge or point mass, smooth below the speed `smoothing`."""
         return self._append(s.LinearFriction, name=name, hinge=hinge, sliding=sliding, smoothing=smoothing, **options)
+
     # Feedback: what controllers put out acts through a ControlSignal in place of a function of time
 
     def sense_coordinate(self, name: str, of: str, *, quantity: Literal["value", "rate"] = "value") -> Self:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from flexmb.frisch.errata import Erratum
+from flexmb.integrate.problem import Leaping
 from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
@@ -18,11 +19,15 @@ Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_
 
 
 class Route(NamedTuple):
-    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold."""
+    """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold.
+
+    leaping: how runs go on where a step fails, if they can.
+    """
 
     tables: Callable[[], tuple[Any, Any]]
     rhs: Any
     project: Any
+    leaping: Leaping | None = None
 
 
 @dataclass(frozen=True)

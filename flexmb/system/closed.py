@@ -12,7 +12,10 @@ from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
+from flexmb.closure.leap import back, leap
 from flexmb.closure.tables import Closed
+from flexmb.entry import articulated
+from flexmb.integrate.problem import Leaping
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
@@ -21,7 +24,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
-from flexmb.tables.state import State, finite_result, pack
+from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
@@ -116,11 +119,28 @@ class ClosedSystem(System):
 
     def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
         """As of a tree, with the loads of closures."""
-        self._observation.fill(row, t, self._observe(t, y, algorithm))
+        try:
+            motion = self._motion(t, y, algorithm)
+        except DynamicsError:
+            if not self.closures.is_singular:
+                raise
+            motion = self._motion_across(t, y, algorithm)
+        self._observation.fill(row, t, self._outputs(t, y, motion))
+
+    def _motion_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
+        """In a run through a singular position, where nothing determines the loads: the mean of those beside it."""
+        slope = np.empty_like(y)
+        articulated.rhs(t, y, slope, self.constants, self.workspace())
+        sides = [self.closures.beside(t, y, slope[: self.nq], side) for side in (-1, 1)]
+        before, after = (self._motion(*each, algorithm) for each in sides)
+        return ClosedMotion(*(0.5 * (one + other) for one, other in zip(before, after, strict=True)))
 
     def _observe(self, t: float, y: Real, algorithm: Algorithm) -> Real:
         """Fills the outputs; loads (C,6) of closures."""
-        motion, out = self._motion(t, y, algorithm), self._out
+        return self._outputs(t, y, self._motion(t, y, algorithm))
+
+    def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> Real:
+        out = self._out
         out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
         self._observe_motion(t, y)
         return motion.closures
@@ -152,7 +172,7 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project)
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap))
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""

@@ -55,17 +55,17 @@ _ADVICE = {
         "look for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
-        "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and where "
-        "the mechanism moves next is not determined; start elsewhere, or give a body flexibility"
+        "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "
+        "mechanism is too slow, or started too close, for its speed to say along which branch it goes on; start "
+        "elsewhere, or give a body flexibility"
     ),
     Status.CLOSURE_OPEN: (
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
         "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
     ),
     Status.BRANCH_UNKNOWN: (
-        "closure {body} went through a singular position, or close to one in too long a step: there the mechanism can "
-        "go on along more than one branch, and which one it takes is not known; use a shorter step, end the run before "
-        "that position, or give a body flexibility"
+        "closure {body} went close to a singular position in too long a step: branches of the motion nearly meet "
+        'there, and which one the mechanism takes is not known; use a shorter step, or "dop853"'
     ),
     Status.CONNECTOR_OVERTURNED: (
         "bushing {body} is turned by more than 170 degrees: close to half a turn its rotation vector jumps, and its "

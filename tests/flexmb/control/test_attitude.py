@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import flexmb as fm
 from flexmb.control.attitude import eigenaxis_slew
@@ -49,6 +52,37 @@ def test_the_craft_follows_the_slew_and_rests() -> None:
     assert rates.max() == pytest.approx(peak, rel=0.05)  # it runs after the profile
     along = np.linalg.norm(run.signals["gyro"] - np.outer(rates, AXIS), axis=1)
     assert along.max() < 0.02 * peak  # it turns about the axis, and hardly about others
+
+
+def gyrostat(t: float, y: Any, motor: Any) -> Any:
+    """Euler's equations of a body with three wheels: y = [quaternion, angular velocity, momenta of the wheels along
+    their axes, of which the body's turning is a part]."""
+    q, w, h = y[:4], y[4:7], y[7:]
+    inertia = INERTIA + 2 * 0.06  # the wheels' transverse one, of the two that do not spin about the axis
+    rate = -motor - np.cross(w, inertia * w + h)
+    turning = 0.5 * np.array([-q[1:] @ w, *(q[0] * w + np.cross(q[1:], w))])
+    return np.concatenate([turning, rate / inertia, motor])
+
+
+def test_an_integration_of_its_own_agrees() -> None:
+    """The same law on Euler's equations, by SciPy, from instant to instant."""
+    t_end, period, delay, y = 12.0, 0.1, 0.05, np.array([1.0, *np.zeros(9)])
+    slew = fm.SmoothStep(start_value=0.0, end_value=ANGLE, start_s=5.0, duration_s=DURATION)
+    parameters, torque, none = np.array([*AXIS, *INERTIA * FREQUENCY**2, *1.4 * INERTIA * FREQUENCY]), np.zeros(3), []
+    for k in range(round(t_end / period)):
+        x = max(0.0, (k * period - slew.start_s) / slew.duration_s)
+        angle = ANGLE * x**4 * (35 + x * (-84 + x * (70 - 20 * x)))
+        rate = ANGLE / DURATION * 140 * (x * (1 - x)) ** 3
+        new = np.zeros(3)
+        eigenaxis_slew.py_func(k * period, np.array([*y[:7], angle, rate]), none, parameters, new, none)
+        for length, held in ((delay, torque), (period - delay, new)):
+            y = solve_ivp(gyrostat, (0.0, length), y, "DOP853", args=(-held,), rtol=1e-11, atol=1e-13).y[:, -1]
+        torque = new
+    run = fm.simulate(craft().scene(), t_end)
+    seen = run.markers["star tracker"].quaternion[-1]
+    assert seen * np.sign(seen[0]) == pytest.approx(y[:4] / np.linalg.norm(y[:4]), abs=1e-9)
+    assert run.signals["gyro"][-1] == pytest.approx(y[4:7], abs=1e-10)
+    assert np.abs(y[1:4]).max() > 0.001  # it has begun to turn
 
 
 def test_the_law_is_the_small_angle_law_near_its_aim() -> None:

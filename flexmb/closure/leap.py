@@ -1,0 +1,215 @@
+"""Through a singular position on the branch that momentum demands: a leap from one side to the other.
+
+At a singular position pivots of B P = Q R vanish and branches of the motion cross. A mechanism that moves goes on along
+the branch whose direction it has: loads are bounded, so its speeds cannot jump to those of another branch. On either
+side accelerations are smooth; only at the position itself, and for what strays from the branch near it, no stage of an
+integrator can be evaluated. So a run comes close by ordinary steps and then takes one step by the trapezoidal rule,
+which evaluates the equations of motion at both its ends only. It goes from a distance between `NEAREST` and `LEAP`
+sizes of the mechanism: the rule's error is the cube of twice that over twelve, below 2^-30 of the speed, and rounding
+does not blur the branches. What comes before the position and what comes after it are on one branch where
+
+- every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
+  over, while all other rows are where they were; and
+- the accelerations that the closures demand along these rows go on smoothly. A mechanism that only passes near a
+  singular position turns there, within the leap, and its accelerations before and after are opposite. On branches that
+  are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so that a c of 2^-40 or more is noticed.
+
+Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or
+the run ends with the status it had.
+"""
+
+from math import inf
+
+from flexmb.closure.branch import TO_LEAP, TURNED, passing_time, recall, remember
+from flexmb.closure.factor import choose_rows, entry, factorise
+from flexmb.closure.forces import accelerate, free_tree, row_loads
+from flexmb.closure.projection import OPEN, close
+from flexmb.closure.rows import largest_gap
+from flexmb.jain.balance import power
+from flexmb.jit.kernel import helper, kernel, sweep
+from flexmb.motion.coordinates import load_state, store_slope
+from flexmb.motion.coordinates import project as project_tree
+from flexmb.tables.status import CLOSURE_SINGULAR, OK
+
+LEAP = 2.0**-10  # sizes of the mechanism to a singular position from where a leap goes
+NEAREST = TO_LEAP / 2.0
+TIGHT = 2.0**-50  # gap of closures at both ends of a leap: rounding
+PROBE = 2.0**-14  # sizes of the mechanism that are tried to see how pivots fall
+APART = 3.0  # times the distance of a singular position, that of the next one that is not leapt over too
+BEYOND = 0.25  # of the distance before it, the least beyond the position
+SMOOTH = 2.0**-4  # change of accelerations in a leap, as part of them and of speed squared over size
+APPROACHES = 3  # by which the implicit rule converges: Euler's, then its own twice
+
+
+@kernel
+def back(y, s):
+    """Put the last good state of the run into y; returns its time (s), -inf where there is none."""
+    if s.cw.time[0] > -inf:
+        for i in range(y.shape[0]):
+            y[i] = s.cw.state[i]
+    return s.cw.time[0]
+
+
+@kernel
+def leap(end, y, dy, y_new, dy_new, s):
+    """Leap from the last good state of the run, y, over a singular position, not beyond time `end` (s).
+
+    Returns the length of the leap (s), with slopes dy at y, which is closed to rounding first, and dy_new at y_new, the
+    last good state from now on. 0 where there is none: too far from such a position, or it is not seen how to go on.
+    """
+    cw, t = s.cw, s.cw.time[0]
+    if not t > -inf:
+        return 0.0
+    recall(cw)
+    h = _length(t, end, y, dy, y_new, s)
+    if h > 0.0 and not _lands(t, h, y, dy, y_new, dy_new, s):
+        h = 0.0
+    if h > 0.0:
+        cw.failure[0], cw.closer[0] = OK, 0
+        if choose_rows(s.cc, cw) < 0 and factorise(s.cc, cw) < 0:
+            remember(t + h, y_new, s.cc, cw)
+            return h
+    recall(cw)
+    return 0.0
+
+
+@sweep
+def _slope(t, y, dy, s):
+    """dy at y once it is closed to rounding; a status code, and what is left in R, loads and Q belongs to y."""
+    project_tree(t, y, s.c)
+    status = _tree(t, y, s)
+    if status != OK:
+        return status
+    close(t, y, TIGHT, s)
+    status = _tree(t, y, s)
+    if status != OK:
+        return status
+    status = row_loads(s.w, s.cc, s.cw)
+    if status == OK:
+        accelerate(s.route, s)
+        store_slope(s.c, s.w, power(s.c, s.w), dy)
+    return status
+
+
+@sweep
+def _tree(t, y, s):
+    load_state(t, y, s.c, s.w)
+    status = free_tree(s.route, s)
+    if status == OK and factorise(s.cc, s.cw) >= 0:
+        return CLOSURE_SINGULAR
+    return status
+
+
+@helper
+def _length(t, end, y, dy, trial, s):
+    """How far to leap: twice to where the last of the pivots vanishes that vanish soon, or to `end`; 0 for none.
+
+    Leaves in cw.vanishing (s) when each chosen row does, inf for those that do not soon, and in cw.demand what the
+    closures demand along them now.
+    """
+    cc, cw = s.cc, s.cw
+    if _slope(t, y, dy, s) != OK:
+        return 0.0
+    probe = inf
+    for g in range(cc.group.shape[0]):
+        probe = min(probe, PROBE * passing_time(cc, cw, g))
+        for a in range(cw.rank[g]):
+            cw.demand[cc.group[g].row_start + a] = _demand(cc, cw, g, a)
+    if not probe < inf:
+        return 0.0
+    for i in range(y.shape[0]):
+        trial[i] = y[i] + probe * dy[i]
+    project_tree(t + probe, trial, s.c)
+    if _tree(t + probe, trial, s) != OK:
+        return 0.0
+    last, blurred = _vanish(probe, cc, cw)
+    cw.closer[0] = 1 if last > 0.0 else 0
+    h = min(2.0 * last, end - t)
+    return 0.0 if blurred or h < (1.0 + BEYOND) * last else h
+
+
+@helper
+def _vanish(probe, cc, cw):
+    """When each chosen row vanishes that does so soon: last of these times (s), 0 for none; whether one is too near.
+
+    Rows that vanish not much later are among them: a leap must not end near another singular position.
+    """
+    last, blurred = 0.0, False
+    for g in range(cc.group.shape[0]):
+        moment = passing_time(cc, cw, g)
+        for a in range(cw.rank[g]):
+            place = cc.group[g].row_start + a
+            before, after = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
+            if _along(cc, cw, g, a) < 0.0:
+                after = -after
+            ahead = before * probe / (before - after) if before > after else inf
+            cw.vanishing[place] = ahead
+            if ahead < LEAP * moment:
+                last = max(last, ahead)
+                blurred = blurred or ahead < NEAREST * moment
+    before = 0.0
+    while before < last:
+        before = last
+        for g in range(cc.group.shape[0]):
+            for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
+                if cw.vanishing[place] < APART * before:
+                    last = max(last, cw.vanishing[place])
+    for g in range(cc.group.shape[0]):
+        for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
+            if cw.vanishing[place] > last:
+                cw.vanishing[place] = inf
+    return last, blurred
+
+
+@helper
+def _lands(t, h, y, dy, y_new, dy_new, s):
+    """Whether the trapezoidal rule leads from y to y_new on the same branch."""
+    for approach in range(APPROACHES):
+        for i in range(y.shape[0]):
+            slope = dy[i] if approach == 0 else 0.5 * (dy[i] + dy_new[i])
+            y_new[i] = y[i] + h * slope
+        if _slope(t + h, y_new, dy_new, s) != OK:
+            return False
+    return largest_gap(s.cc, s.cw)[0] <= OPEN and _same_branch(h, s.cc, s.cw)
+
+
+@helper
+def _same_branch(h, cc, cw):
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            place = cc.group[g].row_start + a
+            r = cw.chosen[place]
+            along, ahead = _along(cc, cw, g, a), cw.vanishing[place]
+            if not ahead < inf:
+                if not along >= TURNED:
+                    return False
+            else:
+                expected = cw.former_pivot[place] * (h - ahead) / ahead
+                found = cw.factor[entry(cc, g, a, a)]
+                if not (-along >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
+                    return False
+                closure = cw.closure[cc.row[r].closure]
+                before, after = cw.demand[place], -_demand(cc, cw, g, a)  # Q points the other way
+                usual = closure.speed**2 / closure.size + cw.size[r] * min(abs(before), abs(after))
+                if not cw.size[r] * abs(after - before) <= SMOOTH * usual:
+                    return False
+    return True
+
+
+@helper
+def _along(cc, cw, g, a):
+    """Cosine of the angle by which row a of Q of group g has turned since the last good state."""
+    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
+    total, at = 0.0, cc.group[g].half + a * (stop - start)
+    for j in range(at, at + own - start):
+        total += cw.basis[j] * cw.former[j]
+    return total
+
+
+@helper
+def _demand(cc, cw, g, a):
+    """Acceleration that the loads cause along row a of Q of group g: an element of R f."""
+    total, first = 0.0, cc.group[g].row_start
+    for b in range(a, cw.rank[g]):
+        total += cw.factor[entry(cc, g, a, b)] * cw.row[cw.chosen[first + b]].load
+    return total
