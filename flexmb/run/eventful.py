@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
@@ -19,6 +20,7 @@ from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun, Impact, Latch
 from flexmb.scene.schema import SceneEvent
+from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
@@ -30,7 +32,7 @@ MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chatterin
 
 def refuse_events(system: System, method: Method) -> None:
     """NotImplementedError for events that a method or a closed chain does not have."""
-    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in system.scene.events):
+    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in _by_what_they_watch(system)):
         raise NotImplementedError(
             f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
             '"radau5" or "exponential"'
@@ -43,6 +45,14 @@ def refuse_events(system: System, method: Method) -> None:
             )
 
 
+def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
+    """The scene's events, sensors replaced by what they measure."""
+    if not system.scene.events:
+        return ()
+    names = watchable(system.scene)
+    return tuple(structs.replace(event, watch=names[event.watch]) for event in system.scene.events)
+
+
 class EventfulRun:
     """One run of a scene with events."""
 
@@ -52,7 +62,7 @@ class EventfulRun:
         """times (T,) s of the output."""
         self._situation, self._times, self._settings = Situation(system), times, settings
         self._algorithm, self._stabilise = algorithm, stabilise
-        self._events = system.scene.events
+        self._events = _by_what_they_watch(system)
         self._happened: list[EventRecord] = []
         self._paused_at: list[float] = []
         self._whole: Trajectory | None = None

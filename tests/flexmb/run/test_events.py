@@ -157,6 +157,16 @@ def test_the_run_ends_at_an_event():
     assert run.message == f'ended by event "landed" at t = {t:g} s' and abs(run.q[-1, 0]) < 1e-14
 
 
+def test_sensors_are_watched_by_their_names():
+    ended = fm.SceneEvent(name="fast", watch="speed", level=-2.0, actions=(fm.EndRun(),))
+    speed = fm.CoordinateSensor(name="speed", of="rail", quantity="rate")
+    late = fm.SceneEvent(name="late", watch="clock", level=0.1, actions=(impact(1.0).actions[0],))
+    run = fm.simulate(ball(1.0, ended, late, speed, fm.TimeSensor(name="clock")), 2.0, samples=11)
+    assert [each.name for each in run.events] == ["late", "fast"] and run.u[-1, 0] == -2.0
+    with pytest.raises(fm.SceneError, match='no "height"'):
+        ball(1.0, fm.SceneEvent(name="e", watch="height", level=0.0, actions=(fm.EndRun(),)))
+
+
 def test_what_does_not_come_does_not_happen():
     """Wrong direction, level out of reach, at the level from the start: the run is that without events, bit for bit."""
     plain = fm.simulate(ball(1.0, stiffness=30.0), 3.0, samples=31)
