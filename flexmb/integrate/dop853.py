@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     REJECTED,
     SAMPLES,
     Interval,
