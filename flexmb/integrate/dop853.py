@@ -244,16 +244,17 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
                 return status, t
             step, length = Interval(t, t_new, last), t_new - t
             status, error = attempt(problem, step, y, s, accuracy, counts)
-            trouble = reason(status)
+            trouble, leapt = reason(status), False
             if may_leap(status):
                 far = leap(problem, last, y, s.k[0], s.y_new, s.k[END], counts)
                 if far > 0.0:
                     t_new, length, status, error = t + far, far, OK, CALM
-                    step = Interval(t, t_new, last)
+                    step, leapt = Interval(t, t_new, last), True
                     store_leapt(step, y, s.k[0], s.y_new, s.k[END], times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
-                if watch is not None and is_crossed(watch, s.y_new):
+                # a level that is crossed within a leap is found at its end, by the step that follows
+                if watch is not None and not leapt and is_crossed(watch, s.y_new):
                     return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from msgspec import structs
 
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
@@ -19,6 +20,7 @@ from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun, Impact, Latch
 from flexmb.scene.schema import SceneEvent
+from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
@@ -30,7 +32,7 @@ MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chatterin
 
 def refuse_events(system: System, method: Method) -> None:
     """NotImplementedError for events that a method or a closed chain does not have."""
-    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in system.scene.events):
+    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in _by_what_they_watch(system)):
         raise NotImplementedError(
             f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
             '"radau5" or "exponential"'
@@ -43,6 +45,14 @@ def refuse_events(system: System, method: Method) -> None:
             )
 
 
+def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
+    """The scene's events, sensors replaced by what they measure."""
+    if not system.scene.events:
+        return ()
+    names = watchable(system.scene)
+    return tuple(structs.replace(event, watch=names[event.watch]) for event in system.scene.events)
+
+
 class EventfulRun:
     """One run of a scene with events."""
 
@@ -52,7 +62,7 @@ class EventfulRun:
         """times (T,) s of the output."""
         self._situation, self._times, self._settings = Situation(system), times, settings
         self._algorithm, self._stabilise = algorithm, stabilise
-        self._events = system.scene.events
+        self._events = _by_what_they_watch(system)
         self._happened: list[EventRecord] = []
         self._paused_at: list[float] = []
         self._whole: Trajectory | None = None
@@ -74,10 +84,10 @@ class EventfulRun:
                 return self._ended(raw), raw
             self._paused_at.append(raw.t)
             y, controlled = self._apart(raw.y)
-            for event in self._arriving(found, watched, levels, y):
-                self._happened.append(self._situation.happen(event, raw.t, y))
+            arrived = self._arriving(found, watched, levels, y)
+            self._happened += [self._situation.happen(event, raw.t, y) for event in arrived]
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
-            ends = any(isinstance(action, EndRun) for event in found for action in event.actions)
+            ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
             sides = self._sides_after(watched, levels, y)
@@ -103,11 +113,18 @@ class EventfulRun:
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
         times = np.unique([start, *wanted, stop])
         with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
-            raw = integrate(system, solve, begin, times, self._settings, levels)
+            raw = integrate(system, solve, begin, times, self._left(), levels)
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
             self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
         return raw, stop
+
+    def _left(self) -> Settings:
+        """The settings with as many steps as the pieces before have left."""
+        if self._whole is None:
+            return self._settings
+        done = self._whole.statistics.accepted_steps + self._whole.statistics.rejected_steps
+        return replace(self._settings, max_steps=max(self._settings.max_steps - done, 0))
 
     def _found(self, raw: Raw, stop: float, watched: Sequence[SceneEvent], levels: Watch | None) -> list[SceneEvent]:
         """What happens where a piece ended, in the order of the scene."""

@@ -142,13 +142,3 @@ class UserLaw(_Controller, frozen=True, kw_only=True, tag="user"):
 
 
 Controller = StateSpace | Pid | Saturation | GainTable | UserLaw
-
-
-def has_states(controller: Controller) -> bool:
-    """Whether it remembers anything."""
-    match controller:
-        case StateSpace(A=A):
-            return bool(A)
-        case UserLaw(initial=initial):
-            return bool(initial)
-    return isinstance(controller, Pid)

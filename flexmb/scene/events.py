@@ -51,9 +51,9 @@ Action = Latch | Release | Impact | Change | EndRun
 class SceneEvent(SceneStruct, frozen=True, kw_only=True):
     """What happens, whenever `watch` comes to `level` from below (rising), from above (falling) or either way.
 
-    `watch`: "time" (s); a scalar coordinate, "<hinge>.<key>" or "<wheel>.angle" (m or rad); or its rate,
-    "<hinge>.<key>.rate" or "<wheel>.speed". What is at its level when the run begins has been there before. Actions are
-    done in their order, at the same time.
+    `watch`: "time" (s); a scalar coordinate, "<hinge>.<key>" or "<wheel>.angle" (m or rad); its rate,
+    "<hinge>.<key>.rate" or "<wheel>.speed"; or the name of a sensor that measures one of these alone. What is at its
+    level when the run begins has been there before. Actions are done in their order, at the same time.
     """
 
     name: str

@@ -7,6 +7,7 @@ from typing import NamedTuple
 from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quaternion, RigidBody, Vector
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.connectors import AlongHinge, AngularFriction, AngularSpring
+from flexmb.scene.control import CoordinateSensor, TimeSensor
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
 from flexmb.scene.schema import PointMass, Scene, Wheel
 
@@ -148,3 +149,21 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     if names:
         raise ValueError(f'"{item.name}" has more than one {sort}, {", ".join(names)}: say which coordinate is meant')
     raise ValueError(f'"{item.name}" has no {sort} "{connector.coordinate}"'.replace(' ""', ""))
+
+
+def watchable(scene: Scene) -> dict[str, str]:
+    """What an event may watch, by the name it gives: "time", a scalar coordinate or its rate.
+
+    A sensor of time or of the only coordinate of a hinge, wheel or point mass stands for what it measures.
+    """
+    paths = scalar_paths(scene)
+    found = {"time": "time"} | {name: name for name in paths}
+    found |= {rate: rate for rate in (rate_name(name, path) for name, path in paths.items())}
+    for sensor in scene.sensors:
+        if isinstance(sensor, TimeSensor):
+            found[sensor.name] = "time"
+        elif isinstance(sensor, CoordinateSensor):
+            own = [name for name in paths if name.startswith(f"{sensor.of}.")]
+            if len(own) == 1:
+                found[sensor.name] = own[0] if sensor.quantity == "value" else rate_name(own[0], paths[own[0]])
+    return found

@@ -8,7 +8,7 @@ from flexmb.scene.check.walk import sound
 from flexmb.scene.events import Change, Impact, Latch, Release
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene, SceneEvent
-from flexmb.scene.tree import rate_name, scalar_paths
+from flexmb.scene.tree import scalar_paths, watchable
 from flexmb.scene.values import PathError, with_values
 
 
@@ -17,12 +17,12 @@ def events(scene: Scene) -> Iterator[Defect]:
     if not scene.events:
         return
     paths = scalar_paths(scene)
-    watched = {"time", *paths, *(rate_name(name, path) for name, path in paths.items())}
+    watched = watchable(scene)
     for place, event in sound(scene, "events"):
         if event.watch not in watched:
             yield Defect(str(place.key("watch")), f'there is no "{event.watch}"', closest(event.watch, watched))
-        if event.watch == "time" and event.crossing == "falling":
-            yield Defect(str(place.key("direction")), "time does not fall", "leave the direction out")
+        if watched.get(event.watch) == "time" and event.crossing == "falling":
+            yield Defect(str(place.key("crossing")), "time does not fall", "leave the crossing out")
         if not event.actions:
             yield Defect(str(place.key("actions")), "nothing happens", "give at least one action, or leave it out")
         yield from _actions(scene, place, event, paths)

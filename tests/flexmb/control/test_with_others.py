@@ -29,31 +29,33 @@ def test_an_actuator_of_a_connector_is_driven() -> None:
     assert run.power["law"] == pytest.approx(motor.power["law"], abs=1e-10)
 
 
-def test_controllers_go_on_across_events() -> None:
-    """An event that changes nothing of the motion changes nothing of the control either, to rounding of the steps."""
-    law = fm.StateSpace(
-        name="law", inputs=("angle", "rate"), A=((0.5,),), B=((1.0, 0.0),), C=((-2.0,),), D=((-3.0, -0.5),),
-        period_s=0.1, delay_s=0.05,
-    )  # fmt: skip
-    plain = rotor(law)
+SAMPLED = fm.StateSpace(
+    name="law", inputs=("angle", "rate"), A=((0.5,),), B=((1.0, 0.0),), C=((-2.0,),), D=((-3.0, -0.5),), period_s=0.1,
+    delay_s=0.05,
+)  # fmt: skip
+CONTINUOUS = fm.StateSpace(name="law", inputs=("angle", "rate"), A=((-2.0,),), B=((1.0, 0.3),), C=((-3.0,),))
+
+
+@pytest.mark.parametrize("law", [SAMPLED, CONTINUOUS], ids=["sampled", "continuous"])
+def test_controllers_go_on_across_events(law: fm.StateSpace) -> None:
+    """An event that changes nothing of the motion changes nothing of the control either, to the error of the steps."""
     event = fm.SceneEvent(
         name="nothing", watch="pivot.rotation", level=0.1,
         actions=(fm.Change(path="pivot.rotation.stiffness_Nm_rad", value=0.0),),
     )  # fmt: skip
     with_event = fm.simulate(rotor(law, event), 2.0, samples=21)
-    alone = fm.simulate(plain, 2.0, samples=21)
+    alone = fm.simulate(rotor(law), 2.0, samples=21)
     assert with_event.events
     assert np.abs(with_event.q - alone.q).max() < 1e-9
     assert np.abs(with_event.signals["law"] - alone.signals["law"]).max() < 1e-8
     assert np.abs(with_event.energy_drift).max() < 1e-9
 
 
-def test_states_that_are_integrated_refuse_events() -> None:
-    law = fm.StateSpace(name="law", inputs=("angle",), A=((-1.0,),), B=((1.0,),), C=((-1.0,),))
-    event = fm.SceneEvent(name="end", watch="time", level=0.5, actions=(fm.EndRun(),))
-    with pytest.raises(NotImplementedError, match="continuous and has states, and the scene has events"):
-        fm.simulate(rotor(law, event), 1.0)
-    static = fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),))
-    run = fm.simulate(rotor(static, event), 1.0)
-    assert run.stopped_at == 0.5
-    assert run.signals["law"][-1, 0] == -run.q[-1, 0]
+@pytest.mark.parametrize("law", [SAMPLED, CONTINUOUS], ids=["sampled", "continuous"])
+def test_a_run_that_an_event_ends_shows_its_signals_there(law: fm.StateSpace) -> None:
+    event = fm.SceneEvent(name="end", watch="time", level=0.55, actions=(fm.EndRun(),))
+    run = fm.simulate(rotor(law, event), 1.0)
+    assert run.stopped_at == run.t[-1] == 0.55
+    assert run.signals["angle"][-1, 0] == run.q[-1, 0]
+    assert run.loads["pivot"][-1, 2] == pytest.approx(run.signals["law"][-1, 0], abs=1e-12)
+    assert run.signals["law"][-1, 0] != 0.0

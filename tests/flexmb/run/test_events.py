@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.scene.shapes import beam_section
 
 G = 9.81
 METHODS = [("dop853", {}), ("rk4", {"step": 1e-3}), ("radau5", {"rtol": 1e-9}), ("exponential", {"rtol": 1e-9})]
@@ -156,6 +157,16 @@ def test_the_run_ends_at_an_event():
     assert run.message == f'ended by event "landed" at t = {t:g} s' and abs(run.q[-1, 0]) < 1e-14
 
 
+def test_sensors_are_watched_by_their_names():
+    ended = fm.SceneEvent(name="fast", watch="speed", level=-2.0, actions=(fm.EndRun(),))
+    speed = fm.CoordinateSensor(name="speed", of="rail", quantity="rate")
+    late = fm.SceneEvent(name="late", watch="clock", level=0.1, actions=(impact(1.0).actions[0],))
+    run = fm.simulate(ball(1.0, ended, late, speed, fm.TimeSensor(name="clock")), 2.0, samples=11)
+    assert [each.name for each in run.events] == ["late", "fast"] and run.u[-1, 0] == -2.0
+    with pytest.raises(fm.SceneError, match='no "height"'):
+        ball(1.0, fm.SceneEvent(name="e", watch="height", level=0.0, actions=(fm.EndRun(),)))
+
+
 def test_what_does_not_come_does_not_happen():
     """Wrong direction, level out of reach, at the level from the start: the run is that without events, bit for bit."""
     plain = fm.simulate(ball(1.0, stiffness=30.0), 3.0, samples=31)
@@ -180,6 +191,16 @@ def test_chattering_is_told(restitution):
     assert run.stopped_at == pytest.approx(rest, rel=1e-5) and run.q.min() > -1e-9
 
 
+def test_steps_are_counted_over_all_pieces_and_a_stopped_run_goes_on():
+    whole = fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31)
+    steps = whole.statistics.accepted_steps + whole.statistics.rejected_steps
+    assert fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31, max_steps=steps).finished
+    run = fm.simulate(arm(latch("root", 0.0)), 3.0, samples=31, max_steps=steps - 1)
+    assert run.status is fm.Status.MAX_STEPS and run.events and run.stopped_at < 3.0
+    rest = fm.simulate(run.restart.scene, 3.0, state=run.restart, samples=[run.stopped_at, 3.0])
+    assert np.array_equal(rest.q[-1], whole.q[-1])
+
+
 def test_what_events_cannot_do_is_refused():
     with pytest.raises(NotImplementedError, match="does not find where"):
         fm.simulate(ball(1.0, impact(1.0)), 1.0, "generalised_alpha", step=1e-3)
@@ -199,3 +220,36 @@ def test_a_run_with_events_is_taken_up():
     whole, first = fm.simulate(scene, 3.0, samples=times), fm.simulate(scene, 2.0, samples=times[:41])
     rest = fm.simulate(first.restart.scene, 3.0, state=first.restart, samples=times[40:])
     assert first.events and np.array_equal(rest.q[1:], whole.q[41:]) and rest.events == ()
+
+
+def test_modes_take_their_part_of_a_latch():
+    """Two flexible panels that latch at the same time, or next to it: both momenta and the balance of energy hold."""
+    strip = beam_section(E=7e10, G=2.7e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=2700.0)
+    scene = fm.SceneBuilder("panels").rigid_body("hub", mass=20.0, inertia=(5.0, 6.0, 7.0)).free("f", "ground", "hub")
+    for side in (1, -1):
+        name, seat = f"panel{side}", (0.0, 0.5 * side, 0.0)
+        scene.beam(name, length=1.0, elements=6, section=strip, modes=4)
+        scene.revolute(f"h{side}", "hub", name, parent_position=seat, angle=1.5 * side, stiffness=0.3)
+        scene.add(latch(f"h{side}", 0.0))
+    run = fm.simulate(scene.scene(), 2.0, rtol=1e-11, samples=41)
+    assert len(run.events) == 2 and abs(run.events[0].t - run.events[1].t) < 1e-9
+    modes = [place for place, (name, _) in enumerate(run.u_names) if ".mode_rate" in name]
+    jump = run.events[0].after.u - run.events[0].before.u
+    assert np.abs(jump[modes]).max() > 0.1
+    assert np.abs(run.momentum_drift).max() < 1e-10
+    assert np.abs(run.energy_drift).max() < 1e-9 * run.energy_scale
+
+
+def test_a_closed_chain_has_events_without_impulses():
+    """A motor on a loop is switched off at a time, and the run ends where a coordinate passes a level."""
+    def loop(torque: fm.Function) -> fm.SceneBuilder:
+        scene = fm.SceneBuilder("loop").rigid_body("bob", mass=1.0, com=(1.0, 0.0, 0.0), inertia=(0.1, 0.1, 0.1))
+        scene.planar("slide", "ground", "bob", rotation=fm.AngularCoordinate(torque_Nm=torque))
+        return scene.closure("pin", "revolute", "ground", "bob", axis=(0.0, 0.0, 1.0))
+
+    off = fm.Change(path="slide.rotation.torque_Nm", value=fm.Constant(value=0.0))
+    scene = loop(fm.Constant(value=2.0)).event("off", "time", 0.5, off)
+    run = fm.simulate(scene.event("over", "slide.rotation", 1.0, fm.EndRun()).scene(), 5.0, samples=21)
+    pulsed = fm.simulate(loop(fm.Pulse(value=2.0, start_s=0.0, duration_s=0.5)).scene(), run.stopped_at, samples=2)
+    assert [each.name for each in run.events] == ["off", "over"] and run.stopped_at < 5.0
+    assert np.allclose(run.q[-1], pulsed.q[-1], rtol=0.0, atol=1e-9) and run.q[-1, 2] == pytest.approx(1.0, abs=1e-12)
