@@ -39,7 +39,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     NotImplementedError for controllers that are sampled, or read what depends on forces of the same instant.
     """
     _refuse(system)
-    plant = system.anew()
+    plant = system._anew()
     made = algorithms.chosen("articulated").route
     assert made is not None
     route = made(plant)
