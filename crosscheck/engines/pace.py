@@ -6,16 +6,16 @@ motors bring about later, and what hangs beyond a hinge that is free to move, ma
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import eigh
 
-from crosscheck.engines.connections import stiffest
+from crosscheck.engines.connections import Connection
 from crosscheck.engines.conventions import Frame, axis_rotation, cross, cross_matrix, frame
 from crosscheck.engines.functions_of_time import fastest_change, fastest_rate, profile, scene_functions
-from crosscheck.engines.links import Ball, Floating, Freedom, Link, Scalar, links
-from flexmb.scene.connectors import HingeSpring, by_stem
+from crosscheck.engines.links import Attachment, Ball, Floating, Freedom, Link, Scalar, links
+from flexmb.scene.connectors import BetweenNodes, Bushing, Connector, HingeSpring, by_stem
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
@@ -42,7 +42,7 @@ def pace(scene: Scene, duration_s: float, modes: float = 0.0) -> Pace:
     turning = max(_turning(freedom, duration_s) for link in chain for freedom in link.freedoms or (None,))
     swinging = tree.swinging(float(np.linalg.norm(scene.gravity_m_s2)))
     profiles = [fastest_change(function, duration_s) for function in scene_functions(scene)]
-    return Pace(max(turning, swinging), max(tree.poles(scene), stiffest(scene, chain), *profiles, 0.0), modes)
+    return Pace(max(turning, swinging), max((tree.poles(scene), *profiles)), modes)
 
 
 def fastest_mode(mass: Real, translation: Real, inertia: Real, rotation: Real, stiffness: Real) -> float:
@@ -77,7 +77,9 @@ class _Columns:
         self._motion = np.array(motions).reshape(-1, 6).T
         self._origin = np.array(origins).reshape(-1, 3)
         self._carried = _subtrees(chain, frames)[owners]
-        beyond = _beyond(chain)[np.ix_(owners, owners)]
+        self._frames = frames
+        self._moves = _beyond(chain)[owners]  # (n, links)
+        beyond = self._moves[:, owners]
         upper = np.einsum("ia,jik,kj->aj", self._motion, self._carried, self._motion) * beyond
         self._mass = np.where(beyond, upper, upper.T)
 
@@ -96,22 +98,58 @@ class _Columns:
         return float(np.sqrt(fastest))
 
     def poles(self, scene: Scene) -> float:
-        """Of the springs and dampers of hinges, wheels, point masses, and of connectors along them (rad/s)."""
-        K, C = np.zeros((2, len(self._freedoms)))
-        free = np.ones(len(self._freedoms), dtype=bool)
+        """Of the springs and dampers of hinges, wheels and point masses, and of connectors (rad/s)."""
+        count = len(self._freedoms)
+        K, C = np.zeros((2, count, count))
+        free = np.ones(count, dtype=bool)
         for column, freedom in enumerate(self._freedoms):
             if not isinstance(freedom, Floating):
-                K[column], C[column] = freedom.stiffness, freedom.damping
+                K[column, column], C[column, column] = freedom.stiffness, freedom.damping
                 free[column] = not isinstance(freedom, Scalar) or freedom.prescribed is None
         for connector in scene.connectors:
-            if isinstance(connector, HingeSpring):
-                item, number = coordinate_of(scene, connector)
-                stems = by_stem(connector)
-                rise = np.diff(stems["loads"]) / np.diff(stems["table"]) if stems["table"] else np.zeros(1)
-                K[self._first[item.name] + number] += max(stems["stiffness"], rise.max()) + stems["stop_stiffness"]
-                C[self._first[item.name] + number] += stems["damping"]
+            rows, stiffness, damping = self._resisted(scene, connector)
+            K += rows.T @ stiffness @ rows
+            C += rows.T @ damping @ rows
         M = self._mass[np.ix_(free, free)]
-        return max(_fastest(np.diag(K[free]), M), _fastest(np.diag(C[free]), M) ** 2)
+        return max(_fastest(K[np.ix_(free, free)], M), _fastest(C[np.ix_(free, free)], M) ** 2)
+
+    def _resisted(self, scene: Scene, connector: Connector) -> tuple[Real, Real, Real]:
+        """What a connector resists: k rates of n speeds (k,n), and stiffness and damping (k,k) of them."""
+        stems = by_stem(connector)
+        if isinstance(connector, HingeSpring):
+            item, number = coordinate_of(scene, connector)
+            column = np.eye(len(self._freedoms))[[self._first[item.name] + number]]
+            return column, (_steepest(stems) + stems["stop_stiffness"]) * np.eye(1), stems["damping"] * np.eye(1)
+        if not isinstance(connector, BetweenNodes):  # friction along a hinge
+            return np.zeros((0, len(self._freedoms))), np.zeros((0, 0)), np.zeros((0, 0))
+        ends = Connection(scene, self._chain, connector)
+        a, b = self._frame(ends.a), self._frame(ends.b)
+        turning, moving = (
+            a.rotation.T @ (beyond - before)
+            for beyond, before in zip(self._motion_of(ends.b, b), self._motion_of(ends.a, b), strict=True)
+        )
+        if isinstance(connector, Bushing):
+            return np.concatenate([turning, moving]), np.array(connector.stiffness), np.array(connector.damping)
+        line = a.rotation.T @ (b.position - a.position)
+        length = np.linalg.norm(line)
+        along = (line / length @ moving)[None] if length > 0.0 else moving
+        return along, _steepest(stems) * np.eye(len(along)), stems["damping"] * np.eye(len(along))
+
+    def _frame(self, at: Attachment) -> Frame:
+        """In World."""
+        return at.frame if at.link < 0 else self._frames[at.link] @ at.frame
+
+    def _motion_of(self, at: Attachment, place: Frame) -> tuple[Real, Real]:
+        """Angular velocity, and velocity at the place, (3,n) each, of what a frame is attached to."""
+        turns, shifts = self._motion[:3], self._motion[3:]
+        moves = self._moves[:, at.link] if at.link >= 0 else np.zeros(len(self._freedoms), dtype=bool)
+        return turns * moves, (shifts - cross_matrix(place.position) @ turns) * moves
+
+
+def _steepest(stems: dict[str, Any]) -> float:
+    """Stiffness of a law at rest, or where its table rises most."""
+    rise = np.diff(stems["loads"]) / np.diff(stems["table"]) if stems["table"] else np.zeros(1)
+    return max(stems["stiffness"], float(rise.max()))
 
 
 def _fastest(stiffness: Real, mass: Real) -> float:

@@ -23,7 +23,7 @@ def _arm(builder: SceneBuilder) -> SceneBuilder:
 @pytest.mark.parametrize("place", [(0.0, 0.0, 0.0), (30.0, -20.0, 5.0)])
 def test_a_pendulum_swings_as_fast_wherever_it_begins(angle: float, place: tuple[float, float, float]) -> None:
     scene = _arm(SceneBuilder("pendulum", gravity=(0.0, 0.0, -G)))
-    scene = scene.revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), angle=angle, position=place).scene()
+    scene = scene.revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), angle=angle, parent_position=place).scene()
     assert pace(scene, 1.0) == pytest.approx((np.sqrt(MASS * G * ARM / ABOUT_PIVOT), 0.0, 0.0))
 
 
@@ -52,35 +52,79 @@ def test_springs_in_a_chain_have_its_highest_frequency() -> None:
 
 
 def test_the_mass_matrix_is_the_native_one() -> None:
-    """By their damping poles: hinges of all kinds, turned and moved, point masses and wheels with their own."""
+    """By the highest frequency of springs on a ball joint and a hinge that is turned and moved."""
     from crosscheck.engines.native import NativeEngine
 
     scene = (
         _arm(SceneBuilder("tree", gravity=(0.0, 0.0, -G)))
         .rigid_body("hand", mass=0.7, com=(0.1, 0.2, -0.1), inertia=(0.02, 0.03, 0.04))
         .spherical("shoulder", "ground", "arm", quaternion=(0.8, 0.6, 0.0, 0.0), stiffness=3.0)
-        .revolute("wrist", "arm", "hand", axis=(0.0, 0.6, 0.8), angle=0.4, position=(1.0, 0.1, 0.0), stiffness=11.0)
+        .revolute("wrist", "arm", "hand", axis=(0.0, 0.6, 0.8), angle=0.4, parent_position=(1, 0.1, 0), stiffness=11.0)
         .scene()
     )
     system = NativeEngine().compile(scene)._system
-    M = system.mass_matrix(system.initial_state.q)
+    M = system.mass_matrix(system.initial_state)
     highest = np.sqrt(np.linalg.eigvals(np.linalg.solve(M, np.diag([3.0, 3.0, 3.0, 11.0]))).real.max())
     assert pace(scene, 1.0).elastic == pytest.approx(highest, rel=1e-9)
 
 
-def test_a_spring_on_what_has_no_mass_has_no_say() -> None:
+def _joined() -> SceneBuilder:
+    """The same carriages side by side on rails along x, without springs."""
+    return (
+        SceneBuilder("carriages")
+        .rigid_body("first", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        .rigid_body("second", mass=3.0, inertia=(1.0, 1.0, 1.0))
+        .prismatic("left", "ground", "first", axis=(1.0, 0.0, 0.0))
+        .prismatic("right", "ground", "second", axis=(1.0, 0.0, 0.0), parent_position=(2.0, 0.0, 0.0))
+    )
+
+
+def test_connectors_count_by_what_they_join() -> None:
+    """6 N/m and 9 N s/m between masses of 1 and 3 kg: poles of sqrt(6 * 4/3) and 9 * 4/3 rad/s."""
+    sprung = _joined().spring_damper("spring", "first", "second", stiffness=6.0).scene()
+    assert pace(sprung, 1.0).elastic == pytest.approx(np.sqrt(8.0), rel=1e-9)
+    damped = _joined().spring_damper("damper", "first", "second", stiffness=6.0, damping=9.0).scene()
+    assert pace(damped, 1.0).elastic == pytest.approx(12.0, rel=1e-9)
+    across = _joined().spring_damper("across", "ground", "second", position_a=(2.0, 5.0, 0.0), stiffness=6.0).scene()
+    assert pace(across, 1.0).elastic == pytest.approx(0.0, abs=1e-9)
+    both = np.diag([5.0, 5.0, 5.0, 6.0, 70.0, 70.0])
+    bushed = _joined().bushing("bushing", "first", "second", stiffness=both).scene()
+    assert pace(bushed, 1.0).elastic == pytest.approx(np.sqrt(8.0), rel=1e-9)
+
+
+def test_a_bushing_turns_with_its_frame_about_its_point() -> None:
+    """A hinged arm held at its mass centre by stiffness across it alone: k arm² about the pivot, at any angle."""
+    stiffness = np.diag([0.0, 0.0, 0.0, 0.0, 0.0, 40.0])
+    for angle in (0.0, 0.8):
+        held = _arm(SceneBuilder("held")).revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0), angle=angle)
+        turned = (np.cos(angle / 2.0), 0.0, np.sin(angle / 2.0), 0.0)
+        place = (ARM * np.cos(angle), 0.0, -ARM * np.sin(angle))
+        held.bushing(
+            "hold", "ground", "arm", stiffness=stiffness, position_a=place, quaternion_a=turned, position_b=(ARM, 0, 0)
+        )
+        assert pace(held.scene(), 1.0).elastic == pytest.approx(np.sqrt(40.0 * ARM**2 / ABOUT_PIVOT), rel=1e-9)
+
+
+def test_a_spring_and_a_stop_along_a_hinge() -> None:
+    scene = _arm(SceneBuilder("stopped")).revolute("pivot", "ground", "arm", axis=(0.0, 1.0, 0.0))
+    law = {"table": (-1.0, 0.0, 1.0), "loads": (-1.0, 0.0, 5.0)}
+    scene.angular_spring("stop", "pivot", **law, upper=1.0, stop_stiffness=90.0)
+    assert pace(scene.scene(), 1.0).elastic == pytest.approx(np.sqrt(95.0 / ABOUT_PIVOT), rel=1e-9)
+
+
+def test_a_driven_link_without_mass_has_its_rate_alone() -> None:
     scene = (
-        SceneBuilder("massless")
+        SceneBuilder("massless", gravity=(0.0, 0.0, -G))
         .rigid_body("link", mass=0.0, inertia=(0.0, 0.0, 0.0))
-        .revolute("pivot", "ground", "link", axis=(0.0, 1.0, 0.0), stiffness=5.0)
+        .revolute("pivot", "ground", "link", axis=(0.0, 1.0, 0.0), prescribed=Ramp(rate=-3.0))
         .scene()
     )
-    assert pace(scene, 1.0) == (0.0, 0.0, 0.0)
+    assert pace(scene, 1.0) == (3.0, 0.0, 0.0)
 
 
-@pytest.mark.parametrize("function", [Constant(value=3.0), Ramp(rate=2.0), Pulse(value=1.0, start_s=0.0, duration_s=1.0)])
-def test_what_does_not_swing_changes_at_no_frequency(function) -> None:
-    assert fastest_change(function) == 0.0
+def test_what_does_not_swing_changes_at_no_frequency() -> None:
+    for function in (Constant(value=3.0), Ramp(rate=2.0), Pulse(value=1.0, start_s=0.0, duration_s=1.0)):
+        assert fastest_change(function) == 0.0
 
 
 def test_profiles_change_at_the_frequency_of_a_sine_like_them() -> None:
@@ -95,7 +139,8 @@ def test_profiles_change_at_the_frequency_of_a_sine_like_them() -> None:
 
 
 def test_the_highest_mode_of_points() -> None:
-    translation, rotation = np.zeros((2, 3, 2)), np.zeros((2, 3, 2))
+    """The third mode has stiffness and no mass, so it has no frequency."""
+    translation, rotation = np.zeros((2, 3, 3)), np.zeros((2, 3, 3))
     translation[0, 1, 0], rotation[1, 2, 1] = 2.0, 1.0  # modal masses 3 * 4 and 0.5
-    inertia = np.array([np.eye(3), 0.5 * np.eye(3)])
-    assert fastest_mode(np.array([3.0, 1.0]), translation, inertia, rotation, np.diag([12.0, 8.0])) == pytest.approx(4.0)
+    inertia, mass = np.array([np.eye(3), 0.5 * np.eye(3)]), np.array([3.0, 1.0])
+    assert fastest_mode(mass, translation, inertia, rotation, np.diag([12.0, 8.0, 1.0])) == pytest.approx(4.0)
