@@ -112,8 +112,8 @@ def a_snapshot_names_what_the_scene_has(engine: Engine) -> None:
 def a_violent_run_has_a_status(engine: Engine) -> None:
     scene = pendulum(rate=1e6)
     times = np.linspace(0.0, 1e-3, 3)
-    coarsest = ladder(engine, scene, times[-1])[0]
-    run = simulated(offered(engine, scene), scene, times, coarsest)  # where it raises, that is told
+    model = offered(engine, scene)
+    run = simulated(model, scene, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
     require(run.status == "finished" or bool(run.message.strip()), f"it {run.status} without saying why")
 
 
