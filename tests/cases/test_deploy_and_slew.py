@@ -14,7 +14,9 @@ from flexmb.typing import Real
 
 SCENE = fm.load_scene(Path(__file__).parents[2] / "cases" / "spacecraft" / "deploy_and_slew" / "scene.toml")
 (LAW,) = SCENE.controllers
+assert isinstance(LAW, fm.UserLaw)
 AXIS, STIFFNESS, DAMPING = np.reshape(LAW.parameters, (3, 3))
+PERIOD, DELAY = 0.1, LAW.delay_s
 WHEELS = [wheel.name for wheel in SCENE.wheels]
 XYZ = "xyz"
 
@@ -26,6 +28,7 @@ def run() -> fm.Trajectory:
 
 def test_the_panels_latch_one_after_the_other_and_the_slew_ends_at_its_aim(run: fm.Trajectory) -> None:
     assert run.finished
+    assert LAW.period_s == PERIOD
     assert [event.name for event in run.events] == ["left latches", "right latches"]
     left, right = (event.t for event in run.events)
     assert 5.0 < left < right - 1.0 < 25.0
@@ -74,13 +77,13 @@ def predicted(latched: fm.Scene, start: Real, slew: fm.SmoothStep, periods: int,
     names, inputs = [name for name, _ in model.states], [name for name, _ in model.inputs]
     n, motors = len(names), [inputs.index(f"{wheel}.angle") for wheel in WHEELS]
     whole = np.block([[model.A, -model.B[:, motors]], [np.zeros((3, n + 3))]])  # the motors' torque on the hub
-    late, rest_of_period = expm(delay * whole), expm((LAW.period_s - delay) * whole)
+    late, rest_of_period = expm(delay * whole), expm((PERIOD - delay) * whole)
     turned = [names.index(f"orbit.rotation.{axis}") for axis in XYZ]
     turning = [names.index(f"orbit.angular_velocity.{axis}") for axis in XYZ]
     x, held, found = np.zeros(n), np.zeros(3), [start]
     x[turned] = start
     for k in range(periods):
-        angle, rate = aimed(slew, k * LAW.period_s)
+        angle, rate = aimed(slew, k * PERIOD)
         new = -STIFFNESS * (x[turned] - angle * AXIS) - DAMPING * (x[turning] - rate * AXIS)
         x = (late @ [*x, *held])[:n]
         x = (rest_of_period @ [*x, *new])[:n]
@@ -103,11 +106,11 @@ def test_the_linear_model_predicts_the_sampled_loop(run: fm.Trajectory) -> None:
     slew = fm.SmoothStep(start_value=0.0, end_value=size, start_s=4.0, duration_s=6.0)
     assert run.restart is not None
     latched = run.restart.scene.with_values({"slew.function": slew})
-    rest = {"orbit": [0.0, 0.0, 0.0, 1.0, *0.5 * start], "orbit.speeds": np.zeros(6)}
-    small = fm.simulate(latched, periods * LAW.period_s, samples=periods + 1, rtol=1e-12, atol=1e-17, state=rest)
+    rest = {"orbit": np.array([0.0, 0.0, 0.0, 1.0, *0.5 * start]), "orbit.speeds": np.zeros(6)}
+    small = fm.simulate(latched, periods * PERIOD, samples=periods + 1, rtol=1e-12, atol=1e-17, state=rest)
     turned = 2.0 * small.markers["tracker"].quaternion[:, 1:]  # of a small rotation
     response = np.abs(turned).max()
-    assert np.abs(turned - predicted(latched, start, slew, periods, LAW.delay_s)).max() < 1e-6 * response
+    assert np.abs(turned - predicted(latched, start, slew, periods, DELAY)).max() < 1e-6 * response
     assert np.ptp(turned, axis=0).min() > 0.3 * size
     # without the delay the model would be another
     assert np.abs(turned - predicted(latched, start, slew, periods, 0.0)).max() > 1e-3 * response
