@@ -5,7 +5,7 @@ torque or force, and knows of no controllers. Sampled controllers act where an i
 at their instant for the first time. Instants are ends of segments (`flexmb.integrate.problem.Clock`), before which
 integrators evaluate nothing at or after them: that first evaluation is at the state that the run has reached there.
 
-A loop is passed as constants and as workspace.
+A loop is passed as constants and as workspace: `s`, and the `same` once more.
 """
 
 from flexmb.control import tables as a
@@ -17,7 +17,7 @@ from flexmb.tables.status import OK
 
 
 @kernel
-def rhs(t, y, dy, s, _):
+def rhs(t, y, dy, s, same):
     """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
     _take(y, s)
     status = _set(t, s)
@@ -44,7 +44,7 @@ def move(y, increment, result, s):
 
 
 @kernel
-def observe(s, _, out):
+def observe(s, same, out):
     """What the mechanics' kernel observes where `rhs` was just evaluated."""
     nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], out))
 

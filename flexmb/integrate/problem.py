@@ -93,12 +93,12 @@ class Leaping(NamedTuple):
 
 
 @kernel
-def _no_way_back(y, _):
+def _no_way_back(y, constants):
     return -math.inf
 
 
 @kernel
-def _no_leap(end, y, dy, y_new, dy_new, _):
+def _no_leap(end, y, dy, y_new, dy_new, constants):
     return 0.0
 
 
