@@ -17,7 +17,7 @@ BODIES = {  # mass, mass centre, inertia about it
     "K6": (0.00706, 0.00579, 5.667e-7),
     "K7": (0.05498, -0.00449 - 0.01228j, 1.912e-5),
 }
-MARKERS = {"K1": 0.007, "K2": -0.028, "K3": 0.02 - 0.018j, "K4": 0.0, "K5": 0.0, "K6": 0.0, "K7": 0.0}
+MARKERS = {"K1": 0.007, "K2": -0.028, "K3": 0.02 - 0.018j, "K4": 0.0, "K5": 0.02 + 0.01j, "K6": 0.0, "K7": -0.01 - 0.02j}
 TURNED, PANELS = 20.0, 200  # the angle up to which the quadrature goes, and its panels of equal steps in the root
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 TINY = 1e-9  # a root of the angle at which the mechanism has hardly begun to move, for 0/0
