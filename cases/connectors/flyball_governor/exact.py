@@ -28,23 +28,23 @@ MOMENTUM = about_axis(START[0])[0] * SPIN
 
 
 def coupler(lean, height, lean_rate, height_rate):
-    """Of one spring: tension, extension, direction from the slider to the arm, and the pull on lean and height."""
+    """Of one spring: tension, extension, and how its length changes with lean and height."""
     way = np.array([MIDDLE * np.cos(lean), TOP - MIDDLE * np.sin(lean) - height])
     length = np.sqrt(way[0] ** 2 + way[1] ** 2)
     n = way / length
-    slope = -MIDDLE * (n[0] * np.sin(lean) + n[1] * np.cos(lean))  # of the length by the lean; by the height: -n[1]
-    tension = STIFFNESS * (length - FREE) + DAMPING * (slope * lean_rate - n[1] * height_rate)
-    return tension, length - FREE, n, slope
+    by_lean, by_height = -MIDDLE * (n[0] * np.sin(lean) + n[1] * np.cos(lean)), -n[1]
+    tension = STIFFNESS * (length - FREE) + DAMPING * (by_lean * lean_rate + by_height * height_rate)
+    return tension, length - FREE, by_lean, by_height
 
 
 def rates(t, y):
+    """Of lean, height, their rates and the turn of the shaft: for each arm, a half of what the shaft's inertia demands."""
     lean, height, lean_rate, height_rate, _ = y
     inertia, change = about_axis(lean)
-    tension, _, n, slope = coupler(lean, height, lean_rate, height_rate)
+    tension, _, by_lean, by_height = coupler(lean, height, lean_rate, height_rate)
     spin = MOMENTUM / inertia
-    moment = 0.25 * spin**2 * change + FIRST * G * np.cos(lean) - tension * slope
-    swing = moment / (SECOND + ACROSS)
-    return np.array([lean_rate, height_rate, swing, 2.0 * tension * n[1] / SLIDER - G, spin])
+    swing = (0.25 * spin**2 * change + FIRST * G * np.cos(lean) - tension * by_lean) / (SECOND + ACROSS)
+    return np.array([lean_rate, height_rate, swing, -2.0 * tension * by_height / SLIDER - G, spin])
 
 
 def slopes(t, y):
@@ -59,23 +59,27 @@ def around(turn, radius, z):
 
 def states(times):
     """Lean, height, their rates and the turn of the shaft (T, 5)."""
-    run = solve_ivp(rates, (0.0, max(times[-1], 1e-9)), START, "Radau", times, jac=slopes, rtol=1e-11, atol=1e-13)
+    run = solve_ivp(rates, (0.0, max(times[-1], 1e-9)), START, "Radau", times, jac=slopes, rtol=1e-10, atol=1e-12)
     if not run.success:
         raise ArithmeticError(run.message)
     return run.y.T
 
 
+def energies(lean, height, lean_rate, height_rate):
+    """Kinetic, of gravity, of both springs; and the rate of the shaft."""
+    inertia, _ = about_axis(lean)
+    spin = MOMENTUM / inertia
+    kinetic = 0.5 * inertia * spin**2 + (SECOND + ACROSS) * lean_rate**2 + 0.5 * SLIDER * height_rate**2
+    weight = G * (SLIDER * height + 2.0 * (MASS * TOP - FIRST * np.sin(lean)) + 0.5 * ROD)
+    return kinetic, weight, STIFFNESS * coupler(lean, height, lean_rate, height_rate)[1] ** 2, spin
+
+
 def exact(times):
-    """Motion of slider and balls, couplers' loads and energies at `times` (s), World axes, SI."""
+    """Motion of slider and balls, momentum and energies at `times` (s), World axes, SI."""
     times = np.asarray(times, dtype=float)
     lean, height, lean_rate, height_rate, turn = states(times).T
-    inertia, _ = about_axis(lean)
-    spin, zero = MOMENTUM / inertia, np.zeros_like(lean)
-    tension, extension, n, _ = coupler(lean, height, lean_rate, height_rate)
-    kinetic = 0.5 * inertia * spin**2 + (SECOND + ACROSS) * lean_rate**2 + 0.5 * SLIDER * height_rate**2
-    weight = G * (SLIDER * height + 2.0 * (MASS * TOP - FIRST * np.sin(lean)) + ROD * 0.5)
-    spring = STIFFNESS * extension**2
-    half = 0.5 * turn
+    kinetic, weight, spring, spin = energies(lean, height, lean_rate, height_rate)
+    half, zero = 0.5 * turn, np.zeros_like(lean)
     found = {
         "energy.kinetic": kinetic[:, None],
         "energy.gravity": weight[:, None],
@@ -94,5 +98,4 @@ def exact(times):
         found[f"marker:{name} ball.position"] = around(at, radius, TOP - np.sin(lean))
         found[f"marker:{name} ball.velocity"] = along + around(at, out, -np.cos(lean) * lean_rate)
         found[f"marker:{name} ball.angular_velocity"] = around(at + 0.5 * np.pi, lean_rate, spin)
-        found[f"connector:{name} coupler.force"] = -around(at, tension * n[0], tension * n[1])
     return found
