@@ -120,7 +120,8 @@ def _dominant(model: LinearModel, shape: Complex) -> str:
 
 def _mac(mass: Real, before: Complex, after: Complex) -> Real:
     """Modal assurance criterion (n,n) of shapes (n,n), by kinetic energy."""
-    one, other = (root / np.linalg.norm(root, axis=0) for root in (np.linalg.cholesky(mass).T @ x for x in (before, after)))
+    root = np.linalg.cholesky(mass).T
+    one, other = (x / np.linalg.norm(x, axis=0) for x in (root @ before, root @ after))
     return np.abs(one.conj().T @ other) ** 2
 
 
