@@ -6,5 +6,5 @@ it follow from unit loads passed inward through the articulated quantities. `row
 on rows forces on the tree and passes these inward, `sizes` says what rows are compared with, `factor` finds the
 independent ones, `clusters` couples groups that one base carries, `forces` adds the closure loads to an evaluation,
 `projection` takes a state back to where the closures are closed, `branch` notices singular positions, `leap` passes
-them, `dynamics` holds the entry points.
+them, `dynamics` holds the entry points, `tangent` that of exact derivatives at given closure loads.
 """

@@ -76,6 +76,15 @@ class Closures:
         self.is_singular = False
         """Whether the last motion failed because fewer rows are independent there than elsewhere."""
 
+    def on_tree(self, constants: Constants, tree: Callable[[], Workspace]) -> Closures:
+        """The same closures on the same tree with other functions of time, and workspaces for them."""
+        return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check)
+
+    @property
+    def row_loads(self) -> Real:
+        """(G,) loads of the rows in the motion that was evaluated last."""
+        return self._evaluated.cw.row["load"].copy()
+
     def chain(self, algorithm: str, rate: float = 0.0) -> Closed:
         """The chain with workspaces of its own, for an algorithm; with a `rate` (1/s) closures are stabilised."""
         c, cc = self.constants

@@ -73,28 +73,35 @@ def evaluate_rows(c, w, cc, cw, accelerated):
     for j in range(w.u.shape[0]):
         fastest = max(fastest, abs(w.u[j]))
     for i in range(cc.closure.shape[0]):
-        A, B = cc.side[i, 0], cc.side[i, 1]
-        p_WA, R_WA = pose(w, A)
-        p_WB, R_WB = pose(w, B)
-        V_WA, V_WB = velocity(w, A), velocity(w, B)
-        R_AB = matmul(transpose(R_WA), R_WB)
-        p_AB = times_t(R_WA, sub(p_WB, p_WA))
-        w_A = times_t(R_WA, V_WA[0])
-        V_AB = _relative_velocity(times6_t(R_WA, sub6(V_WB, V_WA)), w_A, p_AB)
-        store9(cw.closure[i].rotation, 0, R_AB)
-        store3(cw.closure[i].position, 0, p_AB)
-        store9(cw.closure[i].world, 0, R_WA)
+        p_WA, V_WA, V_WB = evaluate_closure(c, w, cc, cw, i, accelerated)
         cw.closure[i].size = cc.length[0] + norm1(p_WA)
         turns = norm1(V_WA[0]) + norm1(V_WB[0])
         cw.closure[i].speed = norm1(V_WA[1]) + norm1(V_WB[1]) + cc.length[0] * (turns + fastest)
+
+
+@helper
+def evaluate_closure(c, w, cc, cw, i, accelerated):
+    """The same for closure i, without its size and speed; returns p_WA, V_WA and V_WB."""
+    A, B = cc.side[i, 0], cc.side[i, 1]
+    p_WA, R_WA = pose(w, A)
+    p_WB, R_WB = pose(w, B)
+    V_WA, V_WB = velocity(w, A), velocity(w, B)
+    R_AB = matmul(transpose(R_WA), R_WB)
+    p_AB = times_t(R_WA, sub(p_WB, p_WA))
+    w_A = times_t(R_WA, V_WA[0])
+    V_AB = _relative_velocity(times6_t(R_WA, sub6(V_WB, V_WA)), w_A, p_AB)
+    store9(cw.closure[i].rotation, 0, R_AB)
+    store3(cw.closure[i].position, 0, p_AB)
+    store9(cw.closure[i].world, 0, R_WA)
+    for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
+        _row(cc, cw, r, R_AB, p_AB, V_AB)
+    if accelerated:
+        A_WA, A_WB = acceleration(c, w, A), acceleration(c, w, B)
+        alpha_A = times_t(R_WA, A_WA[0])
+        A_AB = _relative_acceleration(times6_t(R_WA, sub6(A_WB, A_WA)), alpha_A, w_A, p_AB, V_AB)
         for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
-            _row(cc, cw, r, R_AB, p_AB, V_AB)
-        if accelerated:
-            A_WA, A_WB = acceleration(c, w, A), acceleration(c, w, B)
-            alpha_A = times_t(R_WA, A_WA[0])
-            A_AB = _relative_acceleration(times6_t(R_WA, sub6(A_WB, A_WA)), alpha_A, w_A, p_AB, V_AB)
-            for r in range(cc.closure[i].row_start, cc.closure[i].row_stop):
-                _row_acceleration(cc, cw, r, R_AB, V_AB, A_AB)
+            _row_acceleration(cc, cw, r, R_AB, V_AB, A_AB)
+    return p_WA, V_WA, V_WB
 
 
 @helper

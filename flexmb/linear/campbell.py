@@ -81,21 +81,22 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
     macs: list[Real] = []
     verdicts: list[Stability] = []
     names: tuple[str, ...] = ()
-    shapes: Complex | None = None
+    before: tuple[LinearModel, Complex] | None = None
     for rate in rates:
         spin = steady_spin(system, hinge, float(rate), guess)
         model, guess = spin.linearize(), spin.state
         found, current = _spectrum(model)
-        if shapes is None:
+        if before is None:
             names = tuple(_dominant(model, shape) for shape in current.T)
             macs.append(np.ones(len(found)))
         else:
-            alike = _mac(shapes, current)
+            shapes = before[0].displacements_by(model.displacements) @ before[1]  # others may be independent here
+            alike = _mac(model.mass, shapes, current)
             order = _followed(alike, values[-1], found)
             macs.append(alike[np.arange(len(order)), order])
             found, current = found[order], current[:, order]
         values.append(found)
-        shapes = current
+        before = model, current
         verdicts.append(model.stability)
     return Campbell(
         system.scene.name, hinge, rates, np.array(values), np.array(macs), names, tuple(verdicts)
@@ -103,25 +104,25 @@ def campbell(system: System | Scene, hinge: str, rates: ArrayLike) -> Campbell:
 
 
 def _spectrum(model: LinearModel) -> tuple[Complex, Complex]:
-    """n eigenvalues, one of each pair (above, or on the right), and shapes (n,n) of unit kinetic energy."""
+    """n eigenvalues, one of each pair (above, or on the right), and shapes (n,n)."""
     modes = [mode for mode in model.modes if mode.eigenvalue.imag > 0.0]
     real = sorted(
         (mode for mode in model.modes if mode.eigenvalue.imag == 0.0), key=lambda mode: -mode.eigenvalue.real
     )
     modes += real[: len(model.rates) - len(modes)]
     modes.sort(key=lambda mode: mode.natural_rad_s)
-    root = np.linalg.cholesky(model.mass).T
-    shapes = root @ np.array([mode.shape for mode in modes]).T
-    return np.array([mode.eigenvalue for mode in modes]), shapes / np.linalg.norm(shapes, axis=0)
+    return np.array([mode.eigenvalue for mode in modes]), np.array([mode.shape for mode in modes]).T
 
 
 def _dominant(model: LinearModel, shape: Complex) -> str:
     return model.displacements[int(np.argmax(np.abs(shape)))]
 
 
-def _mac(before: Complex, after: Complex) -> Real:
-    """Modal assurance criterion (n,n) of shapes of unit norm."""
-    return np.abs(before.conj().T @ after) ** 2
+def _mac(mass: Real, before: Complex, after: Complex) -> Real:
+    """Modal assurance criterion (n,n) of shapes (n,n), by kinetic energy."""
+    root = np.linalg.cholesky(mass).T
+    one, other = (x / np.linalg.norm(x, axis=0) for x in (root @ before, root @ after))
+    return np.abs(one.conj().T @ other) ** 2
 
 
 def _followed(alike: Real, before: Sequence[complex] | Complex, after: Complex) -> NDArray[np.int64]:

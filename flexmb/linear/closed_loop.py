@@ -21,6 +21,7 @@ from flexmb.linear.variations import Equations
 from flexmb.motion.retraction import move
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.tables.status import OK, Status
@@ -36,7 +37,8 @@ STEP = 1e-3
 def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
     """About a state, and the controllers' initial states; `model` makes the linear model of a motion.
 
-    NotImplementedError for controllers that are sampled, or read what depends on forces of the same instant.
+    NotImplementedError for closed chains, and for controllers that are sampled or read what depends on forces of the
+    same instant.
     """
     _refuse(system)
     plant = system._anew()
@@ -100,6 +102,8 @@ class _Seen:
 
 
 def _refuse(system: System) -> None:
+    if isinstance(system, ClosedSystem):
+        raise NotImplementedError(f'scene "{system.scene.name}" has closures and controllers: {REMEDY}')
     sampled = [each.name for each in system.scene.controllers if each.period_s is not None]
     if sampled:
         raise NotImplementedError(

@@ -18,7 +18,7 @@ from flexmb.linear.variations import Equations, Variations, entering
 from flexmb.scene.schema import Scene
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
-from flexmb.typing import Index, Real
+from flexmb.typing import Real
 
 CONVERGED = 1e-12  # last correction, as part of a displacement of all free coordinates by 1 (rad, m, unit of a mode)
 RESIDUAL = 1e-9  # acceleration left, as part of that at the start
@@ -40,8 +40,8 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
 
     All speeds are zero; prescribed coordinates, motors and loads keep the values their functions have at the guess's
     time. Wheels without springs stay at their angles. Whether the equilibrium is stable is for `linearize(...,
-    held=True)`. Raises EquilibriumError where none is found, NotImplementedError for closed chains, ValueError or
-    TypeError for a guess that is not a state of this system.
+    held=True)`. Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of
+    level "ruthless", ValueError or TypeError for a guess that is not a state of this system or leaves closures open.
     """
     equations, guess = entering(system, guess)
     return balanced(equations.held(guess.t), replace(guess, u=np.zeros_like(guess.u)))
@@ -50,7 +50,7 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
 def balanced(equations: Equations, guess: State) -> State:
     """The state near the guess, with the guess's speeds, in which the free accelerations vanish."""
     start = equations.on_functions(guess)
-    if not len(equations.free):
+    if not equations.freedom:
         return start
     found = _newton(equations, start)
     if found is not None:
@@ -91,7 +91,7 @@ class _Loads:
     """
 
     def __init__(self, equations: Equations, at: Variations) -> None:
-        M, moving = equations.mass(at.state), equations.movable
+        M, moving = at.mass, at.movable
         self.at = at
         self.loads, self.derivative = (M @ at.rates)[moving], (M @ at.by_displacement)[np.ix_(moving, moving)]
         self.inertia, self.size = M[np.ix_(moving, moving)], float(np.sqrt(at.rates @ M @ at.rates))
@@ -102,7 +102,7 @@ class _Loads:
 
 def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variations, float] | None:
     """After the longest of the steps tau, tau/4, tau/16 ... that does a quarter of the promised work; the next tau."""
-    moving, step = equations.movable, np.zeros(len(here.at.rates))
+    moving, step = here.at.movable, np.zeros(len(here.at.rates))
     for _ in range(SHORTENINGS):
         flow = here.inertia / tau - here.derivative
         try:
@@ -111,7 +111,7 @@ def _downhill(equations: Equations, here: _Loads, tau: float) -> tuple[Variation
             if s @ here.inertia @ s <= (LONGEST * here.scale) ** 2:
                 step[moving] = s
                 there = equations.moved(here.at, step)
-                left = (equations.mass(there) @ equations.rates(there))[moving]
+                left = equations.loads(there, here.at)[moving]
                 work, promised = 0.5 * s @ (here.loads + left), s @ here.loads + 0.5 * s @ here.derivative @ s
                 if work >= 0.25 * promised:
                     return equations.variations(there), tau * (4.0 if work >= 0.75 * promised else 1.0)
@@ -127,7 +127,7 @@ def _newton(equations: Equations, state: State) -> State | None:
     try:
         at = equations.variations(state)
         for _ in range(STEPS):
-            now = _Linearised(at, equations.mass(at.state), equations.movable)
+            now = _Linearised(at)
             first = now.size if first is None else first
             if now.length <= CONVERGED * now.scale:
                 removed = now.left <= RESIDUAL * first + ROUNDING * now.stiffness * now.scale
@@ -148,7 +148,8 @@ class _Linearised:
     of the derivative; scale: length of a displacement of all free coordinates by 1.
     """
 
-    def __init__(self, at: Variations, M: Real, moving: Index) -> None:
+    def __init__(self, at: Variations) -> None:
+        M, moving = at.mass, at.movable
         self.at, self._moving = at, moving
         self._root, self._own = np.linalg.cholesky(M), np.linalg.cholesky(M[np.ix_(moving, moving)])
         K = self._root.T @ solve_triangular(self._own, at.by_displacement[:, moving].T, lower=True).T
@@ -175,7 +176,7 @@ def _damped(equations: Equations, now: _Linearised) -> State | None:
     while factor >= SMALLEST * longest:
         try:
             moved = equations.moved(now.at, factor * now.step)
-            if now.correction(equations.rates(moved))[1] <= (1.0 - 0.25 * factor) * now.length:
+            if now.correction(equations.rates(moved)[now.at.chosen])[1] <= (1.0 - 0.25 * factor) * now.length:
                 return moved
         except DynamicsError:
             pass  # cannot be evaluated there: take a shorter step
@@ -185,10 +186,10 @@ def _damped(equations: Equations, now: _Linearised) -> State | None:
 
 def _report(equations: Equations, at: Variations) -> str:
     """The error: which acceleration is left, where, and what to do."""
-    left = equations.mass(at.state) @ at.rates
+    left = at.mass @ at.rates
     names, _ = displacement_names(equations)
     worst = int(np.argmax(np.abs(left)))
     return (
         f'scene "{equations.system.scene.name}": no equilibrium found; {left[worst]:.3g} N (N m) are left along '
-        f"{names[worst]}. Look for a coordinate without a spring that loads push away, or give a guess closer to it"
+        f"{names[at.chosen[worst]]}. Look for a coordinate without a spring that loads push away, or give a guess closer to it"
     )

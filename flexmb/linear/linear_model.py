@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -91,6 +92,9 @@ class LinearModel:
     Names and units: `states` (2n), `inputs` (loads of hinges and wheels along their free speeds), `outputs` (the
     states, then displacement and rotation vector of every marker, World axes). mass (n,n): mass matrix. motion (nq,n):
     dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit derivative by time.
+
+    Of a closed chain the states are independent coordinates and their speeds, as many as the closures leave. Those that
+    depend on them follow the states among the outputs, and `motion` moves all.
     """
 
     scene: str
@@ -111,6 +115,10 @@ class LinearModel:
     def displacements(self) -> tuple[str, ...]:
         """Names of the first half of x."""
         return tuple(name for name, _ in self.states[: len(self.rates)])
+
+    def displacements_by(self, names: Sequence[str]) -> Real:
+        """(len(names), n) of x[:n]: displacements with these names, dependent ones of closed chains too; KeyError."""
+        return self.C[[_place(self.outputs, name, "output") for name in names], : len(self.rates)]
 
     @cached_property
     def eigenvalues(self) -> Complex:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.variations import Equations, entering
+from flexmb.linear.variations import Equations, Variations, entering
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -22,9 +22,11 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
 
     Prescribed coordinates follow their functions of time; with `held`, all functions stand still at their values at the
     state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` has its accelerations.
-    Of a scene with controllers it is that of the closed loop: their states come last, and start where the scene says.
-    Raises DynamicsError where the accelerations do not exist, NotImplementedError for closed chains and
-    for sampled controllers, ValueError or TypeError for what is not a state of this system.
+    Of a closed chain it is that of as many independent coordinates as the closures leave; those that depend on them are
+    among the outputs. Of a scene with controllers it is that of the closed loop: their states come last, and start
+    where the scene says. Raises DynamicsError where the accelerations do not exist, NotImplementedError for sampled
+    controllers, controllers of closed chains and closures on bodies of level "ruthless", ValueError or TypeError for
+    what is not a state of this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
@@ -47,21 +49,26 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     """The model of equations whose functions of time are already held or replaced as wanted."""
     system, free = equations.system, equations.free
     state = equations.on_functions(state)
-    at, mass, n = equations.variations(state), equations.mass(state), len(free)
+    at, n = equations.variations(state), equations.freedom
     names, units = displacement_names(equations)
     speeds = [system.state_names[1][j] for j in free]
     driven = _driven(equations)
     B = np.zeros((2 * n, len(driven)))
-    B[n:] = np.linalg.solve(mass, np.eye(n)[:, driven])
-    markers, C = _markers(equations, state)
-    states = (*zip(names, units, strict=True), *speeds)
+    B[n:] = np.linalg.solve(at.mass, at.basis[driven].T)
+    markers, seen = _markers(equations, at)
+    everything = [*zip(names, units, strict=True), *speeds]
+    chosen = np.r_[at.chosen, len(free) + at.chosen]
+    dependent = np.setdiff1d(np.arange(2 * len(free)), chosen)
+    states = tuple(everything[i] for i in chosen)
+    C = np.vstack([np.eye(2 * n), at.by_chosen[dependent], seen])
     if not all(np.isfinite(part).all() for part in (at.A, at.drift, at.rates)):
         raise DynamicsError("derivatives are not finite: coordinates or speeds are so large that products overflow")
     return LinearModel(
         scene=system.scene.name, state=state, states=states,
-        inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven), outputs=(*states, *markers),
-        A=at.A, B=B, C=np.vstack([np.eye(2 * n), C]), D=np.zeros((2 * n + len(C), len(driven))),
-        mass=mass, motion=at.motion, rates=at.rates, drift=at.drift,
+        inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven),
+        outputs=(*states, *(everything[i] for i in dependent), *markers),
+        A=at.A, B=B, C=C, D=np.zeros((len(C), len(driven))),
+        mass=at.mass, motion=at.motion, rates=at.rates, drift=at.drift,
     )  # fmt: skip
 
 
@@ -93,16 +100,18 @@ def _driven(equations: Equations) -> list[int]:
     return np.flatnonzero(~modal[equations.free]).tolist()
 
 
-def _markers(equations: Equations, state: State) -> tuple[list[tuple[str, str]], Real]:
-    """Names and rows (6 K, 2n): displacement and rotation of markers by xi, from velocities, which are linear in u."""
-    system, n = equations.system, len(equations.free)
+def _markers(equations: Equations, at: Variations) -> tuple[list[tuple[str, str]], Real]:
+    """Names and rows (6 K, 2f): displacement and rotation of markers by xi, from velocities, which are linear in u."""
+    system, state, n = equations.system, at.state, equations.freedom
     labels = [*zip("xyz", "mmm", strict=True), *_ROTATION]
     names = [(f"{marker.name}.{label}", unit) for marker in system.scene.markers for label, unit in labels]
     rows = np.zeros((len(names), 2 * n))
     if names:
         driven = _velocities(system, state, np.zeros(system.nu))
-        for i, j in enumerate(equations.free):
-            rows[:, i] = _velocities(system, state, np.eye(system.nu)[j]) - driven
+        for i, column in enumerate(at.basis.T):
+            u = np.zeros(system.nu)
+            u[equations.free] = column
+            rows[:, i] = _velocities(system, state, u) - driven
     return names, rows
 
 

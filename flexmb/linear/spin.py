@@ -37,7 +37,8 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
 
     This drive replaces every other drive of it in the scene; other prescribed coordinates stand still, other wheels
     keep the speeds they have in the guess (default: the initial state), other speeds are zero. ValueError where the
-    motion of what turns depends on the angle (gravity across the axis, loads in World axes): there is no steady spin.
+    motion of what turns depends on the angle (gravity across the axis, loads in World axes), or where closures make it
+    turn other hinges: there is no steady spin.
     EquilibriumError where no deformation is found.
     """
     base, guess = entering(system, guess)
@@ -48,6 +49,11 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     for wheel in system.scene.wheels:
         u[system.speed(wheel.name)] = guess.u[system.speed(wheel.name)]
     state = balanced(equations, replace(guess, u=u))
+    if np.any(np.abs(state.u - u)[equations.free] > DEPENDENT * abs(rate)):
+        raise ValueError(
+            f'"{hinge}" turns other hinges through closures, or bends what they join: that is no steady spin; linearize '
+            "about the states of a run"
+        )
     at = equations.variations(state)
     size = np.sum(np.abs(at.by_displacement), axis=1) + rate**2
     if np.any(np.abs(at.drift) > DEPENDENT * abs(rate) * size):

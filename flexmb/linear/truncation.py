@@ -121,19 +121,19 @@ def _across(coarse: BeamBody, fine: BeamBody) -> Real:
 
 
 def _embedding(model: LinearModel, finer: LinearModel, scene: Scene) -> Real:
-    """(n_fine, n) displacements of the finer model for unit displacements of the other, by their names."""
-    rows = {name: i for i, name in enumerate(finer.displacements)}
-    places = {name: i for i, name in enumerate(model.displacements)}
-    out = np.zeros((len(rows), len(places)))
-    for name, i in places.items():
-        out[rows[name], i] = 1.0
+    """(n_fine, n) displacements of the finer model for unit displacements of the other, by their names.
+
+    Coordinates that are independent in the finer model of a closed chain may depend on others here.
+    """
+    modal = dict[str, Real]()
     for body in scene.bodies:
         if _bends(body):
             across = _across(body, _finer(body))
-            fine = [rows[f"{body.name}.mode[{n}]"] for n in range(across.shape[0])]
-            coarse = [places[f"{body.name}.mode[{n}]"] for n in range(across.shape[1])]
-            out[np.ix_(fine, coarse)] = across
-    return out
+            coarse = model.displacements_by([f"{body.name}.mode[{n}]" for n in range(across.shape[1])])
+            modal |= {f"{body.name}.mode[{n}]": row for n, row in enumerate(across @ coarse)}
+    others = [name for name in finer.displacements if name not in modal]
+    rows = modal | dict(zip(others, model.displacements_by(others), strict=True))
+    return np.array([rows[name] for name in finer.displacements])
 
 
 def _likeness(mass: Real, one: Complex, other: Complex) -> float:

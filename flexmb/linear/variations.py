@@ -1,4 +1,6 @@
-"""The equations of motion of a tree and their exact first variations, in minimal coordinates.
+"""The equations of motion and their exact first variations, in minimal coordinates: of trees all free ones.
+
+Closed chains: `flexmb.linear.closed_variations`.
 
 xi (n,) are displacements along the free speeds: the motion that constant speeds would make in a unit of time. For
 scalar hinges, modes and wheels that is the change of the coordinate; for a quaternion a rotation vector in outboard
@@ -35,10 +37,12 @@ from flexmb.typing import Index, Real, Record
 
 @dataclass(frozen=True, eq=False)
 class Variations:
-    """Derivatives at one state, over the n free speeds.
+    """Derivatives at one state, over the f independent ones of n free speeds; of a tree these are all.
 
-    rates (n,): udot; by_displacement, by_speed (n,n): its derivatives; drift (n,): its explicit derivative by time;
-    transport (n,n): xi' = du + transport xi; motion (nq,n): N.
+    rates (f,): udot; by_displacement, by_speed (f,f): its derivatives; drift (f,): its explicit derivative by time;
+    transport (f,f): xi' = du + transport xi; motion (nq,f): N; mass (f,f): mass matrix. chosen (f,): places of the
+    independent speeds among the free ones; movable: places among these of those on whose displacement anything depends.
+    by_chosen (2n,2f): displacements and changes of all free speeds by those of the independent ones.
     """
 
     state: State
@@ -48,6 +52,15 @@ class Variations:
     drift: Real
     transport: Real
     motion: Real
+    mass: Real
+    chosen: Index
+    movable: Index
+    by_chosen: Real
+
+    @property
+    def basis(self) -> Real:
+        """(n,f) displacements of all free speeds by those of the independent ones; velocities likewise."""
+        return self.by_chosen[: len(self.by_chosen) // 2, : len(self.chosen)]
 
     @property
     def A(self) -> Real:
@@ -59,20 +72,18 @@ class Equations:
     """A system with its functions of time as they are, held, or replaced (`held`, `spinning`); one per thread."""
 
     def __init__(self, system: System, constants: Constants | None = None) -> None:
-        if isinstance(system, ClosedSystem):
-            raise NotImplementedError(
-                f'scene "{system.scene.name}" has closures: linear models are made of trees; open the loop, or put a '
-                "stiff spring hinge in its place"
-            )
         self.system = system
         self.constants = system.constants if constants is None else constants
         self.free: Index = np.flatnonzero(self.constants.speed["prescribed"] < 0)
-        # places among them of those on whose displacement anything depends: all but wheels without springs
         wheels = self.constants.wheel["u_index"]
-        indifferent = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
-        self.movable: Index = np.flatnonzero(~np.isin(self.free, indifferent))
+        self._indifferent: Index = wheels[self.constants.speed["stiffness"][wheels] == 0.0]
         self._w = tangent_workspace(self.constants, system.nq, system.nu)
         self._real_w = workspace(self.constants, system.nq, system.nu)  # with a row for each of their functions
+
+    @property
+    def freedom(self) -> int:
+        """How many speeds are independent."""
+        return len(self.free)
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""
@@ -90,7 +101,7 @@ class Equations:
         """The same with other functions of time, as many."""
         rows, table = pack_functions(functions)
         speed = self.constants.speed if speeds is None else speeds
-        return Equations(self.system, replace(self.constants, function=rows, table=table, speed=speed))
+        return type(self)(self.system, replace(self.constants, function=rows, table=table, speed=speed))
 
     def constant_functions(self, t: float) -> list[Constant]:
         """All functions of time, held at their values at time t (s)."""
@@ -105,12 +116,21 @@ class Equations:
         return self._real_w.speed["acceleration"][self.free]
 
     def mass(self, state: State) -> Real:
-        """Mass matrix (n,n) of the free speeds."""
+        """Mass matrix (n,n) of the free speeds, closures aside."""
         return self.system.mass_matrix(state)[np.ix_(self.free, self.free)]
+
+    def loads(self, state: State, at: Variations) -> Real:
+        """What accelerates the coordinates (f,) that are independent at another state, N (N m)."""
+        return self.mass(state) @ self.rates(state)
+
+    def movable(self, chosen: Index) -> Index:
+        """Places among these free speeds of those on whose displacement anything depends: no unsprung wheels."""
+        return np.flatnonzero(~np.isin(self.free[chosen], self._indifferent))
 
     def variations(self, state: State) -> Variations:
         """Exact derivatives at a state; DynamicsError where the accelerations do not exist."""
-        nq, y = self.system.nq, pack(state)
+        nq, n, y = self.system.nq, len(self.free), pack(state)
+        everything = np.arange(n)
         J, drift = np.empty((len(y), len(y))), np.empty(len(y))
         self._check(jacobian(state.t, y, J, self.constants, self._w), self._w.fault[0])
         if self._w.doubt[0]:
@@ -120,17 +140,15 @@ class Equations:
         rows, motion = J[nq + self.free], J[:nq, nq + self.free]
         return Variations(
             state, rates, rows[:, :nq] @ motion, rows[:, nq + self.free], drift[nq + self.free],
-            self._transport(state.u)[np.ix_(self.free, self.free)], motion,
+            self._transport(state.u), motion, self.mass(state), everything, self.movable(everything), np.eye(2 * n),
         )  # fmt: skip
 
     def moved(self, at: Variations, xi: Real) -> State:
         """The state displaced by xi (n,) to first order, quaternions normalised again; raises DynamicsError."""
-        y = pack(at.state)
-        y[: self.system.nq] += at.motion @ xi
-        self.system.project(at.state.t, y, self.constants)
-        if not np.isfinite(y).all():
+        q = at.state.q + at.motion @ xi
+        if not np.isfinite(q).all():
             raise DynamicsError("a displacement led beyond all numbers")
-        return State(y[: self.system.nq], y[self.system.nq : -1], at.state.t, self.system.layout)
+        return self.on_functions(replace(at.state, q=q))
 
     def on_functions(self, state: State) -> State:
         """The state with prescribed coordinates and speeds at the values of their functions at its time."""
@@ -139,7 +157,7 @@ class Equations:
         return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
 
     def _transport(self, u: Real) -> Real:
-        """(nu,nu) of xi' = du + transport xi: carried axes turn with their own angular velocity."""
+        """(n,n) of xi' = du + transport xi: carried axes turn with their own angular velocity."""
         out = np.zeros((len(u), len(u)))
         for body in self.constants.body:
             if body["quaternion"] >= 0:
@@ -149,7 +167,7 @@ class Equations:
                 if body["quaternion"] > body["q_index"]:
                     moving = slice(j + 3, j + 6)
                     out[moving, turning], out[moving, moving] = -_cross(u[moving]), -_cross(u[turning])
-        return out
+        return out[np.ix_(self.free, self.free)]
 
     def _check(self, status: int, fault: int) -> None:
         if status != OK:
@@ -157,19 +175,30 @@ class Equations:
             raise DynamicsError(Status(status).advice.format(body=f'"{place}"'))
 
 
-def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
-    """The two parts of a linear model: the equations of a tree or its scene, and a state of it (default: initial).
+def equations_of(system: System) -> Equations:
+    """The equations of a tree or a closed chain; NotImplementedError for closures on bodies of level "ruthless"."""
+    if not isinstance(system, ClosedSystem):
+        return Equations(system)
+    from flexmb.linear.closed_variations import ClosedEquations  # few scenes need it
 
-    NotImplementedError for closed chains and scenes with controllers, ValueError or TypeError for a state that is not
-    one of this system.
+    return ClosedEquations(system)
+
+
+def entering(system: System | Scene, state: State | None) -> tuple[Equations, State]:
+    """The two parts of a linear model: the equations of a system or scene, and a state of it (default: initial).
+
+    NotImplementedError for scenes with controllers and for closures on bodies of level "ruthless", ValueError or
+    TypeError for a state that is not one of this system.
     """
     if not isinstance(system, System | Scene):
         raise TypeError(f"a System or a Scene is needed, not {type(system).__name__}")
     refuse_feedback(system if isinstance(system, Scene) else system.scene, "a linear model of the motion alone")
-    equations = Equations(system if isinstance(system, System) else compile(system))
+    equations = equations_of(system if isinstance(system, System) else compile(system))
     if state is None:
         return equations, equations.system.initial_state
-    equations.system.layout.entering(state)
+    t, y = equations.system.layout.entering(state)
+    if isinstance(equations.system, ClosedSystem):
+        return equations, equations.system.admissible(t, y)
     return equations, state
 
 

@@ -57,6 +57,12 @@ class ClosedSystem(System):
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 
+    @property
+    def rank(self) -> int:
+        """Independent motions that the closures suppress, at the initial state."""
+        self.initial_state  # noqa: B018 - counts them
+        return self.closures.rank
+
     def _admissible(self, t: float, y: Real) -> State:
         """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
         rough = super()._admissible(t, y).y

@@ -1,0 +1,163 @@
+"""First variations of closed chains, in independent coordinates.
+
+Of the tree under the closure loads f, and of the rows, the derivatives are exact at fixed f (`flexmb.closure.tangent`).
+With J the rows' rates by the n free speeds and L L' = M the mass matrix of these, J L'^-1 = U S V' has as many singular
+values as rows are independent. With V_0 its null space,
+
+    P = L'^-1 V S^-1 U'     the least change of speeds, by kinetic energy, that gives rows their rates
+    N_0 = L'^-1 V_0         motions that the closures leave
+
+The loads change so that the rows' accelerations g'' stay zero, which adds M^-1 J' df = -P dg'':
+
+    dudot = d(udot)|f - P d(g'')|f
+
+E picks independent coordinates: as many as there are motions, and of all free ones those that move most, measured by
+the root of their own inertia, one after the other (pivots of a QR decomposition). Closures stay closed, and what is
+closed stays so, under
+
+    xi_all = N xi,    du_all = N du + T xi,    N = N_0 (E N_0)^-1,    T = -(1 - N E) P d(J u)/dxi N
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.linalg import qr, solve_triangular
+
+from flexmb.closure.assembly import consistent
+from flexmb.closure.closures import ClosureError
+from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.tangent import closed_jacobian, closure_tangent_workspace
+from flexmb.levels.body import LEVELS
+from flexmb.linear.variations import Equations, Variations
+from flexmb.system.closed import ClosedSystem
+from flexmb.tables.arrays import Constants
+from flexmb.tables.state import DynamicsError, State, pack
+from flexmb.tables.workspaces import workspace
+from flexmb.typing import Index, Real
+
+
+class _Derivatives(NamedTuple):
+    """Of n or G values at fixed closure loads: by displacements and speeds (n or G, n), and by time."""
+
+    by_displacement: Real
+    by_speed: Real
+    by_time: Real
+
+
+class _Slopes(NamedTuple):
+    """udot (n,) of the free speeds with its derivatives, those of the rows' rates and accelerations, N of the tree."""
+
+    rates: Real
+    of_rates: _Derivatives
+    of_row_rates: _Derivatives
+    of_row_accelerations: _Derivatives
+    motion: Real
+
+
+class _Freedom(NamedTuple):
+    """What the closures leave of n speeds with a mass matrix (n,n): N_0 (n,f), and P (n,G)."""
+
+    mass: Real
+    null: Real
+    lever: Real
+
+    def independent(self) -> Index:
+        """Places (f,) of the independent coordinates."""
+        weighed = np.sqrt(np.diag(self.mass))[:, None] * self.null
+        order: Index = qr(weighed.T, mode="r", pivoting=True)[1]
+        return np.sort(order[: self.null.shape[1]])
+
+    def basis(self, chosen: Index) -> Real:
+        """N (n,f) for these independent coordinates; LinAlgError where they are not independent."""
+        return np.linalg.solve(self.null[chosen].T, self.null.T).T
+
+
+class ClosedEquations(Equations):
+    """The equations of a closed chain."""
+
+    def __init__(self, system: ClosedSystem, constants: Constants | None = None) -> None:
+        super().__init__(system, constants)
+        c = self.constants
+        if any(LEVELS[c.body["level"][k]].at_rest for k in np.flatnonzero(c.body["modes"])):
+            raise NotImplementedError(
+                f'scene "{system.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
+                'closures join them: for a linear model use level "linear" or a better one'
+            )
+        self._closures = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
+        self._rank = system.rank
+        self._rows_w = closure_tangent_workspace(self._closures.constants[1])
+
+    @property
+    def freedom(self) -> int:
+        return len(self.free) - self._rank
+
+    def rates(self, state: State) -> Real:
+        return self._closures.motion(state.t, pack(state)).accelerations[self.free]
+
+    def loads(self, state: State, at: Variations) -> Real:
+        left = self._freedom(state, self._slopes(state).of_row_rates.by_speed)
+        return left.basis(at.chosen).T @ left.mass @ self.rates(state)
+
+    def variations(self, state: State) -> Variations:
+        slopes = self._slopes(state)
+        rows = slopes.of_row_rates
+        left = self._freedom(state, rows.by_speed)
+        chosen, P = left.independent(), left.lever
+        N, f, n = left.basis(chosen), self.freedom, len(self.free)
+        pairs = zip(slopes.of_rates, slopes.of_row_accelerations, strict=True)
+        by_displacement, by_speed, by_time = (free - P @ stopped for free, stopped in pairs)
+
+        def dependent(x: Real) -> Real:
+            """x (n,...) without what the independent coordinates move."""
+            return x - N @ x[chosen]
+
+        T = dependent(-P @ rows.by_displacement @ N)
+        carried = dependent(P @ rows.by_speed @ state.u[self.free])  # displacement by what is prescribed, per second
+        hurried = dependent(-P @ (rows.by_time + rows.by_displacement @ carried))
+        return Variations(
+            state, slopes.rates[chosen],
+            (by_displacement @ N + by_speed @ T)[chosen], (by_speed @ N)[chosen],
+            (by_time + by_displacement @ carried + by_speed @ hurried)[chosen],
+            self._transport(state.u)[chosen] @ N, slopes.motion @ N, N.T @ left.mass @ N, chosen, self.movable(chosen),
+            np.block([[N, np.zeros((n, f))], [T, N]]),
+        )  # fmt: skip
+
+    def moved(self, at: Variations, xi: Real) -> State:
+        """Closed again; DynamicsError where no closed state is near too."""
+        try:
+            return super().moved(at, xi)
+        except ClosureError as error:
+            raise DynamicsError(str(error)) from None
+
+    def on_functions(self, state: State) -> State:
+        """Closed too, with speeds that keep it so; ClosureError where there is no such state."""
+        y = consistent(self._closures, state.t, pack(super().on_functions(state)))
+        return State(y[: self.system.nq], y[self.system.nq : -1], state.t, self.system.layout)
+
+    def _slopes(self, state: State) -> _Slopes:
+        y, nq, free = pack(state), self.system.nq, self.free
+        rates, load = self.rates(state), self._closures.row_loads
+        n, rows = len(y), len(load)
+        J = np.empty((n + 2 * rows, n + 1))
+        own = self._closures.constants[1]
+        status = closed_jacobian(state.t, y, load, J, self.constants, self._w, own, self._rows_w)
+        self._check(status, self._w.fault[0])
+        motion = J[:nq, nq + free]
+
+        def of(values: Real) -> _Derivatives:
+            return _Derivatives(values[:, :nq] @ motion, values[:, nq + free], values[:, n])
+
+        return _Slopes(rates, of(J[nq + free]), of(J[n : n + rows]), of(J[n + rows :]), motion)
+
+    def _freedom(self, state: State, J: Real) -> _Freedom:
+        """DynamicsError at a singular position."""
+        mass, rank = self.mass(state), self._rank
+        weight = self._closures.constants[1].weight  # rotations beside translations
+        root = np.linalg.cholesky(mass)
+        U, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)
+        if rank and not S[rank - 1] > DEPENDENT * S[0]:
+            raise DynamicsError("the closures suppress fewer motions here than elsewhere: a singular position")
+        V = solve_triangular(root.T, Vt.T, lower=False)
+        return _Freedom(mass, V[:, rank:], V[:, :rank] / S[:rank] @ (U[:, :rank].T * weight))
