@@ -1,4 +1,4 @@
-"""Andrews' mechanism against the equations that the IVP test set prints, to 12 digits; the flyball governor's balance."""
+"""Andrews' mechanism against the equations that the IVP test set prints, to 12 digits; the governor's balance."""
 
 from __future__ import annotations
 
