@@ -241,7 +241,8 @@ def exact_in_motion(case: str) -> np.ndarray:
     scene = load_scene(FAMILY / case / "scene.toml")
     meshed = replace(scene, bodies=(replace(scene.bodies[0], elements=64),))
     code = engine("exudyn-beam")
-    done = code.compile(meshed).simulate(Run(IN_MOTION[case].times), code.efforts(meshed)[-1])
+    motion = IN_MOTION[case]
+    done = code.compile(meshed).simulate(Run(motion.times), code.efforts_for(meshed, motion.duration)[-1])
     return np.array([done.markers[marker.name].position for marker in scene.markers])
 
 

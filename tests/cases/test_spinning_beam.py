@@ -288,7 +288,7 @@ def nonlinear_beam(case: str) -> NonlinearBeam:
     code = engine("exudyn-beam")
     model, times = code.compile(scene), np.linspace(0.0, SPIN_UP_S, 151)
     length, found = scene.bodies[0].length_m, []
-    for effort in code.efforts(scene)[-2:]:
+    for effort in code.efforts_for(scene, SPIN_UP_S)[-2:]:
         done = model.simulate(Run(times), effort)
         assert done.status == "finished"
         motion = rotating_frame(TRUTHS[case].rate, times, done.markers["tip"].position)

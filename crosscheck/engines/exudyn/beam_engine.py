@@ -62,11 +62,12 @@ class ExudynBeamEngine:
 
 
 def _first_bending(scene: Scene) -> float:
-    """Frequency (rad/s) of the clamped beam's first bending, by its first station."""
-    beam = scene.bodies[0]
+    """Frequency (rad/s) of the first bending of the beam, clamped or free, by its first station."""
+    beam, root = scene.bodies[0], scene.hinges[0]
     assert isinstance(beam, BeamBody)
     station = beam.stations[0]
-    return 3.516 / beam.length_m**2 * sqrt(station.EIz_Nm2 / station.mass_per_length_kg_m)
+    number = 22.37 if isinstance(root, Planar) else 3.516
+    return number / beam.length_m**2 * sqrt(station.EIz_Nm2 / station.mass_per_length_kg_m)
 
 
 def _refusals(scene: Scene) -> Iterator[str]:
