@@ -17,8 +17,16 @@ BODIES = {  # mass, mass centre, inertia about it
     "K6": (0.00706, 0.00579, 5.667e-7),
     "K7": (0.05498, -0.00449 - 0.01228j, 1.912e-5),
 }
-MARKERS = {"K1": 0.007, "K2": -0.028, "K3": 0.02 - 0.018j, "K4": 0.0, "K5": 0.02 + 0.01j, "K6": 0.0, "K7": -0.01 - 0.02j}
-TURNED, PANELS = 20.0, 200  # the angle up to which the quadrature goes, and its panels of equal steps in the root
+MARKERS = {  # points of the bodies
+    "K1": 0.007,
+    "K2": -0.028,
+    "K3": 0.02 - 0.018j,
+    "K4": 0.0,
+    "K5": 0.02 + 0.01j,
+    "K6": 0.0,
+    "K7": -0.01 - 0.02j,
+}
+TURNED, PANELS = 20.0, 200  # the angle that the quadrature goes to, and its panels, equal in the root of the angle
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(24)
 TINY = 1e-9  # a root of the angle at which the mechanism has hardly begun to move, for 0/0
 
@@ -39,7 +47,7 @@ def pair(P, first, Q, second, side):
 
 
 def motion(crank):
-    """Of every body the place and velocity of its frame, its direction and its rate, for a crank that turns at 1 rad/s."""
+    """Of every body its place and velocity, its direction and its rate, for a crank that turns at 1 rad/s."""
     still, x = np.zeros_like(crank), np.exp(1j * crank)
     F, at_A, at_B = (0.007 * x, 0.007j * x), (A + still, still), (B + still, still)
     rod, arm = pair(F, 0.028, at_B, 0.035, 1)
@@ -69,14 +77,15 @@ def energies(bodies):
     """Kinetic for a unit rate of the crank, that of the spring, and the pull of the spring on K3."""
     kinetic = 0.0
     for name, (mass, centre, inertia) in BODIES.items():
-        kinetic = kinetic + 0.5 * mass * np.abs(point(bodies[name], centre)[1]) ** 2 + 0.5 * inertia * bodies[name][3] ** 2
+        speed, rate = np.abs(point(bodies[name], centre)[1]), bodies[name][3]
+        kinetic = kinetic + 0.5 * mass * speed**2 + 0.5 * inertia * rate**2
     way = point(bodies["K3"], MARKERS["K3"])[0] - C
     beyond = np.abs(way) - FREE
     return kinetic, 0.5 * STIFFNESS * beyond**2, -STIFFNESS * beyond * way / np.abs(way)
 
 
 def raised(angle):
-    """What the spring has stored while the crank turned by `angle`; at its first turn by quadrature, against rounding."""
+    """What the spring has stored while the crank turned by `angle`; near the start by quadrature, against rounding."""
     _, stored, _ = energies(motion(START + angle))
     _, first, _ = energies(motion(np.array([START])))
     parts = angle[..., None] * 0.5 * (1.0 + NODES)
@@ -96,13 +105,14 @@ def panels():
     """Where the panels end, as roots of the angle from the start, and when that is reached."""
     ends = np.sqrt(TURNED) * np.linspace(0.0, 1.0, PANELS + 1)
     half = 0.5 * (ends[1] - ends[0])
-    return ends, np.concatenate([[0.0], np.cumsum(half * slowness((ends[:-1] + half)[:, None] + half * NODES) @ WEIGHTS)])
+    lasting = half * slowness((ends[:-1] + half)[:, None] + half * NODES) @ WEIGHTS
+    return ends, np.concatenate([[0.0], np.cumsum(lasting)])
 
 
 def turned(times):
     """The crank's angle from the start at `times` (s), by Newton's method for its root."""
     ends, reached = panels()
-    if not np.all((0.0 <= times) & (times <= reached[-1])):
+    if not np.all((times >= 0.0) & (times <= reached[-1])):
         raise ValueError(f"times must lie between 0 and {reached[-1]:.4f} s, when the crank has turned by {TURNED} rad")
     panel = np.clip(np.searchsorted(reached, times, side="right") - 1, 0, PANELS - 1)
     begin, rest = ends[panel], times - reached[panel]

@@ -38,7 +38,7 @@ def coupler(lean, height, lean_rate, height_rate):
 
 
 def rates(t, y):
-    """Of lean, height, their rates and the turn of the shaft: for each arm, a half of what the shaft's inertia demands."""
+    """Of lean, height, their rates and the turn: each arm has a half of what the shaft's inertia demands."""
     lean, height, lean_rate, height_rate, _ = y
     inertia, change = about_axis(lean)
     tension, _, by_lean, by_height = coupler(lean, height, lean_rate, height_rate)
