@@ -51,8 +51,8 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     state = balanced(equations, replace(guess, u=u))
     if np.any(np.abs(state.u - u)[equations.free] > DEPENDENT * abs(rate)):
         raise ValueError(
-            f'"{hinge}" turns other hinges through closures, or bends what they join: that is no steady spin; linearize '
-            "about the states of a run"
+            f'"{hinge}" turns other hinges through closures, or bends what they join: that is no steady spin; '
+            "linearize about the states of a run"
         )
     at = equations.variations(state)
     size = np.sum(np.abs(at.by_displacement), axis=1) + rate**2
