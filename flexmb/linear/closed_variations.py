@@ -20,7 +20,7 @@ closed stays so, under
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import NamedTuple, cast
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -71,7 +71,7 @@ class _Freedom(NamedTuple):
 
     def basis(self, chosen: Index) -> Real:
         """N (n,f) for these independent coordinates; LinAlgError where they are not independent."""
-        return np.linalg.solve(self.null[chosen].T, self.null.T).T
+        return cast(Real, np.linalg.solve(self.null[chosen].T, self.null.T).T)
 
 
 class ClosedEquations(Equations):

@@ -81,7 +81,8 @@ def test_derivatives_are_those_of_the_closed_chain(name):
     manifold = Manifold(system, model)
     displaced = np.column_stack([manifold.slope("displacement", i) for i in range(n)])
     hurried = np.column_stack([manifold.slope("speed", i) for i in range(n)])
-    for found, expected in ((model.A[n:, :n], displaced), (model.A[n:, n:], hurried), (model.drift, manifold.slope("time"))):
+    drift = manifold.slope("time")
+    for found, expected in ((model.A[n:, :n], displaced), (model.A[n:, n:], hurried), (model.drift, drift)):
         stiffest = np.max(np.abs(expected))  # of closing the loops to 1e-14 this is what is left
         assert np.all(np.abs(found - expected) <= 2e-7 * np.max(np.abs(expected), axis=0) + 1e-10 * stiffest + 1e-8)
     assert np.array_equal(model.A[:n], np.eye(n, 2 * n, n))
@@ -232,7 +233,7 @@ def test_two_halves_of_a_spinning_body_are_one(how):
     for value in (nutation, -nutation):
         assert np.min(np.abs(model.eigenvalues - 1j * value)) < 1e-10
     assert np.max(np.abs(model.eigenvalues.real)) < 1e-6
-    assert np.sum(np.abs(np.abs(found) - rate) < 1e-6) == 6  # double ones of position, one of attitude, each with its pair
+    assert np.sum(np.abs(np.abs(found) - rate) < 1e-6) == 6  # two of position, one of attitude, and their conjugates
 
 
 ARM, LINK = 0.4, 0.5
@@ -287,7 +288,7 @@ class Governor:
 
 
 def test_governor_in_steady_spin():
-    """Where its effective potential is level, at the root of its curvature over its inertia; and so from rate to rate."""
+    """Where its effective potential is level, at the root of its curvature over its inertia; from rate to rate."""
     rates = [12.0, 14.0, 16.0]
     system = fm.compile(governor())
     diagram = fm.campbell(system, "spin", rates)
@@ -349,3 +350,50 @@ def test_ruthless_bodies_between_closures_are_refused():
     bodies = tuple(msgspec.structs.replace(body, level="ruthless") for body in scene.bodies)
     with pytest.raises(NotImplementedError, match="ruthless"):
         fm.linearize(msgspec.structs.replace(scene, bodies=bodies))
+
+
+def test_exudyn_projects_to_the_same_frequency():
+    """Every bar by itself, pins as constraints. At rest without loads: Exudyn leaves out how those of pins turn."""
+    exu = pytest.importorskip("exudyn")
+    import exudyn.itemInterface as ei
+
+    springs, bars = {"drive": 4.0, "pivot": 7.0}, m.GRASHOF
+    coupler, rocker = bars.angles(1.0)
+    rests = {"drive": 1.0, "pivot": rocker}
+    scene = m.four_bar(rate=0.0, gravity=0.0)
+    sprung = scene.with_values({
+        f"{name}.{key}": value
+        for name, stiffness in springs.items()
+        for key, value in (("rotation.stiffness_Nm_rad", stiffness), ("rotation.rest_rad", rests[name]))
+    })
+    found = fm.linearize(sprung).modes[0].frequency_rad_s
+
+    mbs = exu.SystemContainer().AddSystem()
+    ground = mbs.AddObject(ei.ObjectGround())
+    starts = (0.0, 0.0), (bars.crank * np.cos(1.0), bars.crank * np.sin(1.0)), (bars.ground, 0.0)
+    bodies = []
+    for start, angle, length in zip(starts, (1.0, coupler, rocker), bars[:3], strict=True):
+        middle = np.array(start) + 0.5 * length * np.array([np.cos(angle), np.sin(angle)])
+        node = mbs.AddNode(ei.NodeRigidBody2D(referenceCoordinates=[*middle, angle]))
+        mass = 0.78 * length
+        body = ei.ObjectRigidBody2D(physicsMass=mass, physicsInertia=mass * length**2 / 12.0, nodeNumber=node)
+        bodies.append((mbs.AddObject(body), node, 0.5 * length))
+
+    def end(i: int, side: float) -> int:
+        body, _, half = bodies[i]
+        return int(mbs.AddMarker(ei.MarkerBodyPosition(bodyNumber=body, localPosition=[side * half, 0.0, 0.0])))
+
+    def fixed(x: float) -> int:
+        return int(mbs.AddMarker(ei.MarkerBodyPosition(bodyNumber=ground, localPosition=[x, 0.0, 0.0])))
+
+    pins = (fixed(0.0), end(0, -1.0)), (end(0, 1.0), end(1, -1.0)), (fixed(bars.ground), end(2, -1.0))
+    for pair in (*pins, (end(1, 1.0), end(2, 1.0))):
+        mbs.AddObject(ei.ObjectJointRevolute2D(markerNumbers=list(pair)))
+    still = mbs.AddMarker(ei.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(ei.NodePointGround()), coordinate=0))
+    for i, stiffness in ((0, springs["drive"]), (2, springs["pivot"])):
+        turning = mbs.AddMarker(ei.MarkerNodeCoordinate(nodeNumber=bodies[i][1], coordinate=2))
+        mbs.AddObject(ei.ObjectConnectorCoordinateSpringDamper(markerNumbers=[still, turning], stiffness=stiffness))
+    mbs.Assemble()
+    squares, _ = mbs.ComputeODE2Eigenvalues()
+    assert len(squares) == 1
+    assert found == pytest.approx(np.sqrt(squares[0]), rel=1e-6)
