@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from crosscheck.engines.answers import checked_ladder, checked_model, checked_run, support_of
+from crosscheck.engines.answers import checked_model, checked_run, efforts_of, support_of
 from crosscheck.engines.contract import Effort, Engine, Model, Run, Snapshot, Trajectory
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -92,9 +92,9 @@ def snapshot(engine: Engine, scene: Scene) -> Snapshot:
     return found
 
 
-def ladder(engine: Engine, scene: Scene) -> tuple[Effort, ...]:
-    """The efforts of the engine for the scene, held against the contract."""
-    return checked_ladder(engine.efforts(scene))
+def ladder(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
+    """The efforts of the engine for a run of the scene, held against the contract."""
+    return efforts_of(engine, scene, duration_s)
 
 
 def simulated(model: Model, scene: Scene, times: Real, effort: Effort) -> Trajectory:
@@ -106,7 +106,7 @@ def finest_two(engine: Engine, scene: Scene, times: Real) -> tuple[Trajectory, T
     """The runs at the last two efforts, which must finish: their difference says how well the finest is converged."""
     model = offered(engine, scene)
     model.warm_up()
-    coarser, finest = (simulated(model, scene, times, effort) for effort in ladder(engine, scene)[-2:])
+    coarser, finest = (simulated(model, scene, times, effort) for effort in ladder(engine, scene, times[-1])[-2:])
     for run in (coarser, finest):
         require(run.status == "finished", f"the run ended as {run.status}: {run.message}")
     return coarser, finest

@@ -32,10 +32,11 @@ def a_refusal_has_a_reason(engine: Engine) -> None:
         require(support.kind == "exact" or bool(support.reason.strip()), text)
 
 
-@FORM.clause("`efforts` is a ladder of at least three efforts, coarse to fine, each once.")
+@FORM.clause("Efforts are a ladder of at least three, coarse to fine, each once, however long the run is.")
 def efforts_are_a_ladder(engine: Engine) -> None:
     offered(engine, pendulum())
-    ladder(engine, pendulum())
+    for duration_s in (1e-3, 1.0, 1e3):
+        ladder(engine, pendulum(), duration_s)
 
 
 @FORM.clause("A run has the sample times asked for, arrays of the right shapes, finite, and names that the scene has.")
@@ -49,7 +50,7 @@ def a_run_is_what_was_asked_for(engine: Engine) -> None:
 def sample_times_do_not_change_the_motion(engine: Engine) -> None:
     scene = pendulum()
     model = offered(engine, scene)
-    coarser, finest = ladder(engine, scene)[-2:]
+    coarser, finest = ladder(engine, scene, TIMES[-1])[-2:]
     few = simulated(model, scene, TIMES[::5], finest).markers["tip"].position
     many = simulated(model, scene, TIMES, finest).markers["tip"].position
     rough = simulated(model, scene, TIMES, coarser).markers["tip"].position
@@ -71,7 +72,7 @@ def runs_do_not_disturb_each_other(engine: Engine) -> None:
     scene = pendulum()
     before = msgspec.json.encode(scene)
     model = offered(engine, scene)
-    efforts = ladder(engine, scene)
+    efforts = ladder(engine, scene, TIMES[-1])
     first = simulated(model, scene, TIMES, efforts[-1]).markers["tip"].position
     for effort in (efforts[0], efforts[-1]):
         last = simulated(model, scene, TIMES, effort).markers["tip"].position
@@ -111,7 +112,8 @@ def a_snapshot_names_what_the_scene_has(engine: Engine) -> None:
 def a_violent_run_has_a_status(engine: Engine) -> None:
     scene = pendulum(rate=1e6)
     times = np.linspace(0.0, 1e-3, 3)
-    run = simulated(offered(engine, scene), scene, times, ladder(engine, scene)[0])  # where it raises, that is told
+    model = offered(engine, scene)
+    run = simulated(model, scene, times, ladder(engine, scene, times[-1])[0])  # where it raises, that is told
     require(run.status == "finished" or bool(run.message.strip()), f"it {run.status} without saying why")
 
 
@@ -119,7 +121,7 @@ def _pendulum_run(engine: Engine) -> Trajectory:
     scene = pendulum()
     model = offered(engine, scene)
     model.warm_up()
-    return simulated(model, scene, TIMES, ladder(engine, scene)[-1])
+    return simulated(model, scene, TIMES, ladder(engine, scene, TIMES[-1])[-1])
 
 
 def _same_side(found: Real, like: Real) -> Real:

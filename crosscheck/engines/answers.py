@@ -79,6 +79,13 @@ def checked_support(found: Any) -> Support:
     return Support(found.kind, _text(found.reason, "the reason of supports()"))
 
 
+def efforts_of(engine: Engine, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
+    """The engine's ladder for a run of this duration: of its `efforts_for` where it has one, else of its `efforts`."""
+    if (by_duration := getattr(engine, "efforts_for", None)) is not None:
+        return checked_ladder(by_duration(scene, duration_s))
+    return checked_ladder(engine.efforts(scene))
+
+
 def checked_ladder(found: Any) -> tuple[Effort, ...]:
     """What `efforts` returned: at least three, from coarse to fine for each method."""
     _require(isinstance(found, tuple | list), f"efforts() is {_named(found)}, not a tuple of efforts")

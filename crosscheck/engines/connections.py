@@ -106,30 +106,6 @@ def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, flo
     return found
 
 
-def stiffest(scene: Scene, chain: tuple[Link, ...]) -> float:
-    """A bound (rad/s) of what connectors between nodes add to frequencies, for choosing a step.
-
-    By their stiffness at rest and the links' own masses and inertias, which other links only add to.
-    """
-    squares = 0.0
-    for each, connector in zip(connections(scene, chain), _between(scene), strict=True):
-        ends = [chain[at.link].inertia for at in (each.a, each.b) if at.link >= 0]
-        linear = sum(1.0 / end.mass for end in ends)
-        angular = sum(1.0 / max(float(np.linalg.eigvalsh(end.inertia)[0]), 1e-12) for end in ends)
-        if isinstance(connector, Bushing):
-            K = np.array(connector.stiffness)
-            turning, moving = (float(np.linalg.eigvalsh(part)[-1]) for part in (K[:3, :3], K[3:, 3:]))
-            squares = max(squares, moving * linear, turning * angular)
-        else:
-            rise = np.max(np.diff(connector.loads_N) / np.diff(connector.table_m)) if connector.table_m else 0.0
-            squares = max(squares, max(connector.stiffness_N_m, float(rise)) * linear)
-    return sqrt(squares)
-
-
-def _between(scene: Scene) -> list[BetweenNodes]:
-    return [each for each in scene.connectors if isinstance(each, BetweenNodes)]
-
-
 def _attached(scene: Scene, chain: tuple[Link, ...], connector: BetweenNodes, side: str) -> Attachment:
     body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
     own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))

@@ -158,7 +158,8 @@ class Engine(Protocol):
     a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
     switched off, whose loop steps it, and what its `wall_s` contains. `takes` names the collections of a scene beyond
     the first contract that its adapter knows, such as "connectors" or "controllers"; a scene that has others is refused
-    for it.
+    for it. `efforts_for(scene, duration_s)` is asked in place of `efforts` where an engine has it: a ladder of fixed
+    steps depends on how long the run is (s), one of tolerances does not (see `crosscheck.engines.steps`).
     """
 
     name: str

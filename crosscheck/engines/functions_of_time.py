@@ -96,6 +96,25 @@ def fastest_rate(function: Function, until: float = inf) -> float:
             return max(abs(f(t).rate) for t in np.linspace(times[0], min(times[-1], until), 20 * len(times)))
 
 
+def fastest_change(function: Function, until: float = inf) -> float:
+    """Frequency (rad/s) of a sine that changes as fast as the function does within its own range; for choosing a step.
+
+    Jumps count as nothing: integrators stop at them.
+    """
+    match function:
+        case Constant() | Pulse() | ControlSignal() | Ramp():
+            return 0.0
+        case Sine(angular_frequency_rad_s=frequency):
+            return abs(frequency)
+        case SmoothStep(start_s=start, duration_s=duration):
+            return 2.0 * pi / duration if start < until else 0.0
+        case SpinUp(duration_s=duration):
+            return 2.0 * pi / duration
+        case Table(values=values):
+            half = (max(values) - min(values)) / 2.0
+            return fastest_rate(function, until) / half if half > 0.0 else 0.0
+
+
 def _sine(function: Sine) -> Callable[[float], Profile]:
     A, w, phase, offset = (
         function.amplitude, function.angular_frequency_rad_s, function.phase_rad, function.offset,

@@ -26,19 +26,22 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.pace import fastest_mode, pace
+from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
+from flexmb.modal.flexible import flexible_model
 from flexmb.run.eventful import refuse_events
 from flexmb.run.simulate import refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
-from flexmb.scene.schema import RigidBody, Scene
+from flexmb.scene.schema import BeamBody, ModalBody, RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 
 _TOLERANCES = (1e-6, 1e-8, 1e-10, 1e-12)
-_STEPS = (2e-3, 1e-3, 5e-4, 2.5e-4)
+_RUNGS = 4  # of steps
 _ABSOLUTE = 1e-2  # atol over rtol: modal coordinates and small rates are of the order of hundredths
 
 
@@ -86,9 +89,13 @@ class NativeEngine:
         return Support("surrogate", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        return self.efforts_for(scene, USUAL_S)
+
+    def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """A ladder of tolerances, by which adaptive methods find the steps that fit the scene; or of steps."""
         if INTEGRATORS[self._method].fixed:
-            return tuple(Effort("step", value, self._method) for value in _STEPS)
+            read = self._prepared(scene).scene
+            return ladder(self._method, pace(read, duration_s, _fastest_mode(read)), duration_s, _RUNGS)
         return tuple(Effort("tolerance", value, self._method) for value in _TOLERANCES)
 
     def compile(self, scene: Scene) -> NativeModel:
@@ -96,7 +103,13 @@ class NativeEngine:
 
         NotImplementedError where an algorithm or method has no loops.
         """
-        before, self._supported = self._supported, None
+        model = self._prepared(scene)
+        self._supported = None
+        return model
+
+    def _prepared(self, scene: Scene) -> NativeModel:
+        """The model that `supports` made, or a new one."""
+        before = self._supported
         return before[1] if before is not None and before[0] is scene else self._made(scene)
 
     def _made(self, scene: Scene) -> NativeModel:
@@ -152,6 +165,11 @@ class NativeModel:
         self._system = system
         self._algorithm: Algorithm = algorithm
         self._method: Method = method
+
+    @property
+    def scene(self) -> Scene:
+        """The scene with its SID bodies read."""
+        return self._system.scene
 
     def warm_up(self) -> None:
         """Compile or load what a run needs: the integrator, by a run over next to no time, and the outputs."""
@@ -213,6 +231,19 @@ def _approximation(scene: Scene, algorithm: Algorithm) -> str:
         return ""
     errors = "the print's errors included" if declared.errata and flexible else ""
     return "; ".join(part for part in (first_order, errors) if part)
+
+
+def _fastest_mode(scene: Scene) -> float:
+    """Of all flexible bodies (rad/s)."""
+    models = [
+        flexible_model(body)
+        for body in scene.bodies
+        if isinstance(body, BeamBody | ModalBody) and body.level != "rigid"
+    ]
+    return max(
+        (fastest_mode(each.mass, each.translation, each.inertia, each.rotation, each.stiffness) for each in models),
+        default=0.0,
+    )
 
 
 def _status(done: NativeTrajectory) -> Status:

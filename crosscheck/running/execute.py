@@ -14,11 +14,11 @@ import numpy as np
 
 from crosscheck.engines.answers import (
     BrokenContract,
-    checked_ladder,
     checked_model,
     checked_run,
     checked_version,
     clean,
+    efforts_of,
     support_of,
 )
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
@@ -96,7 +96,7 @@ def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit:
     if support.kind == "no":
         emit(msgspec.structs.replace(blank, status="refused", message=support.reason))
         return
-    ladder = job.efforts or checked_ladder(engine.efforts(scene))
+    ladder = job.efforts or efforts_of(engine, scene, float(job.times[-1]))
     rungs = len(ladder)
     key = _key(engine, version, job, rungs)
     chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]

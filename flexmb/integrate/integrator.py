@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from flexmb.integrate.memory import Memory, memory
+if TYPE_CHECKING:
+    from flexmb.integrate.memory import Memory
 
 Method = Literal["dop853", "rk4", "radau5", "exponential", "generalised_alpha"]
 """Names of the integrators, for type checkers: a test holds them to the catalogue."""
@@ -46,4 +47,6 @@ class Integrator:
 
     def memory(self, n: int) -> Memory:
         """Of a run that begins, with a state of n entries."""
+        from flexmb.integrate.memory import memory  # command lines, which list the methods, go without the compiler
+
         return memory(n, n + 3 if self.keeps_jacobian else 0)

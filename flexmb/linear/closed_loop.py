@@ -41,7 +41,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     same instant.
     """
     _refuse(system)
-    plant = system.anew()
+    plant = system._anew()
     made = algorithms.chosen("articulated").route
     assert made is not None
     route = made(plant)

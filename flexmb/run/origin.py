@@ -54,10 +54,10 @@ def origin(system: System, t: float, state: Given, method: str) -> Beginning:
     if isinstance(state, Restart):
         return _taken_up(system, state, method)
     if state is None:
-        found = system.initial_state if t == 0.0 else system.admissible(t, system.scene_state(t))
+        found = system.initial_state if t == 0.0 else system._admissible(t, system._scene_state(t))
     elif isinstance(state, State):
         system.layout.entering(state)
-        found = system.admissible(t, pack(state))
+        found = system._admissible(t, pack(state))
     elif isinstance(state, Mapping):
         found = _named(system, t, state)
     else:
@@ -79,7 +79,7 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
 
 
 def _named(system: System, t: float, values: Values) -> State:
-    places, y = names_of_places(system), system.scene_state(t)
+    places, y = names_of_places(system), system._scene_state(t)
     given = np.zeros(len(y), bool)
     for name, value in values.items():
         if name not in places:
@@ -93,7 +93,7 @@ def _named(system: System, t: float, values: Values) -> State:
         )
         given[place] = True
     _, whole = system.layout.whole(t, y)
-    found = system.admissible(t, whole)
+    found = system._admissible(t, whole)
     _refuse_other_than_prescribed(system, whole, found, given)
     return found
 

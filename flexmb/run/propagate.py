@@ -141,7 +141,7 @@ def integration(
         found = spare.pop()
     except IndexError:
         if system.scene.controllers:  # they write into functions of time: of a system that nobody else has
-            system = system.anew()
+            system = system._anew()
             route = system.route(algorithm, stabilise)
         found = Integration(system, algorithms.chosen(algorithm), route, integrator)
     yield found

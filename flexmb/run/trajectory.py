@@ -181,9 +181,9 @@ class Trajectory:
     def then(self, later: Trajectory) -> Trajectory:
         """This run and a later one as one: output times of this one, as far as the later one does not have them.
 
-        Work is counted on, statistics are added; status, message and restart are the later one's. Drives that one of
-        them lacks are zero there. ValueError where coordinates, markers or hinges differ, or the later one begins after
-        the last time of this one.
+        Work is counted on, statistics are added; status, message and restart are the later one's. Drives, signals and
+        powers that one of them lacks are NaN there. ValueError where coordinates, markers, hinges or connectors differ,
+        or the later one begins after this one has ended.
         """
         if len(later.t) and later.t[0] > self.stopped_at:
             raise ValueError(

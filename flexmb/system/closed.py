@@ -41,7 +41,7 @@ class ClosedSystem(System):
         self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
         self._start: State | None = None
 
-    def anew(self) -> ClosedSystem:
+    def _anew(self) -> ClosedSystem:
         """The same scene turned into other arrays."""
         return ClosedSystem(self.scene)
 
@@ -63,9 +63,9 @@ class ClosedSystem(System):
         self.initial_state  # noqa: B018 - counts them
         return self.closures.rank
 
-    def admissible(self, t: float, y: Real) -> State:
+    def _admissible(self, t: float, y: Real) -> State:
         """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
-        rough = super().admissible(t, y).y
+        rough = super()._admissible(t, y).y
         self.closures.linearise(t, rough)
         errors = self.closures.errors()
         if not np.max(np.abs(errors), initial=0.0) <= FAR:

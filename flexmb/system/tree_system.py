@@ -74,7 +74,7 @@ class System(Mechanics):
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
 
-    def anew(self) -> System:
+    def _anew(self) -> System:
         """The same scene turned into other arrays."""
         return System(self.scene, self._asked)
 
@@ -128,7 +128,7 @@ class System(Mechanics):
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         return self.layout.known(0.0, self._at_start.copy())
 
-    def admissible(self, t: float, y: Real) -> State:
+    def _admissible(self, t: float, y: Real) -> State:
         """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
 
         Of closed chains the nearest one that closes all closures; ClosureError where that is far.
@@ -137,7 +137,7 @@ class System(Mechanics):
         self.project(t, y, self.constants)
         return self.layout.known(t, y)
 
-    def scene_state(self, t: float) -> Real:
+    def _scene_state(self, t: float) -> Real:
         """(nq+nu+1,) [q, u, 0] of the scene's initial values, with prescribed motions as they are at time t (s)."""
         y: Real = self._at_start.copy()
         self.project(t, y, self.constants)
@@ -249,10 +249,10 @@ class System(Mechanics):
 
     @cached_property
     def start_precision(self) -> Precision | None:
-        """`precision_if_doubtful` of the initial state, found once."""
-        return self.precision_if_doubtful(self.initial_state)
+        """`_precision_if_doubtful` of the initial state, found once."""
+        return self._precision_if_doubtful(self.initial_state)
 
-    def precision_if_doubtful(self, state: State) -> Precision | None:
+    def _precision_if_doubtful(self, state: State) -> Precision | None:
         """`precision` of a state, None where no pivot there is so small that it may be rounding.
 
         Asked of the right-hand side, which a run needs compiled anyway; kernels of the precision few runs need.

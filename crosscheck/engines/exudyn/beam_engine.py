@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from math import sqrt
 
 import numpy as np
 
@@ -12,13 +13,16 @@ from crosscheck.engines.exudyn.beams import PlanarBeam, assemble_beam, axis_sign
 from crosscheck.engines.exudyn.kkt import initial_state
 from crosscheck.engines.exudyn.solve import integrate
 from crosscheck.engines.exudyn.state import States
+from crosscheck.engines.pace import pace
+from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate, Planar, Revolute, Weld
 from flexmb.scene.schema import BeamBody, Marker, Scene
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
 
-STEPS = (1e-2, 5e-3, 2.5e-3)
-"""Steps (s) that follow the bending of a boom turning at a few rad/s; its axial vibrations are stepped over."""
+RUNGS, USUAL = 3, 800
+"""Of steps, and how many are worth their time at the coarsest: the beam's bending is followed, its axial vibrations
+are stepped over."""
 
 
 class ExudynBeamEngine:
@@ -45,12 +49,24 @@ class ExudynBeamEngine:
         return Support("surrogate", "a planar beam of finite deflection instead of modes")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        return self.efforts_for(scene, USUAL_S)
+
+    def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """Three steps, with the scene's number of elements; generalised-alpha damps the axial vibrations it skips."""
-        return tuple(Effort("step", step, "GeneralizedAlpha") for step in STEPS)
+        bending = pace(scene, duration_s, _first_bending(scene))
+        return ladder("GeneralizedAlpha", bending, duration_s, RUNGS, USUAL)
 
     def compile(self, scene: Scene) -> Model:
         """Convert the scene; the mesh has as many elements as the scene's beam."""
         return BeamModel(assemble_beam(scene, scene.bodies[0].elements))
+
+
+def _first_bending(scene: Scene) -> float:
+    """Frequency (rad/s) of the clamped beam's first bending, by its first station."""
+    beam = scene.bodies[0]
+    assert isinstance(beam, BeamBody)
+    station = beam.stations[0]
+    return 3.516 / beam.length_m**2 * sqrt(station.EIz_Nm2 / station.mass_per_length_kg_m)
 
 
 def _refusals(scene: Scene) -> Iterator[str]:

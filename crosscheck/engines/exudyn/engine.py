@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from crosscheck.engines.contract import Effort, Model, Support
 from crosscheck.engines.exudyn import library
 from crosscheck.engines.exudyn.assembly import flexible, unconstrained
 from crosscheck.engines.exudyn.solve import EXPLICIT
 from crosscheck.engines.exudyn.support import supports
-from crosscheck.engines.functions_of_time import fastest_rate
-from flexmb.scene.schema import Scene
+from crosscheck.engines.pace import fastest_mode, pace
+from crosscheck.engines.steps import USUAL_S, ladder
+from flexmb.scene.modal_data import modal_arrays
+from flexmb.scene.schema import ModalBody, Scene
 
-RIGID_STEP, FLEXIBLE_STEP = 4e-3, 2e-3
-"""Coarsest step (s) of a scene in which no wheel spins, without and with flexible bodies."""
-SPIN_PER_STEP, WHEEL_STEP = 0.2, 1e-3
-"""Angle (rad) that a wheel may turn in a coarsest step, for the error of its bearing grows with it, and the step (s)
-below which this is not pursued, for the time of a run grows with it."""
+RUNGS = 3
 
 
 class ExudynEngine:
@@ -43,15 +39,16 @@ class ExudynEngine:
         return supports(scene)
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
+        return self.efforts_for(scene, USUAL_S)
+
+    def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
         """One free body: error-controlled steps; else the trapezoidal rule at three steps, each half the one before.
 
         Generalised-alpha rings on drive torques (percents at the same step), so it is not the default.
         """
         if unconstrained(scene):
             return tuple(Effort("tolerance", tolerance, EXPLICIT) for tolerance in (1e-7, 1e-9, 1e-11))
-        coarsest = FLEXIBLE_STEP if any(flexible(body) for body in scene.bodies) else RIGID_STEP
-        step = min(coarsest, max(WHEEL_STEP, SPIN_PER_STEP / max(_fastest_spin(scene), 1e-9)))
-        return tuple(Effort("step", step / refinement, "TrapezoidalIndex2") for refinement in (1, 2, 4))
+        return ladder("TrapezoidalIndex2", pace(scene, duration_s, _fastest_mode(scene)), duration_s, RUNGS)
 
     def compile(self, scene: Scene) -> Model:
         """Convert the scene."""
@@ -60,7 +57,10 @@ class ExudynEngine:
         return ExudynModel(scene)
 
 
-def _fastest_spin(scene: Scene) -> float:
-    """Fastest wheel rate (rad/s) at the start or by prescription."""
-    prescribed = [fastest_rate(w.prescribed_rad) for w in scene.wheels if w.prescribed_rad is not None]
-    return float(np.max([0.0, *(abs(w.speed_rad_s) for w in scene.wheels), *prescribed]))
+def _fastest_mode(scene: Scene) -> float:
+    """Of all flexible bodies (rad/s)."""
+    every = [modal_arrays(body) for body in scene.bodies if isinstance(body, ModalBody) and flexible(body)]
+    return max(
+        (fastest_mode(a.mass, a.translation_modes, a.inertia, a.rotation_modes, a.stiffness) for a in every),
+        default=0.0,
+    )

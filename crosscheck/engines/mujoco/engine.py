@@ -8,16 +8,15 @@ import numpy as np
 
 from crosscheck.engines.contract import Effort, EngineMissing, Support
 from crosscheck.engines.links import Link, links, obstacle
+from crosscheck.engines.pace import pace
+from crosscheck.engines.steps import USUAL_S, ladder
 from flexmb.scene.schema import Connector, Scene
 
 if TYPE_CHECKING:
     from crosscheck.engines.mujoco.model import MujocoModel
 
-_COARSEST = 4e-3  # s
-_MOTION = 0.3  # rad a step of the fastest prescribed or initial turning, at the coarsest effort
-_ELASTIC = 1.0  # rad a step of the stiffest spring mode: RK4 is stable to 2.8
+_RUNGS = 4
 _SOFT = "closures are springs and dampers (its defaults): loops open by 1e-4 to 1e-3 of their size under load"
-_LADDER = (1.0, 0.5, 0.25, 0.125)
 
 
 class MujocoEngine:
@@ -49,11 +48,11 @@ class MujocoEngine:
         return Support("surrogate", _SOFT) if scene.closures else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        """Steps by halves, the coarsest fitting the scene's fastest motion and stiffest spring."""
-        fastest = self.compile(scene).fastest()
-        coarsest = min(_COARSEST, _MOTION / max(fastest.motion, 1e-9), _ELASTIC / max(fastest.elastic, 1e-9))
-        coarsest = float(f"{coarsest:.2g}")
-        return tuple(Effort("step", coarsest * part, "RK4") for part in _LADDER)
+        return self.efforts_for(scene, USUAL_S)
+
+    def efforts_for(self, scene: Scene, duration_s: float) -> tuple[Effort, ...]:
+        """Steps by halves, the coarsest fitting the scene's pace."""
+        return ladder("RK4", pace(scene, duration_s), duration_s, _RUNGS)
 
     def compile(self, scene: Scene) -> MujocoModel:
         self.version()

@@ -7,16 +7,13 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from itertools import pairwise
 from math import ceil
-from typing import NamedTuple
 
 import mujoco
 import numpy as np
-from scipy.linalg import eigh
 
-from crosscheck.engines.connections import stiffest
 from crosscheck.engines.contract import Effort, Run, Snapshot, Status, Trajectory
-from crosscheck.engines.functions_of_time import breaks_between, fastest_rate, scene_functions
-from crosscheck.engines.links import Ball, Floating, Scalar, closed_frames, links
+from crosscheck.engines.functions_of_time import breaks_between, scene_functions
+from crosscheck.engines.links import closed_frames, links
 from crosscheck.engines.mujoco.forces import Forces
 from crosscheck.engines.mujoco.observer import MujocoObserver
 from crosscheck.engines.mujoco.tree import MujocoClosure, build_tree, initial_state
@@ -32,13 +29,6 @@ _INTEGRATORS = {  # by an effort's method: MuJoCo's number, and evaluations a st
 }
 
 
-class Fastest(NamedTuple):
-    """What bounds a step: turning rates of `motion` and poles of springs and dampers (`elastic`), rad/s."""
-
-    motion: float
-    elastic: float
-
-
 class MujocoModel:
     def __init__(self, scene: Scene) -> None:
         chain = links(scene)
@@ -49,7 +39,6 @@ class MujocoModel:
         self._forces = Forces(self._tree, scene)
         self._observer = MujocoObserver(self._tree, self._forces, scene, closures)
         self._functions = scene_functions(scene)
-        self._connected = stiffest(scene, chain)
 
     def warm_up(self) -> None:
         """Nothing is compiled; touch the code once so that first-call costs are not timed."""
@@ -77,32 +66,6 @@ class MujocoModel:
         return stack(
             reached, samples, status=status, message=message, wall_s=wall, evaluations=stages * steps
         )
-
-    def fastest(self) -> Fastest:
-        """Fastest motion and stiffest pole at the initial state, for choosing a step."""
-        model, data = self._tree.model, self._initial()
-        mujoco.mj_forward(model, data)
-        rates = [0.0]
-        K, C = np.zeros((2, model.nv))
-        for slot in self._tree.slots:
-            match slot.freedom:
-                case Scalar(prescribed=None, angular=angular) as freedom:
-                    rates.append(abs(freedom.rate) if angular else 0.0)
-                    K[slot.v], C[slot.v] = freedom.stiffness, freedom.damping
-                case Scalar(angular=True) as freedom:
-                    rates.append(fastest_rate(freedom.prescribed))
-                case Ball() as freedom:
-                    rates.append(float(np.linalg.norm(freedom.angular_velocity)))
-                    K[slot.v : slot.v + 3], C[slot.v : slot.v + 3] = freedom.stiffness, freedom.damping
-                case Floating() as freedom:
-                    rates.append(float(np.linalg.norm(freedom.angular_velocity)))
-        M = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, data, M)
-        free = np.setdiff1d(np.arange(model.nv), [slot.v for slot in self._forces.driven])
-        M = M[np.ix_(free, free)]
-        elastic = np.sqrt(eigh(np.diag(K[free]), M, eigvals_only=True).max(initial=0.0))
-        damped = eigh(np.diag(C[free]), M, eigvals_only=True).max(initial=0.0)
-        return Fastest(max(rates), float(max(elastic, damped, self._connected)))
 
     def _initial(self) -> mujoco.MjData:
         data = mujoco.MjData(self._tree.model)

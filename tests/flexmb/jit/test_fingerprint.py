@@ -291,8 +291,10 @@ from flexmb.integrate.rk4 import rk4
 from tests.flexmb.integrate.integration_problems import HARMONIC, solve
 from tests.flexmb.jit.test_fingerprint import compiled_beyond
 solve(HARMONIC, [0.0, 1.0], step=1e-2)
+from flexmb.integrate import problem
 from tests.flexmb.integrate import integration_problems
-mine = [each for each in vars(integration_problems).values() if isinstance(each, Dispatcher)]
+rooms = (problem, integration_problems)
+mine = [each for room in rooms for each in vars(room).values() if isinstance(each, Dispatcher)]
 helpers = [each for each in gc.get_objects() if isinstance(each, Dispatcher) and each.overloads]
 assert len(helpers) > 5, helpers
 print(compiled_beyond(rk4, *mine))

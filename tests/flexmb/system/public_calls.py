@@ -257,6 +257,14 @@ def calls() -> dict[str, Call]:
         "max_steps": chosen(None, "5", 0, -1, 1e3, 10**30, True, np.nan, plain=((np.int32(100), 100),)), **RUN,
     }  # fmt: skip
     add("simulate", lambda **given: seen(fm.simulate(tree, **given)), settings, **kinds)
+    begun = {"t_start": 0.0, "state": state}
+    add("simulate, from", lambda **given: seen(fm.simulate(tree, 0.01, samples=3, **given)), begun,
+        t_start=chosen("0", 1j, np.nan, np.inf, 0.02, [0.0], plain=((0, 0.0), (np.float32(0.0), 0.0))),
+        state=chosen("start", 5, W.y, {"nobody": 1.0}, {"elbow": "bent"}, {"elbow": np.nan}))  # fmt: skip
+    stages = {"stages": [fm.RunStage(0.01, samples=3)], "t_start": 0.0}
+    add("simulate_stages", lambda **given: seen(fm.simulate_stages(W.scene, **given)), stages,
+        stages=chosen([], [fm.RunStage(-1.0)], [fm.RunStage(0.01, {"nobody": 1.0})], [fm.RunStage(np.nan)]),
+        t_start=chosen("0", 1j, np.nan, np.inf, [0.0]))  # fmt: skip
     add("simulate, what", lambda scene: seen(fm.simulate(scene, 0.01, samples=3)), {"scene": tree}, scene=systems)
     fixed = {"step": 1e-3, "spectral_radius": 0.5}
     steps = chosen(*(each for each in NO_NUMBER), 0.0, -1.0, 1e-300, 1e-320, plain=((np.float64(1e-3), 1e-3),))
@@ -305,6 +313,9 @@ EXEMPT = {
     "Trajectory.to_rerun",  # a path
     "Trajectory.to_pandas", "Trajectory.to_xarray", "Trajectory.error_estimate",  # nothing
     "Trajectory.section_loads", "Trajectory.loads_in",  # the system's
+    "Trajectory.state_at", "Trajectory.values_at", "Trajectory.then",  # a place in a list; a trajectory
+    "RunStage", "Restart", "EventRecord",  # what runs are given, or give
+    "open_loop", "user_function",  # a scene; a function
     "ClosedSystem.section_loads",  # the closed chain here has no beam
     "LinearModel.save", "Campbell.plot", "Campbell.to_csv",  # a path
     "ClosedSystem.consistent_inverse_dynamics", "ClosedSystem.modal_residual", "ClosedSystem.applied",  # the tree's
