@@ -191,6 +191,6 @@ def _report(equations: Equations, at: Variations) -> str:
     worst = int(np.argmax(np.abs(left)))
     return (
         f'scene "{equations.system.scene.name}": no equilibrium found; {left[worst]:.3g} N (N m) are left along '
-        f"{names[at.chosen[worst]]}. Look for a coordinate without a spring that loads push away, or give a guess closer "
-        "to it"
+        f"{names[at.chosen[worst]]}. Look for a coordinate without a spring that loads push away, or give a guess "
+        "closer to it"
     )
