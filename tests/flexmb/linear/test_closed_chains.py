@@ -376,7 +376,7 @@ def test_exudyn_projects_to_the_same_frequency():
         middle = np.array(start) + 0.5 * length * np.array([np.cos(angle), np.sin(angle)])
         node = mbs.AddNode(ei.NodeRigidBody2D(referenceCoordinates=[*middle, angle]))
         mass = 0.78 * length
-        body = ei.ObjectRigidBody2D(physicsMass=mass, physicsInertia=mass * length**2 / 12.0, nodeNumber=node)
+        body = ei.ObjectRigidBody2D(mass=mass, inertia=mass * length**2 / 12.0, nodeNumber=node)
         bodies.append((mbs.AddObject(body), node, 0.5 * length))
 
     def end(i: int, side: float) -> int:

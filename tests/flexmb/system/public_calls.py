@@ -231,6 +231,12 @@ def calls() -> dict[str, Call]:
         omega=series,
         outputs=chosen(("nobody",), (None,), 5),
     )
+    add(
+        "LinearModel.displacements_by",
+        model.displacements_by,
+        {"names": model.displacements[:2]},
+        names=chosen(("nobody",), (None,), 5),
+    )
     mode = model.modes[-1]
     add(
         "LinearModel.marker_shape",
