@@ -115,8 +115,6 @@ class NativeEngine:
     def _made(self, scene: Scene) -> NativeModel:
         system = compile(scene)
         system.route(self._algorithm)
-        if scene.closures and INTEGRATORS[self._method].linearises:
-            raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)
         refuse_events(system, self._method)

@@ -20,6 +20,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     FACTORISATIONS,
     REJECTED,
     SAMPLES,
@@ -37,6 +38,7 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
+from flexmb.integrate.leap import leap, may_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
@@ -256,8 +258,8 @@ def scratch(n):
 def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`. Where the iteration does not converge, the step is
-    halved.
+    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where the iteration does not
+    converge, the step is halved.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
@@ -288,10 +290,17 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             counts[FACTORISATIONS] += 1
             if prepare(s.flow, s.J, length):
                 status, error = attempt(problem, step, y, s, accuracy, counts)
-            trouble = reason(status)
+            trouble, leapt = reason(status), False
+            if may_leap(status):
+                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
+                if far > 0.0:
+                    t_new, length, status, error = t + far, far, OK, CALM
+                    step, leapt = Interval(t, t_new, last), True
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
-                if watch is not None and is_crossed(watch, s.y_new):
+                # a level that is crossed within a leap is found at its end, by the step that follows
+                if watch is not None and not leapt and is_crossed(watch, s.y_new):
                     return end_at_crossing(problem, step, y, s, times, out, counts, watch)
                 store_samples(problem, step, y, s, times, out, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
