@@ -35,6 +35,7 @@ from flexmb.integrate.leap import leap, may_leap, store_leapt
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
+from flexmb.integrate.settling import settle
 from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
@@ -69,6 +70,7 @@ class RadauStages(NamedTuple):
     f_new: np.ndarray
     error: np.ndarray
     trial: np.ndarray
+    change: np.ndarray
 
 
 @helper
@@ -218,43 +220,44 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
         if status == OK:
             error = estimate(y, s.f_new, h, s, accuracy)
     if status == OK and error < 1.0:
-        problem.project(step.end, s.y_new, problem.constants)
+        settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error, iterations, rate
 
 
 @helper
-def state_at(problem, step, y, s, t, result):
+def state_at(problem, step, y, s, t, accuracy, result):
     """The state inside a step, by the collocation polynomial, projected."""
     evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
     for i in range(y.shape[0]):
         result[i] += y[i]
-    problem.project(t, result, problem.constants)
+    settle(problem, t, REAL / (step.end - step.start), result, s, accuracy)
 
 
 @helper
-def store_samples(problem, step, y, s, times, out, counts):
-    """Store the samples in the step, its end included."""
+def store_samples(problem, step, y, s, samples, accuracy, counts):
+    """Store the samples in the step, its end included; samples: (times, states)."""
+    times, out = samples
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            state_at(problem, step, y, s, times[sample], out[sample])
+            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
 
 
 @helper
-def end_at_crossing(problem, step, y, s, times, out, counts, watch):
+def end_at_crossing(problem, step, y, s, samples, accuracy, counts, watch):
     """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
-    trial, t, first = np.empty(y.shape[0]), step.end, 0
+    (times, out), trial, t, first = samples, np.empty(y.shape[0]), step.end, 0
     for i in range(watch.entry.shape[0]):
         if crosses_one(watch, i, s.y_new):
             entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
             while low < 0.5 * (low + high) < high:
                 middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, trial)
+                state_at(problem, step, y, s, middle, accuracy, trial)
                 if crosses(watch.side[i], trial[entry] - level, 0):
                     high = middle
                 else:
@@ -262,10 +265,10 @@ def end_at_crossing(problem, step, y, s, times, out, counts, watch):
             if high <= t:
                 t, first = high, i
     while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
+        state_at(problem, step, y, s, times[counts[SAMPLES]], accuracy, out[counts[SAMPLES]])
         counts[SAMPLES] += 1
     if t < step.end:
-        state_at(problem, step, y, s, t, trial)
+        state_at(problem, step, y, s, t, accuracy, trial)
     else:
         copy(s.y_new, trial)
     note(watch, first, trial)
@@ -316,7 +319,7 @@ def scratch(n):
         np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
         np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n),
+        np.empty(n), np.empty(n),
     )  # fmt: skip
 
 
@@ -387,8 +390,8 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
                 if watch is not None and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
-                store_samples(problem, step, y, s, times, out, counts)
+                    return end_at_crossing(problem, step, y, s, (times, out), accuracy, counts, watch)
+                store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)
