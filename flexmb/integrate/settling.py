@@ -12,7 +12,7 @@ for its rate. Then little is left to project.
 """
 
 from flexmb.integrate.control import copy
-from flexmb.integrate.lu import lu_solve
+from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.jit.kernel import helper
 
 
@@ -32,3 +32,14 @@ def settle(problem, t, rate, y, s, accuracy):
         for i in range(n):
             y[i] += rate * s.change[i]
     problem.project(t, y, problem.constants)
+
+
+@helper
+def prepare_settling(problem, rate, s):
+    """The factors, for methods that have none."""
+    if problem.settles:
+        for i in range(s.J.shape[0]):
+            for j in range(s.J.shape[0]):
+                s.real[i, j] = -s.J[i, j]
+            s.real[i, i] += rate
+        lu_factorise(s.real, s.real_pivots)
