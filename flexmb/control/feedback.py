@@ -12,11 +12,12 @@ from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
-from flexmb.control.wiring import widest, wired
+from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
 from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
 from flexmb.motion.retraction import move
 from flexmb.scene.control import LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
@@ -118,6 +119,15 @@ class Feedback:
         t = begin.state.t
         self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
         self.replay()
+
+    def place_of(self, signal: str) -> int:
+        """The number of a signal, "gyro[2]", among all of them."""
+        return numbers_of(self._wiring.names, signal)[0]
+
+    def watching(self, watch: Watch) -> Watch:
+        """The same that finds these signals: of a run that was begun."""
+        look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
+        return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
 
     def remember(self) -> LoopMemory:
         """At the end of a run, before it is replayed."""

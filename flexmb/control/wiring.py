@@ -73,7 +73,7 @@ def wired(system: System) -> Wiring:
     follows, continuous, outputs = False, list[float](), 0
     plain: dict[int, Callable[..., None]] = {}
     for i, (row, each) in enumerate(zip(record, scene.controllers, strict=True)):
-        inputs = [n for reference in each.inputs for n in _signals(names, reference)]
+        inputs = [n for reference in each.inputs for n in numbers_of(names, reference)]
         width = output_width(each, len(inputs)) or 0
         first = max((place.stop for place in names.values()), default=0)
         names[each.name] = slice(first, first + width)
@@ -100,7 +100,7 @@ def wired(system: System) -> Wiring:
         outputs += width
     drive = np.zeros(len(system.signals), a.DRIVE)
     for row, (function, signal) in zip(drive, system.signals.items(), strict=True):
-        row["function"], row["signal"], row["gain"] = function, _signals(names, signal.source)[0], signal.gain
+        row["function"], row["signal"], row["gain"] = function, numbers_of(names, signal.source)[0], signal.gain
     return Wiring(
         sensor, record, np.array(wire, np.int64), np.array(number, float), drive, course, piece,
         np.array(initial, float), names, np.array(continuous, float), follows, plain,
@@ -143,7 +143,7 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
     return a.PROFILE, 0, 2, a.WORLD
 
 
-def _signals(names: dict[str, slice], reference: str) -> list[int]:
+def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
     """Numbers of the signals that a reference names; ValueError for a number that there is not."""
     at = named(reference)
     assert at is not None  # the scene was checked

@@ -34,7 +34,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -232,6 +232,13 @@ def state_at(problem, step, y, s, t, result):
 
 
 @helper
+def inside(problem, step, ends, s, t, result, run):
+    """The same as `flexmb.integrate.watch` asks for it."""
+    state_at(problem, step, ends.y, s, t, result)
+    return OK
+
+
+@helper
 def store_samples(problem, step, y, s, times, out, counts):
     """Store the samples in the step, its end included."""
     sample = counts[SAMPLES]
@@ -242,35 +249,6 @@ def store_samples(problem, step, y, s, times, out, counts):
             state_at(problem, step, y, s, times[sample], out[sample])
         sample += 1
     counts[SAMPLES] = sample
-
-
-@helper
-def end_at_crossing(problem, step, y, s, times, out, counts, watch):
-    """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
-    trial, t, first = np.empty(y.shape[0]), step.end, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, trial)
-                if crosses(watch.side[i], trial[entry] - level, 0):
-                    high = middle
-                else:
-                    low = middle
-            if high <= t:
-                t, first = high, i
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
-        counts[SAMPLES] += 1
-    if t < step.end:
-        state_at(problem, step, y, s, t, trial)
-    else:
-        copy(s.y_new, trial)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
 
 
 @helper
@@ -374,8 +352,14 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                if watch is not None and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
+                if watch is not None:
+                    ends, run = Ends(y, s.f, s.y_new, s.f_new), (accuracy, counts)
+                    status, some = meets(problem, watch, step, ends)
+                    if status == OK and some:
+                        within = Within(problem, watch, step, ends, inside, s, np.empty(y.shape[0]), run)
+                        status, t_new = end_at_crossing(within, times, out)
+                    if status != OK:
+                        return status, t if status > OK else t_new
                 store_samples(problem, step, y, s, times, out, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)

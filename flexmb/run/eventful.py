@@ -11,11 +11,11 @@ from msgspec import structs
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.integrate.watch import Watch, watch
+from flexmb.integrate.watch import UNKNOWN, Watch, watch
 from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import observed
-from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
 from flexmb.scene.events import EndRun, Impact, Latch
@@ -50,7 +50,7 @@ def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
     if not system.scene.events:
         return ()
     names = watchable(system.scene)
-    return tuple(structs.replace(event, watch=names[event.watch]) for event in system.scene.events)
+    return tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in system.scene.events)
 
 
 class EventfulRun:
@@ -75,10 +75,9 @@ class EventfulRun:
     def __call__(self, begin: Beginning) -> tuple[Trajectory, Raw]:
         """The trajectory, and the last piece of the run as the integrator left it."""
         watched = [event for event in self._events if event.watch != "time"]
-        sides = self._sides(watched, begin.y)
+        sides, came = self._sides(watched, begin.y), [0] * len(watched)
         while True:
-            levels = self._watch(watched, sides)
-            raw, stop = self._piece(begin, levels)
+            raw, stop, levels = self._piece(begin, watched, sides, came)
             found = self._found(raw, stop, watched, levels)
             if not found:
                 return self._ended(raw), raw
@@ -90,7 +89,7 @@ class EventfulRun:
             ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
-            sides = self._sides_after(watched, levels, y)
+            sides, came = self._sides_after(watched, levels, y), self._came(watched, levels)
             begin = self._going_on(raw)
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
@@ -103,7 +102,9 @@ class EventfulRun:
         state = self.system.layout.known(raw.t, np.r_[self._apart(raw.y)[0][:-1], 0.0])
         return Beginning(state, raw.y, None, raw.controllers)
 
-    def _piece(self, begin: Beginning, levels: Watch | None) -> tuple[Raw, float]:
+    def _piece(
+        self, begin: Beginning, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int]
+    ) -> tuple[Raw, float, Watch | None]:
         """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
         t, system = begin.state.t, self._situation.system
         start = max(t, self._times[0]) if begin.memory is not None else t
@@ -113,11 +114,12 @@ class EventfulRun:
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
         times = np.unique([start, *wanted, stop])
         with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            levels = self._watch(watched, sides, came, solve)
             raw = integrate(system, solve, begin, times, self._left(), levels)
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
             self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
-        return raw, stop
+        return raw, stop, levels
 
     def _left(self) -> Settings:
         """The settings with as many steps as the pieces before have left."""
@@ -140,32 +142,63 @@ class EventfulRun:
     def _arriving(
         self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
     ) -> list[SceneEvent]:
-        """Those that come to their levels, which are set exactly; rounding may find one again that flies off."""
+        """Those that come to their levels, where coordinates are set exactly; rounding may find one again that flies off.
+        """
         off = []
         for i, event in enumerate(watched):
             if levels is not None and event in found:
-                y[self._situation.places[event.watch]] = event.level
-                rate = self._situation.rate_of(event.watch)
-                if rate is not None and levels.side[i] * y[rate] > 0.0:
+                if self._is_signal(event):
+                    rate = levels.rate[i]
+                else:
+                    y[self._situation.places[event.watch]] = event.level
+                    place = self._situation.rate_of(event.watch)
+                    rate = 0.0 if place is None else y[place]
+                if levels.side[i] * rate > 0.0:
                     off.append(event)
         return [event for event in found if event not in off]
 
-    def _watch(self, watched: Sequence[SceneEvent], sides: Sequence[int]) -> Watch | None:
+    def _is_signal(self, event: SceneEvent) -> bool:
+        return event.watch not in self._situation.places
+
+    def _watch(
+        self, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int], solve: Integration
+    ) -> Watch | None:
         if not watched:
             return None
-        entries = [self._situation.places[event.watch] for event in watched]
+        entries, still = [], []
+        for event in watched:
+            if self._is_signal(event):
+                assert solve.feedback is not None
+                entries.append(-1 - solve.feedback.place_of(event.watch))
+                still.append(self._settings.atol + self._settings.rtol * abs(event.level))
+            else:
+                entries.append(self._situation.places[event.watch])
+                still.append(0.0)
         directions = [DIRECTIONS[event.crossing] for event in watched]
-        return watch(entries, [event.level for event in watched], directions, sides)
+        return watch(entries, [event.level for event in watched], directions, sides, came, still)
 
     def _sides(self, watched: Sequence[SceneEvent], y: Real) -> list[int]:
-        """On which side of its level everything is; 0 at it."""
-        return [int(np.sign(y[self._situation.places[event.watch]] - event.level)) for event in watched]
+        """On which side of its level everything is; 0 at it. Those of signals are seen in the first step."""
+        places = self._situation.places
+        return [
+            UNKNOWN if self._is_signal(event) else int(np.sign(y[places[event.watch]] - event.level))
+            for event in watched
+        ]
+
+    def _came(self, watched: Sequence[SceneEvent], levels: Watch | None) -> list[int]:
+        """From which side signals came to the levels at which they are; 0 for others."""
+        return [
+            int(levels.side[i]) if levels is not None and levels.found[i] and self._is_signal(event) else 0
+            for i, event in enumerate(watched)
+        ]
 
     def _sides_after(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
         """After an event. What was found at its level is beyond it, or back where it does not go on; held at it: 0."""
         sides = self._sides(watched, y)
         for i, event in enumerate(watched):
             came = int(levels.side[i]) if levels is not None else 0
+            if self._is_signal(event):
+                continue
             if levels is not None and levels.found[i]:
                 rate = self._situation.rate_of(event.watch)
                 goes_on = rate is None or -came * y[rate] > 0.0

@@ -343,8 +343,8 @@ class SceneBuilder:
     ) -> Self:  # fmt: skip
         """What happens where `watch` comes to `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in this order.
 
-        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", or a rate, "pivot.rotation.rate"
-        or "wheel.speed".
+        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", a rate, "pivot.rotation.rate" or
+        "wheel.speed", or one number of a sensor or controller, "height[2]".
         """
         return self._append(s.SceneEvent, name=name, watch=watch, level=level, crossing=crossing, actions=actions)
 

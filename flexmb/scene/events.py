@@ -52,8 +52,9 @@ class SceneEvent(SceneStruct, frozen=True, kw_only=True):
     """What happens, whenever `watch` comes to `level` from below (rising), from above (falling) or either way.
 
     `watch`: "time" (s); a scalar coordinate, "<hinge>.<key>" or "<wheel>.angle" (m or rad); its rate,
-    "<hinge>.<key>.rate" or "<wheel>.speed"; or the name of a sensor that measures one of these alone. What is at its
-    level when the run begins has been there before. Actions are done in their order, at the same time.
+    "<hinge>.<key>.rate" or "<wheel>.speed"; or a signal: one number of a sensor or controller, "height[2]", whose
+    number may be left out where there is only one. What is at its level when the run begins has been there before.
+    Actions are done in their order, at the same time.
     """
 
     name: str

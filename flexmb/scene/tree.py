@@ -151,8 +151,13 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     raise ValueError(f'"{item.name}" has no {sort} "{connector.coordinate}"'.replace(' ""', ""))
 
 
+def watches_signals(scene: Scene) -> bool:
+    """Whether an event watches what only sensors and controllers say."""
+    return bool(scene.events) and not {event.watch for event in scene.events} <= set(watchable(scene))
+
+
 def watchable(scene: Scene) -> dict[str, str]:
-    """What an event may watch, by the name it gives: "time", a scalar coordinate or its rate.
+    """What an event may watch without a look at sensors, by the name it gives: "time", a scalar coordinate, its rate.
 
     A sensor of time or of the only coordinate of a hinge, wheel or point mass stands for what it measures.
     """

@@ -94,6 +94,25 @@ def output_width(controller: Controller, inputs: int | None) -> int | None:
     return inputs
 
 
+def widths_of(scene: Scene) -> dict[str, int | None]:
+    """How many numbers every sensor and controller has; None where only compiled bodies know it."""
+    widths = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
+    for controller in scene.controllers:
+        each = [_width(reference, widths) for reference in controller.inputs]
+        inputs = None if None in each else sum(width for width in each if width is not None)
+        widths[controller.name] = output_width(controller, inputs)
+    return widths
+
+
+def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> Iterator[Defect]:
+    """A signal that is one number."""
+    yield from _reference(place, reference, widths, set())
+    found = named(reference)
+    width = None if found is None or found.number is not None else widths.get(found.name)
+    if found is not None and width is not None and width != 1:
+        yield Defect(str(place), f'"{found.name}" has {width} numbers', f'say which: "{found.name}[0]"')
+
+
 def control(scene: Scene) -> Iterator[Defect]:
     """All problems of sensors, controllers and signals."""
     yield from _sensors(scene)
