@@ -20,7 +20,7 @@ import numpy as np
 from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, copy
 from flexmb.integrate.problem import Accuracy
 from flexmb.jit.bundle import AnyBundle
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.pointer import REAL, STATUS, VECTOR, Pointer, pointer
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
@@ -133,7 +133,7 @@ def _rates(problem, watch, t, y, dy, ahead, trial):
     return status
 
 
-@helper
+@sweep
 def meets(problem, watch, step, ends):
     """Whether a step may come to a level: (status, whether). If it does not, sides are those of its end."""
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
@@ -185,7 +185,7 @@ def settle(watch):
             watch.side[i] = watch.after[i]
 
 
-@helper
+@sweep
 def end_at_crossing(within, times, out):
     """End a step that `meets` a level at the first one: its state in ends.y, and the samples before it stored.
 
@@ -222,7 +222,7 @@ def end_at_crossing(within, times, out):
     return CROSSED, t
 
 
-@helper
+@sweep
 def _value_at(within, i, t):
     """How far i is above its level at a time within a step, with the state in `trial`: (status, value)."""
     problem, watch, step, ends, state_at, s, trial, run = within
@@ -236,7 +236,7 @@ def _value_at(within, i, t):
     return status, watch.value[i]
 
 
-@helper
+@sweep
 def _beyond(within, i):
     """Between which times what turns within a step comes to its level: (status, low, high); high is inf if it does not.
 
@@ -266,7 +266,7 @@ def _beyond(within, i):
     return OK, low, math.inf
 
 
-@helper
+@sweep
 def _arrival(within, i, low, high):
     """When i comes to its level between two times, to rounding: (status, time).
 
@@ -294,7 +294,7 @@ def _arrival(within, i, low, high):
     return status, high
 
 
-@helper
+@sweep
 def _note(within, first, t):
     """What is reached at time t, the first level and others at the same time, and the rates of signals there.
 
