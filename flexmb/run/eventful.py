@@ -18,7 +18,7 @@ from flexmb.run.outputs import observed
 from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import EndRun, Impact, Latch
+from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
@@ -31,18 +31,12 @@ MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chatterin
 
 
 def refuse_events(system: System, method: Method) -> None:
-    """NotImplementedError for events that a method or a closed chain does not have."""
+    """NotImplementedError for events that a method does not have."""
     if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in _by_what_they_watch(system)):
         raise NotImplementedError(
             f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
             '"radau5" or "exponential"'
         )
-    for event in system.scene.events if system.scene.closures else ():
-        if any(isinstance(action, Latch | Impact) for action in event.actions):
-            raise NotImplementedError(
-                f'event "{event.name}" has an impulse, and the scene has closures, which would take part of it: that '
-                "is not supported yet; use a stiff spring, or a tree"
-            )
 
 
 def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
@@ -142,7 +136,9 @@ class EventfulRun:
     def _arriving(
         self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
     ) -> list[SceneEvent]:
-        """Those that come to their levels, where coordinates are set exactly; rounding may find one again that flies off.
+        """Those that come to their levels, where coordinates are set exactly.
+
+        Rounding may find one again that flies off.
         """
         off = []
         for i, event in enumerate(watched):

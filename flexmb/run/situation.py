@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from msgspec.structs import replace
@@ -14,6 +14,7 @@ from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -25,7 +26,8 @@ class EventRecord:
     """An event that happened at t (s).
 
     impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
-    (J), which the work of the trajectory counts; before, after: the states.
+    (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
+    (6,) [N m s; N s] on body_b about frame B, World axes; the least, where redundant closures leave it open.
     """
 
     name: str
@@ -34,6 +36,7 @@ class EventRecord:
     energy_change: float
     before: State
     after: State
+    closures: dict[str, Real] = field(default_factory=dict)
 
 
 class Situation:
@@ -50,10 +53,11 @@ class Situation:
 
     def happen(self, event: SceneEvent, t: float, y: Real) -> EventRecord:
         """Do what an event says at time t to y = [q, u, work], in place."""
-        before, work, impulses = self._state(t, y), float(y[-1]), dict[str, float]()
+        before, work = self._state(t, y), float(y[-1])
+        impulses, closures = dict[str, float](), dict[str, Real]()
         for action in event.actions:
-            self._do(action, t, y, impulses)
-        return EventRecord(event.name, t, impulses, float(y[-1]) - work, before, self._state(t, y))
+            self._do(action, t, y, impulses, closures)
+        return EventRecord(event.name, t, impulses, float(y[-1]) - work, before, self._state(t, y), closures)
 
     def rate_of(self, watched: str) -> int | None:
         """Place in [q, u, work] of the rate of a coordinate; None for what is a rate itself."""
@@ -65,25 +69,30 @@ class Situation:
         place = self.rate_of(watched)
         return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
 
-    def _do(self, action: Action, t: float, y: Real, impulses: dict[str, float]) -> None:
+    def _do(
+        self, action: Action, t: float, y: Real, impulses: dict[str, float], closures: dict[str, Real]
+    ) -> None:
         match action:
             case Latch(coordinate=name):
-                self._strike(t, y, name, 0.0, impulses)
-                self._become(changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]])))
+                self._strike(t, y, name, 0.0, impulses, closures)
+                held = self._held(y[self.places[name]])
+                self._become(changed_at(self.system.scene, self._paths[name], held), t, y)
                 self.system.project(t, y, self.system.constants)
             case Impact(coordinate=name, restitution=restitution):
-                self._strike(t, y, name, -restitution, impulses)
+                self._strike(t, y, name, -restitution, impulses, closures)
             case Release(coordinate=name):
-                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)))
+                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)), t, y)
             case Change(path=path, value=value):
                 energy = self._energy(t, y)
-                self._become(self.system.scene.with_values({path: value}))
+                self._become(self.system.scene.with_values({path: value}), t, y)
                 self._given = self._given.with_values({path: value})
                 y[-1] += self._energy(t, y) - energy
             case EndRun():
                 pass
 
-    def _strike(self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float]) -> None:
+    def _strike(
+        self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float], closures: dict[str, Real]
+    ) -> None:
         """An impulse that multiplies a speed."""
         rates = {self.places[rate_name(each, path)]: each for each, path in self._paths.items()}
         place = self.places[rate_name(name, self._paths[name])]
@@ -93,6 +102,8 @@ class Situation:
         for j, impulse in found.impulses.items():
             along = rates[self.system.nq + j]
             impulses[along] = impulses.get(along, 0.0) + impulse
+        for closure, wrench in found.closures.items():
+            closures[closure] = closures.get(closure, 0.0) + wrench
 
     def _held(self, value: float):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
         def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
@@ -107,13 +118,15 @@ class Situation:
         motion = _keys(found[0])[3]
         return lambda _: replace(found[0], **{motion: None})
 
-    def _become(self, scene: Scene) -> None:
+    def _become(self, scene: Scene, t: float, y: Real) -> None:
         for system in self._built:
             if system.scene == scene:
                 self.system = system
                 return
-        self.system = assembled(scene)
+        before, self.system = self.system, assembled(scene)
         self._built.append(self.system)
+        if isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem):
+            self.system.begin_at(t, y, before)
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)
