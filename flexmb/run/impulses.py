@@ -22,6 +22,7 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.typing import Real
 
+AT_REST = 2.0**-40  # of the speeds before
 REACHED = 1e-6  # of the largest speed: what is left of a change that closures do not allow is more
 
 
@@ -58,6 +59,8 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     impulses = np.linalg.lstsq(half, moved, rcond=DEPENDENT)[0]
     u = state.u + factors.solve(along.T @ impulses)
     u[places] = state.u[places] + change[: len(places)]
+    if np.max(np.abs(u), initial=0.0) <= AT_REST * np.max(np.abs(state.u), initial=0.0):
+        u[:] = 0.0  # a mechanism that is stopped altogether: of rounding alone closures would seem to open
     held = impulses[: len(places)]
     closures = {} if rows is None else _by_name(system, rows.wrenches(impulses[len(places) :]))
     return Struck(
