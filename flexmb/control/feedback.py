@@ -19,7 +19,7 @@ from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
 from flexmb.motion.retraction import move
-from flexmb.scene.control import LoadSensor
+from flexmb.scene.control import DriveSensor, LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -116,9 +116,22 @@ class Feedback:
 
     def look(self, begin: Starting) -> None:
         """At one state, as at the only sample of a run that is over."""
+        self._only_at(begin)
+
+    def accelerations(self, begin: Starting) -> Real:
+        """(nu,) at one state, under what controllers say there."""
+        y, nq, nu = self._only_at(begin), self._plant.nq, self._plant.nu
+        slope = np.empty(len(y))
+        loop.rhs(begin.state.t, y, slope, self.running, self.running)
+        self.raise_trouble()
+        return slope[nq : nq + nu]
+
+    def _only_at(self, begin: Starting) -> Real:
         t = begin.state.t
-        self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
+        clock = Clock(np.array([t]), np.array([np.nextafter(t, np.inf)]))
+        y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), ()).y
         self.replay()
+        return y
 
     def place_of(self, signal: str) -> int:
         """The number of a signal, "gyro[2]", among all of them."""
@@ -223,7 +236,7 @@ class Feedback:
 
     def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
         """NotImplementedError for loads that this algorithm does not have in compiled code."""
-        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor)]
+        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor | DriveSensor)]
         if loads and (algorithm.observing is None or self._plant.scene.closures):
             raise NotImplementedError(
                 f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
@@ -268,7 +281,7 @@ class Feedback:
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
             dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
-            doubt=self._doubt, **self._held,
+            drives=out.drives, doubt=self._doubt, **self._held,
         )  # fmt: skip
 
 

@@ -61,6 +61,8 @@ def _measure(t, i, s):
     elif kind == a.LOAD:
         for n in range(6):
             s.signal[first + n] = s.loads[place, n]
+    elif kind == a.DRIVE_LOAD:
+        s.signal[first] = s.drives[place] if place >= 0 else 0.0
     elif kind == a.ORIENTATION:
         _store_quaternion(s.markers[place], s.signal, first)
     else:

@@ -16,6 +16,7 @@ from flexmb.scene.check.control import named, output_width
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DriveSensor,
     GainTable,
     LoadSensor,
     MarkerSensor,
@@ -28,6 +29,7 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.convert import ROOT, label
+from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.system.tree_system import System
 from flexmb.tables.functions import pack
 from flexmb.typing import Index, Real, Record
@@ -138,9 +140,18 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
             return _QUANTITIES[quantity], list(observed.markers).index(marker), width, axes
         case LoadSensor(hinge=hinge):
             return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
+        case DriveSensor(coordinate=coordinate):
+            return a.DRIVE_LOAD, _driven(system, coordinate), 1, a.WORLD
         case TimeSensor():
             return a.TIME, 0, 1, a.WORLD
     return a.PROFILE, 0, 2, a.WORLD
+
+
+def _driven(system: System, coordinate: str) -> int:
+    """The number of its speed, -1 where it is free."""
+    rate = rate_name(coordinate, scalar_paths(system.scene)[coordinate])
+    number = [name for name, _ in system.state_names[1]].index(rate)
+    return number if system.constants.speed["prescribed"][number] >= 0 else -1
 
 
 def numbers_of(names: dict[str, slice], reference: str) -> list[int]:

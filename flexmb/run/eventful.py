@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from msgspec import structs
@@ -16,12 +17,14 @@ from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import Integration, Raw, integrate, integration
+from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import EndRun
+from flexmb.scene.events import EndRun, Impact
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
+from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -54,9 +57,11 @@ class EventfulRun:
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float
     ) -> None:
         """times (T,) s of the output."""
-        self._situation, self._times, self._settings = Situation(system), times, settings
+        scene = with_stops(system.scene)
+        whole = system if scene == system.scene else assembled(scene)
+        self._situation, self._times, self._settings = Situation(whole, settings), times, settings
         self._algorithm, self._stabilise = algorithm, stabilise
-        self._events = _by_what_they_watch(system)
+        self._events = _by_what_they_watch(whole)
         self._happened: list[EventRecord] = []
         self._paused_at: list[float] = []
         self._whole: Trajectory | None = None
@@ -68,23 +73,43 @@ class EventfulRun:
 
     def __call__(self, begin: Beginning) -> tuple[Trajectory, Raw]:
         """The trajectory, and the last piece of the run as the integrator left it."""
-        watched = [event for event in self._events if event.watch != "time"]
+        watched = self._watched
         sides, came = self._sides(watched, begin.y), [0] * len(watched)
         while True:
             raw, stop, levels = self._piece(begin, watched, sides, came)
             found = self._found(raw, stop, watched, levels)
             if not found:
                 return self._ended(raw), raw
-            self._paused_at.append(raw.t)
             y, controlled = self._apart(raw.y)
             arrived = self._arriving(found, watched, levels, y)
-            self._happened += [self._situation.happen(event, raw.t, y) for event in arrived]
+            if not any(isinstance(action, Impact) and action.rests for event in arrived for action in event.actions):
+                self._paused_at.append(raw.t)  # rebounds before a rest come to an end by themselves
+            for event in arrived:
+                self._happened += self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
             ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
-            sides, came = self._sides_after(watched, levels, y), self._came(watched, levels)
+            names = [event.name for event in watched]
+            side_of = dict(zip(names, self._sides_after(watched, levels, y), strict=True))
+            came_of = dict(zip(names, self._came(watched, levels), strict=True))
+            self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
+            watched = self._watched
+            anew = zip(watched, self._sides(watched, y), strict=True)
+            sides = [side_of.get(event.name, side) for event, side in anew]
+            came = [came_of.get(event.name, 0) for event in watched]
             begin = self._going_on(raw)
+
+    @property
+    def _watched(self) -> list[SceneEvent]:
+        return [event for event in self._events if event.watch != "time"]
+
+    def _accelerations(self, raw: Raw, t: float, y: Real) -> Real:
+        """Under what controllers say where a piece ended, with another motion y = [q, u, work] there."""
+        there = raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
+        with integration(self.system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            assert solve.feedback is not None  # of a scene with stops to rest on
+            return solve.feedback.accelerations(self._going_on(there))
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
         """[q, u, work], and the states of controllers, which events do not touch."""

@@ -425,6 +425,10 @@ class SceneBuilder:
         """The load across a hinge, [torque; force] on the outboard body, World axes."""
         return self._append(s.LoadSensor, name=name, hinge=hinge)
 
+    def sense_drive(self, name: str, coordinate: str) -> Self:
+        """The load of the drive of a prescribed or latched coordinate, "pivot.rotation"; of a free one 0."""
+        return self._append(s.DriveSensor, name=name, coordinate=coordinate)
+
     def sense_time(self, name: str) -> Self:
         """Time (s) as a signal."""
         return self._append(s.TimeSensor, name=name)

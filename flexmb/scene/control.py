@@ -53,6 +53,17 @@ class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="
     hinge: str
 
 
+class DriveSensor(SceneStruct, frozen=True, kw_only=True, tag="drive", tag_field="kind"):
+    """Load of the drive that moves or holds a coordinate, prescribed or latched (N or N m); of a free one 0.
+
+    What is beyond its spring, damper and motor, as in `drives` of a run. `coordinate`: "<hinge>.<key>" of a scalar
+    coordinate, such as "root.rotation", or "<wheel>.angle".
+    """
+
+    name: str
+    coordinate: str
+
+
 class TimeSensor(SceneStruct, frozen=True, kw_only=True, tag="time", tag_field="kind"):
     """Time since the start (s)."""
 
@@ -66,7 +77,7 @@ class ProfileSensor(SceneStruct, frozen=True, kw_only=True, tag="profile", tag_f
     function: Function
 
 
-Sensor = CoordinateSensor | MarkerSensor | LoadSensor | TimeSensor | ProfileSensor
+Sensor = CoordinateSensor | MarkerSensor | LoadSensor | DriveSensor | TimeSensor | ProfileSensor
 
 
 class _Controller(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):

@@ -25,10 +25,15 @@ class Release(SceneStruct, frozen=True, kw_only=True, tag="release", tag_field="
 
 
 class Impact(SceneStruct, frozen=True, kw_only=True, tag="impact", tag_field="kind"):
-    """An impulse along the coordinate turns its speed over, to `restitution` times as much: contact with a stop."""
+    """An impulse along the coordinate turns its speed over, to `restitution` times as much: contact with a stop.
+
+    With `rests`, a body that is pressed against the stop comes to rest on it where its rebound is below the error that
+    the run allows: it is held there, until the stop would have to pull.
+    """
 
     coordinate: str
     restitution: float = 1.0
+    rests: bool = False
 
 
 class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="kind"):

@@ -13,6 +13,7 @@ from flexmb.scene.columns import alike
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DriveSensor,
     GainTable,
     LoadSensor,
     MarkerSensor,
@@ -27,7 +28,7 @@ from flexmb.scene.functions import ControlSignal
 from flexmb.scene.hinges import Free, Spherical
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
-from flexmb.scene.tree import coordinates
+from flexmb.scene.tree import coordinates, scalar_paths
 
 REFERENCE = re.compile(r"(?P<name>[^\[\]]+)(?:\[(?P<number>\d+)\])?")
 AT_ONCE = ("acceleration", "angular_acceleration", "specific_force")
@@ -77,7 +78,9 @@ def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
 
 def depends_at_once(sensor: Sensor) -> bool:
     """Whether forces change what it measures without delay: accelerations and loads."""
-    return isinstance(sensor, LoadSensor) or (isinstance(sensor, MarkerSensor) and sensor.quantity in AT_ONCE)
+    if isinstance(sensor, MarkerSensor):
+        return sensor.quantity in AT_ONCE
+    return isinstance(sensor, LoadSensor | DriveSensor)
 
 
 def output_width(controller: Controller, inputs: int | None) -> int | None:
@@ -140,6 +143,7 @@ def _sensors(scene: Scene) -> Iterator[Defect]:
         CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
         MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
         LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),
+        DriveSensor: ("coordinate", "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):
         if type(sensor) in known:
