@@ -208,10 +208,6 @@ def test_what_events_cannot_do_is_refused():
         fm.simulate_batch([ball(1.0, impact(1.0))], 1.0)
     with pytest.raises(NotImplementedError, match="has events"):
         fm.simulate_stages(ball(1.0, impact(1.0)), [fm.RunStage(1.0), fm.RunStage(1.0)])
-    closed = fm.SceneBuilder("looped").rigid_body("bob", mass=1.0, inertia=(1.0, 1.0, 1.0))
-    closed = closed.prismatic("rail", "ground", "bob").closure("hold", "prismatic", "ground", "bob", axis=(0, 0, 1))
-    with pytest.raises(NotImplementedError, match="has closures"):
-        fm.simulate(closed.add(impact(1.0)).scene(), 1.0)
 
 
 def test_a_run_with_events_is_taken_up():
