@@ -147,9 +147,6 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
     ends = [(each.body_a, each.node_a) for each in scene.closures]
     ends += [(each.body_b, each.node_b) for each in scene.closures]
-    for each in scene.connectors:
-        if isinstance(each, BetweenNodes):
-            ends += [(each.body_a, each.node_a), (each.body_b, each.node_b)]
     users += [(body, node) for body, node in ends if body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
@@ -165,10 +162,7 @@ def _attach(
 ) -> tuple[ExudynLink, Placed]:
     """A body and the hinge that joins it to its parent."""
     own = frame(hinge.parent_position_m, hinge.parent_quaternion)
-    if hinge.parent == GROUND:
-        port = _grounded(shop, own)
-    else:
-        port = _port(shop, placed[hinge.parent], hinge.parent_node, own)
+    port = _end(shop, placed, hinge.parent, hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
     zero = port.zero @ outboard.rotation.T
     found: list[Placed] = []
@@ -280,22 +274,24 @@ def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> Exu
 
 
 def _end(shop: Workshop, placed: dict[str, Placed], body: str, node: str, own: Frame) -> HingePort:
-    """A frame at a node of the ground or of a body."""
-    return _port(shop, placed[body], node, own) if body != GROUND else _grounded(shop, own)
-
-
-def _grounded(shop: Workshop, own: Frame) -> HingePort:
-    return HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
+    """A frame `own` on the ground or at a node of a body."""
+    if body == GROUND:
+        return HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
+    return _port(shop, placed[body], node, own)
 
 
 def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes) -> None:
     """A connector between two frames that exist already."""
-    ports = []
+    still = NodeShape(np.zeros(3), np.eye(3), *np.zeros((2, 3, 0)))
+    ends = []
     for side in "ab":
-        place = getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY)
+        own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
         body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
-        ports.append(_end(shop, placed, body, node, frame(*place)))
-    springs.between(shop, connector, ports)
+        if body == GROUND:
+            ends.append(springs.End(shop.ground, still, own))
+        else:
+            ends.append(springs.End(placed[body].carrier, placed[body].shape(node), own))
+    springs.between(shop, connector, ends)
 
 
 def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, ExudynLink]]) -> None:

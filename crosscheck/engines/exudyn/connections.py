@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -19,8 +21,31 @@ from flexmb.typing import Real
 Paths = dict[int, CarrierPath]
 
 
-def exerted(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[Exerted]]:
-    """What each connector between nodes does at every sample."""
+class Connected(NamedTuple):
+    """By name, of T samples: wrenches (T,6) of connectors between nodes on B about B, loads (T,1) of those along
+    hinges; energy (T,) stored in all."""
+
+    between: dict[str, Real]
+    along: dict[str, Real]
+    energy: Real
+
+
+def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
+    """What all connectors do at every sample."""
+    between, along = _between(assembly, states, paths), _along(assembly, paths)
+    energy = np.zeros(len(states.times))
+    for each in between.values():
+        energy += [at.energy for at in each]
+    for held in along.values():
+        energy += [at.energy for at in held]
+    return Connected(
+        {name: np.array([at.on_b for at in each]) for name, each in between.items()},
+        {name: np.array([[at.load] for at in held]) for name, held in along.items()},
+        energy,
+    )
+
+
+def _between(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[Exerted]]:
     found = {}
     for connector in assembly.scene.connectors:
         if isinstance(connector, BetweenNodes):
@@ -30,8 +55,7 @@ def exerted(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[
     return found
 
 
-def exerted_along(assembly: Assembly, paths: Paths) -> dict[str, list[Along]]:
-    """What each connector along a hinge does at every sample."""
+def _along(assembly: Assembly, paths: Paths) -> dict[str, list[Along]]:
     found = {}
     for name, item, number, load in along_hinges(assembly.scene):
         stage = assembly.links[item].stages[number]

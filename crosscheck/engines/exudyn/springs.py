@@ -1,32 +1,44 @@
-"""Connectors in Exudyn: its own springs where it has them, with the scene's laws as user functions; bushings as forces.
+"""Connectors in Exudyn: its own springs where it has them, with the scene's laws as user functions; else as forces.
 
 Exudyn's bushing (`RigidBodySpringDamper`) is not the scene's, whatever its user function returns: it acts with equal
 and opposite forces at two points and leaves out their moment; its intrinsic formulation acts midway, and keeps the
-moment to a thousandth only. A bushing is therefore a generalised force on the coordinates of what it joins.
+moment to a thousandth only. And its markers on bending sections are not workless. Bushings, and lines from nodes that
+deform, are therefore generalised forces on the coordinates of what they join.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from crosscheck.engines.connections import Along, Moving, exerts, tension_of
 from crosscheck.engines.conventions import Frame, cross
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
-from crosscheck.engines.exudyn.joints import HingePort, Stage
-from crosscheck.engines.exudyn.motion import initial
-from crosscheck.engines.exudyn.rotations import turn_and_rate_map
-from flexmb.scene.connectors import BetweenNodes, Bushing, SpringDamper
+from crosscheck.engines.exudyn.joints import Stage
+from crosscheck.engines.exudyn.modal import NodeShape
+from crosscheck.engines.exudyn.motion import FrameMotion, initial
+from crosscheck.engines.exudyn.rotations import left_jacobian, turn_and_rate_map
+from flexmb.scene.connectors import BetweenNodes, SpringDamper
 from flexmb.typing import Real
 
 
-def between(shop: Workshop, connector: BetweenNodes, ports: Sequence[HingePort]) -> None:
-    """A connector between the ports of its frames A and B."""
-    if isinstance(connector, Bushing):
-        _bushing(shop, connector, ports)
+@dataclass(frozen=True)
+class End:
+    """Frame A or B of a connector: `own` in the axes of a node of `carrier`, the node's `shape` in Exudyn axes."""
+
+    carrier: Carrier
+    shape: NodeShape
+    own: Frame
+
+
+def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[End]) -> None:
+    """A connector between its frames A and B."""
+    if isinstance(connector, SpringDamper) and not any(end.shape.deforms for end in ends):
+        _line(shop, connector, ends)
     else:
-        _line(shop, connector, ports)
+        _force(shop, connector, ends)
 
 
 def along(shop: Workshop, stage: Stage, load: Callable[[float, float], Along]) -> int:
@@ -44,62 +56,83 @@ def along(shop: Workshop, stage: Stage, load: Callable[[float, float], Along]) -
     return shop.mbs.AddObject(spring)
 
 
-def _line(shop: Workshop, connector: SpringDamper, ports: Sequence[HingePort]) -> None:
+def _line(shop: Workshop, connector: SpringDamper, ends: Sequence[End]) -> None:
     tension = tension_of(connector)
+    points = [end.shape.position + end.shape.rotation @ end.own.position for end in ends]
     shop.mbs.AddObject(
         shop.items.SpringDamper(
-            markerNumbers=[shop.marker(port.carrier, port.position) for port in ports],
+            markerNumbers=[shop.marker(end.carrier, point) for end, point in zip(ends, points, strict=True)],
             referenceLength=connector.free_length_m, stiffness=0.0, damping=0.0,
             springForceUserFunction=lambda mbs, t, item, x, rate, k, d, f: tension(t, x, rate).load,
         )
     )  # fmt: skip
 
 
-def _bushing(shop: Workshop, connector: Bushing, ports: Sequence[HingePort]) -> None:
+def _force(shop: Workshop, connector: BetweenNodes, ends: Sequence[End]) -> None:
     law = exerts(connector)
-    ends = [_End(shop, port) for port in ports]
-    nodes = sorted({end.node for end in ends if end.node >= 0})
-    places = {node: slice(7 * i, 7 * i + 7) for i, node in enumerate(nodes)}
+    held = [_Held(shop, end) for end in ends]
+    sizes = {node: size for each in held for node, size in each.nodes.items()}
+    starts = np.cumsum([0, *sizes.values()])
+    places = {node: slice(starts[i], starts[i + 1]) for i, node in enumerate(sizes)}
 
     def force(mbs, t, item, q, qdot):
-        q, qdot, total = np.asarray(q), np.asarray(qdot), np.zeros(7 * len(nodes))
-        for end in ends:
-            if end.node >= 0:
-                end.take(q[places[end.node]], qdot[places[end.node]])
-        found = law(t, *(end.motion for end in ends))
-        for end, wrench in zip(ends, (found.on_a, found.on_b), strict=True):
-            if end.node >= 0:
-                total[places[end.node]] += end.generalised(wrench)
+        q, qdot, total = np.asarray(q), np.asarray(qdot), np.zeros(starts[-1])
+        for each in held:
+            each.take(*([values[places[node]] for node in each.nodes] for values in (q, qdot)))
+        found = law(t, *(each.motion for each in held))
+        for each, wrench in zip(held, (found.on_a, found.on_b), strict=True):
+            for node, share in zip(each.nodes, each.generalised(wrench), strict=True):
+                total[places[node]] += share
         return total
 
-    shop.mbs.AddObject(shop.items.ObjectGenericODE2(nodeNumbers=nodes, forceUserFunction=force))
+    shop.mbs.AddObject(shop.items.ObjectGenericODE2(nodeNumbers=list(sizes), forceUserFunction=force))
 
 
-class _End:
-    """A frame of a bushing: its motion, and the generalised force of a wrench on it, by the coordinates of its node."""
+class _Held:
+    """What holds an end of a connector: its motion by the coordinates of its nodes, and what a wrench does to these.
 
-    def __init__(self, shop: Workshop, port: HingePort) -> None:
-        self.node = port.carrier.key
-        self._frame = Frame(port.position, port.zero)
-        self._rest = _reference(shop, port.carrier)
-        still = Moving(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
-        self.motion = still.carrying(self._frame)
+    `nodes`: number and count of coordinates of the frame's node, and of the node of modal coordinates where it bends.
+    """
 
-    def take(self, q: Real, qdot: Real) -> None:
-        """Displacements and velocities (7,) of the node, position before Euler parameters."""
-        here = self._rest + q
-        self._turn, self._rate_map = turn_and_rate_map(here[3:])
-        angular = self._turn @ (self._rate_map @ qdot[3:])
-        self.motion = Moving(here[:3], self._turn, angular, qdot[:3]).carrying(self._frame)
+    def __init__(self, shop: Workshop, end: End) -> None:
+        carrier, modes = end.carrier, end.shape.translation.shape[1]
+        self._end, self._rest, self.nodes = end, np.zeros(7), {}
+        self._body = FrameMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))
+        if carrier.key >= 0:
+            self.nodes = {carrier.node: 7} | ({carrier.modes: modes} if carrier.modes is not None else {})
+            self._rest = np.array(shop.mbs.GetNodeParameter(carrier.node, "referenceCoordinates"))
+        self._follow(np.zeros(modes), np.zeros(modes))
 
-    def generalised(self, wrench: Real) -> Real:
-        """(7,) of [torque; force] (6,) about the frame's origin, in World axes."""
-        torque = wrench[:3] + cross(self._turn @ self._frame.position, wrench[3:])
-        return np.concatenate([wrench[3:], self._rate_map.T @ (self._turn.T @ torque)])
+    def take(self, q: list[Real], qdot: list[Real]) -> None:
+        """Displacements and velocities of each of the nodes; of the frame's, positions before Euler parameters."""
+        if not self.nodes:
+            return
+        here = self._rest + q[0]
+        turn, self._rate_map = turn_and_rate_map(here[3:])
+        self._body = FrameMotion(here[:3], turn, turn @ (self._rate_map @ qdot[0][3:]), qdot[0][:3])
+        none = np.zeros(self._end.shape.translation.shape[1])
+        self._follow(*(values[1] if len(values) > 1 else none for values in (q, qdot)))
 
+    def generalised(self, wrench: Real) -> list[Real]:
+        """Forces on the coordinates of each node, of [torque; force] (6,) about the end's origin, in World axes."""
+        if not self.nodes:
+            return []
+        turn, force, shape = self._body.rotation, wrench[3:], self._end.shape
+        about_body, about_node = (
+            wrench[:3] + cross(self.motion.position - point, force)
+            for point in (self._body.position, self._node.position)
+        )
+        on_frame = np.concatenate([force, self._rate_map.T @ (turn.T @ about_body)])
+        if len(self.nodes) == 1:
+            return [on_frame]
+        turning = left_jacobian(shape.rotation_modes @ self._eta) @ shape.rotation_modes
+        return [on_frame, shape.translation.T @ (turn.T @ force) + turning.T @ (turn.T @ about_node)]
 
-def _reference(shop: Workshop, carrier: Carrier) -> Real:
-    """(7,) reference coordinates of a carrier's node; zeros for the ground, which has none."""
-    if carrier.key < 0:
-        return np.zeros(7)
-    return np.array(shop.mbs.GetNodeParameter(carrier.node, "referenceCoordinates"))
+    def _follow(self, eta: Real, rate: Real) -> None:
+        shape, self._eta = self._end.shape, eta
+        if shape.deforms:
+            self._node = self._body.node(shape, eta, rate)
+        else:
+            self._node = self._body.offset(shape.position, shape.rotation)
+        end = self._node.offset(self._end.own.position, self._end.own.rotation)
+        self.motion = Moving(end.position, end.rotation, end.angular, end.linear)

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
-from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Scene, SidBody
@@ -73,11 +72,6 @@ def _approximations(scene: Scene) -> Iterator[str]:
         ends = ((closure.body_a, closure.node_a), (closure.body_b, closure.node_b))
         if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
             yield f'closure "{closure.name}": {NOT_WORKLESS}'
-    for each in scene.connectors:
-        if isinstance(each, BetweenNodes):
-            ends = ((each.body_a, each.node_a), (each.body_b, each.node_b))
-            if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
-                yield f'connector "{each.name}": {NOT_WORKLESS}'
     for load in scene.loads:
         turning = load.type == "torque" or load.frame == "node"
         if turning and flexible(bodies[load.body]) and deforming(bodies[load.body], load.node):
