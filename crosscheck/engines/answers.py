@@ -32,6 +32,7 @@ from flexmb.typing import Real
 RUNGS = 3
 LATER = ("connectors", "controllers", "events")
 """Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
+NO_START = "begins all runs at t = 0"
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -56,14 +57,18 @@ def checked_version(found: Any) -> str:
     return text
 
 
-def support_of(engine: Engine, scene: Scene) -> Support:
-    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out.
+def support_of(engine: Engine, scene: Scene, t_start: float = 0.0) -> Support:
+    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out, or
+    where the run begins at another time (s) than the adapter's runs do.
 
     Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
     would not know.
     """
+    known = getattr(engine, "takes", ())
+    if t_start != 0.0 and "t_start" not in known:
+        return Support("no", f"the adapter of engine {engine.name} {NO_START}")
     for collection in LATER:
-        items, known = getattr(scene, collection), getattr(engine, "takes", ())
+        items = getattr(scene, collection)
         if items and collection not in known:
             return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
     for law in scene.controllers:

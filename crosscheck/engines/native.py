@@ -32,7 +32,7 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.modal.flexible import flexible_model
 from flexmb.run.eventful import refuse_events
-from flexmb.run.simulate import refuse_without_jacobian, simulate
+from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.schema import BeamBody, ModalBody, RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
@@ -54,7 +54,7 @@ class NativeEngine:
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
 
-    takes = ("connectors", "controllers", "events")
+    takes = ("connectors", "controllers", "events", "t_start")
 
     def __init__(
         self,
@@ -195,7 +195,7 @@ class NativeModel:
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         """The method is the effort's; of a tolerance, atol is a hundredth."""
-        accuracy = (
+        accuracy: RunSettings = (
             {"rtol": effort.value, "atol": _ABSOLUTE * effort.value}
             if effort.kind == "tolerance"
             else {"step": effort.value}
@@ -204,12 +204,13 @@ class NativeModel:
             self._system,
             float(run.times[-1]),
             effort.method,  # type: ignore[arg-type]  # simulate refuses what is none
+            t_start=run.t_start,
             samples=run.times,
             algorithm=self._algorithm,
             **accuracy,
         )
         return Trajectory(
-            status=_status(done),
+            status=_status(done, run.t_start),
             message="" if done.finished else done.message,
             times=done.t,
             markers={
@@ -246,8 +247,8 @@ def _fastest_mode(scene: Scene) -> float:
     )
 
 
-def _status(done: NativeTrajectory) -> Status:
+def _status(done: NativeTrajectory, t_start: float) -> Status:
     """A run that never left its initial state has failed; one that left it has diverged."""
     if done.finished:
         return "finished"
-    return "diverged" if done.stopped_at > 0.0 else "failed"
+    return "diverged" if done.stopped_at > t_start else "failed"
