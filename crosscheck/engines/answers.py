@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, get_args
 
 import numpy as np
@@ -25,6 +25,7 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
@@ -132,7 +133,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         evaluations=_count(found.evaluations),
     )
     good = _finite_samples(run, finished)
-    run = run if good == count else _cut(run, good)
+    run = run if good == count else first_samples(run, good)
     for name, path in run.markers.items():
         defect = np.abs(np.linalg.norm(path.quaternion, axis=1) - 1.0)
         if np.any(defect > UNIT):
@@ -232,25 +233,6 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
             yield from ((f"{output}[{name!r}]", values) for name, values in found.items())
         elif found is not None:
             yield output, found
-
-
-def _cut(run: Trajectory, count: int) -> Trajectory:
-    """The first `count` samples."""
-    return replace(
-        run,
-        times=run.times[:count],
-        markers={
-            name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
-            for name, path in run.markers.items()
-        },
-        **{name: _first_samples(getattr(run, name), count) for name in OUTPUTS},
-    )
-
-
-def _first_samples(output: Any, count: int) -> Any:
-    if isinstance(output, dict):
-        return {name: values[:count] for name, values in output.items()}
-    return None if output is None else output[:count]
 
 
 def _effort(found: Any, where: str) -> Effort:

@@ -28,12 +28,14 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.pace import fastest_mode, pace
 from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.modal.flexible import flexible_model
 from flexmb.run.eventful import refuse_events
 from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
+from flexmb.scene.events import EndRun
 from flexmb.scene.schema import BeamBody, ModalBody, RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
@@ -120,6 +122,9 @@ class NativeEngine:
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)
         refuse_events(system, self._method)
+        for event in scene.events:
+            if any(isinstance(action, EndRun) for action in event.actions):
+                raise NotImplementedError(f'event "{event.name}" ends the run, and engines are asked for all samples')
         return NativeModel(system, self._algorithm, self._method)
 
 
@@ -209,7 +214,7 @@ class NativeModel:
             algorithm=self._algorithm,
             **accuracy,
         )
-        return Trajectory(
+        found = Trajectory(
             status=_status(done, run.t_start),
             message="" if done.finished else done.message,
             times=done.t,
@@ -220,6 +225,7 @@ class NativeModel:
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
         )
+        return first_samples(found, int(np.isin(done.t, run.times).sum()))  # events that chatter end a run in between
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:

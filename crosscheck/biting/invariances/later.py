@@ -13,7 +13,7 @@ from crosscheck.library.time_functions import delayed, in_functions
 from flexmb.scene.check.control import named
 from flexmb.scene.control import Controller, TimeSensor
 from flexmb.scene.events import Change, SceneEvent
-from flexmb.scene.functions import Function, SpinUp
+from flexmb.scene.functions import Function, SpinUp, Table
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import watchable
 
@@ -47,6 +47,8 @@ def _later(scene: Scene) -> Counterpart:
 def _shifted(function: Function) -> Function:
     if isinstance(function, SpinUp):
         raise NotApplicable('a "spin_up" begins at t = 0 and cannot be shifted')
+    if isinstance(function, Table):
+        raise NotApplicable('a "table" that is shifted does not cover t = 0, at which engines look at a scene')
     return delayed(function, START_S)
 
 
