@@ -97,9 +97,13 @@ class Closures:
         c = self.constants[0]
         if algorithm == "composite":
             return matrices(c)
-        if any(LEVELS[c.body["level"][k]].at_rest for k in np.flatnonzero(c.body["modes"])):
-            return response(c)
-        return Recursion()
+        return response(c) if self.at_rest else Recursion()
+
+    @property
+    def at_rest(self) -> list[int]:
+        """Bodies whose inertia is that of their rest shape, and so not where closures join them."""
+        body = self.constants[0].body
+        return [k for k in np.flatnonzero(body["modes"]).tolist() if LEVELS[body["level"][k]].at_rest]
 
     @property
     def _own(self) -> ClosureWorkspace:

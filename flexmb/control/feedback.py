@@ -14,11 +14,10 @@ from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
 from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
 from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
-from flexmb.motion.retraction import move
 from flexmb.scene.control import DriveSensor, LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -77,15 +76,15 @@ class Feedback:
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
-    def with_retraction(self) -> None:
+    def with_retraction(self, move: Any) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
-    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). Instants that were due before
-        the start are gone: what they put out is remembered, or zero.
+        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone: what
+        they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
@@ -105,9 +104,8 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
-        if linear:
-            jacobian, exact, tangent = linear
-            posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
+        if linear is not None:
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move))
         else:
             posed = problem(*kernels)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
@@ -129,7 +127,7 @@ class Feedback:
     def _only_at(self, begin: Starting) -> Real:
         t = begin.state.t
         clock = Clock(np.array([t]), np.array([np.nextafter(t, np.inf)]))
-        y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), ()).y
+        y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.replay()
         return y
 

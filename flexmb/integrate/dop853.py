@@ -33,7 +33,7 @@ from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, 
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
+from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -177,16 +177,15 @@ def attempt(problem, step, y, s, accuracy, counts):
 
 
 @helper
-def pause(problem, watch, step, leapt, y, s, samples, run):
+def pause_within(problem, watch, step, leapt, y, s, samples, run):
     """y at the first level that a step, or a leap, comes to: (CROSSED, the time); (OK, .) where it comes to none."""
     ends, trial = Ends(y, s.k[0], s.y_new, s.k[END]), np.empty(y.shape[0])
-    status, some = meets(problem, watch, step, ends)
-    if status != OK or not some:
-        return status, step.start
     if leapt:
-        return end_at_crossing(Within(problem, watch, step, ends, in_leap, OK, trial, run), samples[0], samples[1])
-    status = interpolant(problem, step, y, s, trial, run[1])
-    if status != OK:
+        return pause(problem, watch, step, ends, in_leap, OK, samples, run)
+    status, some = meets(problem, watch, step, ends)
+    if status == OK and some:
+        status = interpolant(problem, step, y, s, trial, run[1])
+    if status != OK or not some:
         return status, step.start
     return end_at_crossing(Within(problem, watch, step, ends, state_at, s, trial, run), samples[0], samples[1])
 
@@ -229,7 +228,7 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
             accepted = status == OK and error < 1.0
             if accepted:
                 if watch is not None:
-                    status, t_at = pause(problem, watch, step, leapt, y, s, (times, out), (accuracy, counts))
+                    status, t_at = pause_within(problem, watch, step, leapt, y, s, (times, out), (accuracy, counts))
                     if status != OK:
                         return status, t_at
                 if leapt:

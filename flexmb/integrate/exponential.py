@@ -20,6 +20,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     FACTORISATIONS,
     REJECTED,
     SAMPLES,
@@ -37,9 +38,10 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -234,8 +236,8 @@ def scratch(n):
 def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`. Where the iteration does not converge, the step is
-    halved.
+    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where the iteration does not
+    converge, the step is halved.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
@@ -266,17 +268,24 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             counts[FACTORISATIONS] += 1
             if prepare(s.flow, s.J, length):
                 status, error = attempt(problem, step, y, s, accuracy, counts)
-            trouble = reason(status)
+            trouble, leapt = reason(status), False
+            if may_leap(status):
+                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
+                if far > 0.0:
+                    t_new, length, status, error = t + far, far, OK, CALM
+                    step, leapt = Interval(t, t_new, last), True
             accepted = status == OK and error < 1.0
             if accepted:
                 if watch is not None:
-                    ends, run = Ends(y, s.f, s.y_new, s.f_new), (accuracy, counts)
-                    status, some = meets(problem, watch, step, ends)
-                    if status == OK and some:
-                        within = Within(problem, watch, step, ends, inside, s, np.empty(y.shape[0]), run)
-                        status, t_new = end_at_crossing(within, times, out)
+                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                    if leapt:
+                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                    else:
+                        status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
                     if status != OK:
-                        return status, t if status > OK else t_new
+                        return status, t_at
+                if leapt:
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
                 store_samples(problem, step, y, s, times, out, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)

@@ -22,7 +22,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
-from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -62,18 +62,6 @@ def inside(problem, step, ends, k, t, result, run):
 
 
 @helper
-def pause(problem, watch, step, ends, leapt, k, samples, run):
-    """ends.y at the first level that a step, or a leap, comes to: (CROSSED, the time); (OK, .) if it comes to none."""
-    status, some = meets(problem, watch, step, ends)
-    if status != OK or not some:
-        return status, step.start
-    trial = np.empty(ends.y.shape[0])
-    if leapt:
-        return end_at_crossing(Within(problem, watch, step, ends, in_leap, k, trial, run), samples[0], samples[1])
-    return end_at_crossing(Within(problem, watch, step, ends, inside, k, trial, run), samples[0], samples[1])
-
-
-@helper
 def _detour(problem, watch, trouble, step, y, scratch, output, run):
     """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
 
@@ -96,7 +84,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
             leapt = Interval(t, t + far, last)
             if watch is not None:
                 ends = Ends(y, k[0], trial, k[1])
-                status, t_at = pause(problem, watch, leapt, ends, True, k, output, run)
+                status, t_at = pause(problem, watch, leapt, ends, in_leap, OK, output, run)
                 if status != OK:
                     return status, t_at
             store_leapt(leapt, y, k[0], trial, k[1], times, out, counts)
@@ -118,7 +106,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
                 continue
             if watch is not None:
                 ends = Ends(y, k[0], trial, k[3])
-                status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, False, k, output, run)
+                status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, output, run)
                 if status != OK:
                     return status, t_at
             t, h = t_new, 2.0 * h
@@ -158,7 +146,7 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                     return status, t
                 if watch is not None:  # the last stage's slope is nearly that at the end
                     step, ends = Interval(t, t + h, last), Ends(y, k[0], trial, k[3])
-                    status, t_at = pause(problem, watch, step, ends, False, k, (times, out), (accuracy, counts))
+                    status, t_at = pause(problem, watch, step, ends, inside, k, (times, out), (accuracy, counts))
                     if status != OK:
                         return status, t_at
                 t = end if j == steps - 1 else start + (j + 1) * h

@@ -223,6 +223,20 @@ def end_at_crossing(within, times, out):
 
 
 @sweep
+def pause(problem, watch, step, ends, state_at, s, samples, run):
+    """ends.y at the first level that a step comes to: (CROSSED, the time); or the status of what fails, and the start.
+
+    Where it comes to none: OK, and its end if it was looked into, else its start. samples: times of samples, and
+    samples; run: accuracy and counts.
+    """
+    status, some = meets(problem, watch, step, ends)
+    if status != OK or not some:
+        return status, step.start
+    within = Within(problem, watch, step, ends, state_at, s, np.empty(ends.y.shape[0]), run)
+    return end_at_crossing(within, samples[0], samples[1])
+
+
+@sweep
 def _value_at(within, i, t):
     """How far i is above its level at a time within a step, with the state in `trial`: (status, value)."""
     problem, watch, step, ends, state_at, s, trial, run = within

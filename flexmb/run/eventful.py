@@ -9,8 +9,6 @@ from functools import partial
 import numpy as np
 from msgspec import structs
 
-from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import UNKNOWN, Watch, watch
 from flexmb.run.joining import joined
@@ -31,15 +29,6 @@ from flexmb.typing import Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
-
-
-def refuse_events(system: System, method: Method) -> None:
-    """NotImplementedError for events that a method does not have."""
-    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in _by_what_they_watch(system)):
-        raise NotImplementedError(
-            f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
-            '"radau5" or "exponential"'
-        )
 
 
 def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:

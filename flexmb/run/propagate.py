@@ -9,15 +9,15 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexmb.entry import articulated, tangent
+from flexmb.entry import articulated
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory
-from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
-from flexmb.motion import coordinates, retraction
+from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
@@ -73,15 +73,14 @@ class Integration:
             from flexmb.control.feedback import Feedback  # few scenes need it
 
             self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
-        self._linear: tuple[Any, ...] = ()
+        self._linear: Linear | None = None
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
-            exact = system.constants  # with every body eliminated explicitly, for Jacobians
-            moving = tangent.tangent_workspace(exact, system.nq, system.nu)
-            self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
-            self._linear = tangent.jacobian, exact, moving
+            assert route.linear is not None  # else `refuse_without_jacobian`
+            self._linear = route.linear(constants, self._workspace)
+            self._problem: Any = stiff_problem(*motion, self._linear, route.leaping)
             if self.feedback is not None:
-                self.feedback.with_retraction()
+                self.feedback.with_retraction(self._linear.move)
         else:
             self._problem = problem(*motion, route.leaping)
         self.batch: Sampler | None = None

@@ -9,13 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
+from flexmb.closure import jacobian as closed_jacobian
 from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
+from flexmb.closure.jacobian import chain_tangent
 from flexmb.closure.leap import back, leap
 from flexmb.closure.tables import Closed
 from flexmb.entry import articulated
-from flexmb.integrate.problem import Leaping
+from flexmb.integrate.problem import Leaping, Linear
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
@@ -193,7 +195,11 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap))
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap), self._linear)
+
+    def _linear(self, chain: Closed, _: Closed) -> Linear:
+        tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)
+        return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
