@@ -229,7 +229,7 @@ class Feedback:
     @property
     def _has_markers(self) -> bool:
         kinds = self._wiring.sensor["kind"]
-        seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
+        seen = (kinds >= a.POSITION) & (kinds <= a.DISTANCE)
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
     def _refuse(self, algorithm: DynamicsAlgorithm) -> None:

@@ -12,8 +12,8 @@ import numpy as np
 from flexmb.jit.bundle import bundle
 from flexmb.typing import Index, Real, Record
 
-COORDINATE, RATE, POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY, TIME, PROFILE = range(8)
-ACCELERATION, ANGULAR_ACCELERATION, SPECIFIC_FORCE, LOAD, DRIVE_LOAD = range(8, 13)
+COORDINATE, RATE, POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY, DISTANCE, TIME, PROFILE = range(9)
+ACCELERATION, ANGULAR_ACCELERATION, SPECIFIC_FORCE, LOAD, DRIVE_LOAD = range(9, 14)
 AT_ONCE = ACCELERATION  # sensors of this kind and after depend on the forces of the same instant
 WORLD, OWN = range(2)  # axes of a marker sensor
 
@@ -36,7 +36,7 @@ SENSOR = _record(
     ("signal", _I),  # its first signal
     ("width", _I),
     ("place", _I),  # in y, or the number of a marker, hinge, function or prescribed speed; -1 of one that is free
-    ("axes", _I),  # WORLD or OWN
+    ("axes", _I),  # WORLD or OWN; of a distance the other marker
 )
 CONTROLLER = _record(
     ("law", _I),

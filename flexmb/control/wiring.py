@@ -16,6 +16,7 @@ from flexmb.scene.check.control import named, output_width
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
     DriveSensor,
     GainTable,
     LoadSensor,
@@ -138,6 +139,8 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
             axes = a.WORLD if frame == "world" else a.OWN
             width = 4 if quantity == "orientation" else 3
             return _QUANTITIES[quantity], list(observed.markers).index(marker), width, axes
+        case DistanceSensor(marker_a=one, marker_b=other):
+            return a.DISTANCE, list(observed.markers).index(one), 2, list(observed.markers).index(other)
         case LoadSensor(hinge=hinge):
             return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
         case DriveSensor(coordinate=coordinate):

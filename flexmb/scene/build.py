@@ -421,6 +421,10 @@ class SceneBuilder:
         or "specific_force", in World axes or its own."""
         return self._append(s.MarkerSensor, name=name, marker=marker, quantity=quantity, frame=frame)
 
+    def sense_distance(self, name: str, marker_a: str, marker_b: str) -> Self:
+        """The distance of two markers (m) and its rate (m/s)."""
+        return self._append(s.DistanceSensor, name=name, marker_a=marker_a, marker_b=marker_b)
+
     def sense_load(self, name: str, hinge: str) -> Self:
         """The load across a hinge, [torque; force] on the outboard body, World axes."""
         return self._append(s.LoadSensor, name=name, hinge=hinge)

@@ -46,6 +46,14 @@ class MarkerSensor(SceneStruct, frozen=True, kw_only=True, tag="marker", tag_fie
     frame: Literal["world", "marker"] = "world"
 
 
+class DistanceSensor(SceneStruct, frozen=True, kw_only=True, tag="distance", tag_field="kind"):
+    """Distance of two markers (m) and its rate (m/s), two numbers: how far bodies are apart, how long a spring is."""
+
+    name: str
+    marker_a: str
+    marker_b: str
+
+
 class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="kind"):
     """Total load across a hinge, six numbers [torque; force] on the outboard body about the hinge point, World axes."""
 
@@ -77,7 +85,7 @@ class ProfileSensor(SceneStruct, frozen=True, kw_only=True, tag="profile", tag_f
     function: Function
 
 
-Sensor = CoordinateSensor | MarkerSensor | LoadSensor | DriveSensor | TimeSensor | ProfileSensor
+Sensor = CoordinateSensor | MarkerSensor | DistanceSensor | LoadSensor | DriveSensor | TimeSensor | ProfileSensor
 
 
 class _Controller(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):

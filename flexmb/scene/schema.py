@@ -41,6 +41,7 @@ from flexmb.scene.connectors import (
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
     DriveSensor,
     GainTable,
     LoadSensor,
@@ -189,7 +190,7 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 __all__ = [
     "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body",
     "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller", "CoordinateSensor",
-    "Cylindrical", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
+    "Cylindrical", "DistanceSensor", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
     "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
     "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
     "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",

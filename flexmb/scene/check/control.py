@@ -13,6 +13,7 @@ from flexmb.scene.columns import alike
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
     DriveSensor,
     GainTable,
     LoadSensor,
@@ -57,7 +58,7 @@ def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
             return 4 if quantity == "orientation" else 3
         case LoadSensor():
             return 6
-        case ProfileSensor():
+        case ProfileSensor() | DistanceSensor():
             return 2
     return 1
 
@@ -139,18 +140,21 @@ def control(scene: Scene) -> Iterator[Defect]:
 def _sensors(scene: Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
     moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, BeamBody | ModalBody)]
-    known: dict[Any, tuple[str, str, list[str]]] = {
-        CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
-        MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
-        LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),
-        DriveSensor: ("coordinate", "scalar coordinate", list(scalar_paths(scene))),
+    markers = [marker.name for marker in scene.markers]
+    known: dict[Any, tuple[tuple[str, ...], str, list[str]]] = {
+        CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
+        MarkerSensor: (("marker",), "marker", markers),
+        DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
+        LoadSensor: (("hinge",), "hinge", [hinge.name for hinge in scene.hinges]),
+        DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):
         if type(sensor) in known:
-            key, what, names = known[type(sensor)]
-            if getattr(sensor, key) not in names:
-                remedy = closest(getattr(sensor, key), names)
-                yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
+            keys, what, names = known[type(sensor)]
+            for key in keys:
+                if getattr(sensor, key) not in names:
+                    remedy = closest(getattr(sensor, key), names)
+                    yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
         if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, ControlSignal):
             remedy = f'let the controller take "{sensor.function.source}" itself'
             yield Defect(str(place.key("function")), "a signal is no function of time", remedy)

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
 import flexmb as fm
+from tests.flexmb.closure.mechanisms import windows
 
 Z = (0.0, 0.0, 1.0)
 
@@ -123,3 +125,26 @@ def test_what_closures_do_not_allow_is_told():
     })  # fmt: skip
     with pytest.raises(fm.DynamicsError, match="closures and prescribed motions do not allow"):
         fm.simulate(driven, 1.0)
+
+
+@pytest.mark.parametrize("settings", [{}, {"method": "rk4", "step": 1e-3}], ids=["dop853", "rk4"])
+@pytest.mark.parametrize("level", [0.0, 1e-4, -1e-4, 5e-4])
+def test_a_level_within_a_leap_is_found_there(level, settings):
+    """A parallelogram turns evenly, pi/2 - pi t; at t = 0.5 all its bars lie on one line, which steps leap over."""
+    scene = windows(1, np.pi, gravity=0.0)
+    end = fm.SceneEvent(name="end", watch="foot 0.rotation", level=level, actions=(fm.EndRun(),))
+    run = fm.simulate(msgspec.structs.replace(scene, events=(end,)), 1.0, samples=11, **settings)
+    assert run.finished and [event.name for event in run.events] == ["end"]
+    assert run.t[-1] == pytest.approx(0.5 - level / np.pi, abs=1e-9)
+    assert run.q[-1, 0] == pytest.approx(run.q[-1, 2], abs=1e-9)  # parallel
+
+
+@pytest.mark.parametrize("level", [0.1, 2e-3, -2e-3, -0.1])
+def test_a_run_goes_on_from_events_beside_a_singular_position(level):
+    """A change that changes nothing, on either side: the branch is that of the run without it."""
+    scene = windows(1, np.pi, gravity=0.0)
+    change = fm.Change(path="foot 0.rotation.damping_Nms_rad", value=0.0)
+    event = fm.SceneEvent(name="nothing", watch="foot 0.rotation", level=level, actions=(change,))
+    run = fm.simulate(msgspec.structs.replace(scene, events=(event,)), 1.0, samples=11)
+    assert run.finished and len(run.events) == 1
+    assert np.abs(run.q[:, 0] - 0.5 * np.pi + np.pi * run.t).max() < 1e-8
