@@ -195,7 +195,7 @@ class SceneView {
     for (const line of this.shown.lines) {
       const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body) || connectorTone(line.kind), side: THREE.DoubleSide });
       if (line.kind === "solid") this.carrier(line.points[0][0]).add(...solid(line.points.map(p => p.slice(1, 4)), material));
-      else if (line.kind === "ball" || line.kind === "mount") for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, 3.5 * thin, material));
+      else if (line.kind === "ball" || line.kind === "mount") for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, 4.5 * thin, material));
       else this.tubes.push(new Tube(this.world, line, { beam: 1.8, spring: 0.45 }[line.kind] * thin || thin, material));
     }
     for (const wheel of this.shown.wheels) {
@@ -288,7 +288,8 @@ function solid(corners, material) {
 
 // A point mass or the mark of a connector, fixed to a marker.
 function dot(kind, [, x, y, z], size, material) {
-  const mesh = new THREE.Mesh(kind === "ball" ? new THREE.SphereGeometry(size, 20, 14) : new THREE.OctahedronGeometry(size), material);
+  const [around, down] = kind === "ball" ? [20, 14] : [4, 2]; // a mark is an octahedron
+  const mesh = new THREE.Mesh(new THREE.SphereGeometry(size, around, down), material);
   mesh.position.set(x, y, z);
   return mesh;
 }
@@ -310,7 +311,7 @@ function wheelMesh(wheel, thin) {
 class Tube {
   constructor(world, line, radius, material) {
     this.line = line; this.radius = radius;
-    this.spine = { beam: hermite, spring: placed => coil(placed, 4 * radius) }[line.kind] || (placed => placed.map(([p]) => p));
+    this.spine = { beam: hermite, spring: placed => coil(placed, 7 * radius) }[line.kind] || (placed => placed.map(([p]) => p));
     this.rings = { beam: (line.points.length - 1) * FINER + 1, spring: TURNS * PER_TURN + 3 }[line.kind] || line.points.length;
     this.geometry = new THREE.BufferGeometry();
     this.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * RING * this.rings), 3));
