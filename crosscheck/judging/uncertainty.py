@@ -16,23 +16,24 @@ of the grid convergence index for an unproven order.
 
 **Tolerance.** Error is not a power of the tolerance, but it falls. If the finest error is at most half the one before,
 |f_2 - f_3| >= e_2 - e_3 >= e_3: the difference bounds the error. d_12 >= 2 d_23 is the sign of it; without it
-U = 3 max(d_12, d_23) again. How far an error falls scatters: at a finer tolerance it is at most a spread S times what the
-fall q foretells, e_3 <= S/q e_2. With e_2 <= d_23 + e_3 that is
+U = 3 max(d_12, d_23) again. How far an error falls scatters: at a finer tolerance it is at most a spread S times what
+the fall q foretells, e_3 <= S/q e_2. With e_2 <= d_23 + e_3, that is
 
     U = S/(q - S) d_23,        at most 3 d_23.
 
-By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and the tolerances' ratio; U is at least d_23,
-because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are counted.
-Where they grow by less than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap): U = SPREAD d_23.
-Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond `LARGEST_ORDER_IN_WORK`, which no method
-has, shows nothing. With a smaller one U may be less than d_23, with S = `SPREAD` and for q the least of
+By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and the tolerances' ratio; U is at least
+d_23, because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are
+counted. Where they grow by no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap):
+U = SPREAD d_23. Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond
+`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. With a smaller one U may be less than d_23, with
+S = `SPREAD` and for q the least of
 
 - the fall that was seen, d_12 / d_23, and the ratio of the tolerances;
 - that ratio, divided by as much as the fall seen exceeds it: what fell too far by chance falls too little next;
 - (N_3 / N_2)^p.
 
-Four efforts tell p twice. Where both agree within a factor of `SAME_ORDER` errors fall evenly: S is EVEN_SPREAD, and a fall
-beyond the tolerances' ratio is no chance. The spreads are those of the library, see docs/verdicts.md.
+Four efforts tell p twice. Where both agree within a factor of `SAME_ORDER` errors fall evenly: S is EVEN_SPREAD, and a
+fall beyond the tolerances' ratio is no chance. The spreads are those of the library, see docs/verdicts.md.
 
 **Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
 eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
@@ -99,8 +100,8 @@ def unknown(samples: int, why: str) -> Uncertainty:
 def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
-    The last three count, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises: U is
-    infinite where the rungs say nothing.
+    The last three count, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises: U
+    is infinite where the rungs say nothing.
     """
     samples = len(rungs[-1].values) if rungs else 0
     fault = _fault(kind, rungs, size)
@@ -200,7 +201,8 @@ def _by_steps(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
         how = f"difference of the two finest steps, as order {order:.2f} is not whole"
         return SAFETY / (ratio - 1.0), gaps[-1], how, order
     credited = min(order, ORDER_CREDIT)
-    return SAFETY / float(np.expm1(credited * np.log(ratio))), gaps[-1], f"Richardson, observed order {order:.2f}", order
+    how = f"Richardson, observed order {order:.2f}"
+    return SAFETY / float(np.expm1(credited * np.log(ratio))), gaps[-1], how, order
 
 
 def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
@@ -211,8 +213,8 @@ def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
     work = [rung.evaluations for rung in rungs[-RUNGS:]]
     growth = [fine / coarse if coarse > 0 else np.nan for coarse, fine in pairwise(work)]
     if any(more <= HARDLY_MORE for more in growth[-2:]):
-        how = f"{SPREAD:g} x the difference of the two finest tolerances, as a finer one took hardly more evaluations"
-        return SPREAD, gaps[-1], how, None
+        why = "as a finer one took hardly more evaluations"
+        return SPREAD, gaps[-1], f"{SPREAD:g} x the difference of the two finest tolerances, {why}", None
     seen = sizes[-2] / sizes[-1] if sizes[-1] > 0.0 else np.inf
     ratio = rungs[-2].effort / rungs[-1].effort
     foretold, spread = _foretold(sizes, growth, ratio)
@@ -221,10 +223,11 @@ def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
 
 
 def _foretold(sizes: Sequence[float], growth: Sequence[float], ratio: float) -> tuple[float, float]:
-    """How far the error falls at the last effort, and how that scatters.
+    """How far evaluations foretell that the error falls at the last effort, and how that scatters.
 
-    `sizes` of the differences, `growth` of the evaluations, of which the last one is beyond what `sizes` can tell; `ratio`
-    of the two finest tolerances. A fall of 1, no fall at all, where the evaluations were not counted or tell no order.
+    `sizes` of the differences, `growth` of the evaluations, which leads from each difference to the next; its last one
+    leads to the finest effort. `ratio` of the two finest tolerances. A fall of 1 is none: evaluations were not counted
+    or tell no order.
     """
     falls = [wide / near if near > 0.0 else np.inf for wide, near in pairwise(sizes)]
     orders = [
