@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,6 +47,10 @@ class ClosedSystem(System):
     def _anew(self) -> ClosedSystem:
         """The same scene turned into other arrays."""
         return ClosedSystem(self.scene)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As of a tree."""
+        return ClosedSystem, (self.scene,)
 
     @property
     def initial_state(self) -> State:

@@ -15,11 +15,13 @@ from crosscheck.engines.registry import engine
 from flexmb.scene.build import angular, linear
 from flexmb.scene.connectors import AngularFriction, Connector
 from flexmb.scene.files import load_scene
-from flexmb.scene.schema import Scene
+from flexmb.scene.functions import Constant
+from flexmb.scene.schema import Load, Scene
 from flexmb.scene.shapes import beam_section
 from flexmb.surrogate import modal_points
 
-CASE = Path(__file__).parents[3] / "cases" / "connectors" / "sprung_platform" / "scene.toml"
+CASES = Path(__file__).parents[3] / "cases"
+CASE, ANDREWS = (CASES / case / "scene.toml" for case in ("connectors/sprung_platform", "closed_chains/andrews"))
 WITHIN = {"native-composite": 1e-12, "pinocchio": 1e-12, "mujoco": 1e-11, "drake": 1e-11, "exudyn": 1e-10}
 LIBRARY = {"native-composite": "flexmb", "drake": "pydrake"}
 
@@ -123,6 +125,25 @@ def sprung_beam(kind: str) -> Scene:
         quaternion_a=(0.8, 0.0, 0.6, 0.0), quaternion_b=(0.8, 0.0, 0.6, 0.0), stiffness=stiffness,
         damping=0.01 * stiffness,
     ).scene()  # fmt: skip
+
+
+def test_connectors_and_loads_beside_closures_in_pinocchio():
+    """Andrews' mechanism with a force on its lever and dry friction at its crank: the first instant, and a run."""
+    pytest.importorskip("pinocchio")
+    scene = load_scene(ANDREWS)
+    push = Load(name="push", type="force", body="K3", direction=(0.6, 0.8, 0.0), function=Constant(value=20.0))
+    rub = AngularFriction(name="rub", hinge=scene.hinges[0].name, sliding_Nm=0.004, smoothing_rad_s=10.0)
+    scene = msgspec.structs.replace(scene, loads=(push,), connectors=(*scene.connectors, rub))
+    models = [engine(each).compile(scene) for each in ("native", "pinocchio")]
+    ours, theirs = (model.evaluate() for model in models)
+    assert off(ours.loads, theirs.loads) <= 1e-12 and off(ours.connectors, theirs.connectors) <= 1e-12
+    run = Run(np.linspace(0.0, 0.005, 6))
+    efforts = Effort("tolerance", 1e-11, "dop853"), Effort("tolerance", 1e-11, "DOP853")
+    ours, theirs = (model.simulate(run, effort) for model, effort in zip(models, efforts, strict=True))
+    paths = [{name: path.position for name, path in each.markers.items()} for each in (ours, theirs)]
+    assert off(*paths) <= 1e-10 and off(ours.loads, theirs.loads) <= 1e-8
+    assert off(ours.hinge_forces, theirs.hinge_forces) <= 1e-8
+    assert np.max(np.abs(ours.work - theirs.work)) <= 1e-9 * np.max(np.abs(ours.work))
 
 
 @pytest.mark.parametrize("kind", ["bushing", "line"])
