@@ -13,6 +13,7 @@ from crosscheck.biting.invariances.counterpart import (
     NotApplicable,
     is_prescribed,
     without_events,
+    without_feedback,
 )
 from crosscheck.library.time_functions import scaled, slowed
 from flexmb.scene.bodies import ModalBody, SidBody
@@ -80,6 +81,7 @@ OF_CHANNEL = {
 
 
 def _rescaled(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):

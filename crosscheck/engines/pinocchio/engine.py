@@ -19,7 +19,7 @@ class PinocchioEngine:
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
-    takes = ("connectors",)
+    takes = ("connectors", "t_start")
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
