@@ -92,6 +92,15 @@ class Leaping(NamedTuple):
     leap: Any
 
 
+class Linear(NamedTuple):
+    """Kernels and bundles of a `StiffProblem` that a `Problem` has not: jacobian and move, exact and tangent."""
+
+    jacobian: Any
+    move: Any
+    exact: Any
+    tangent: Any
+
+
 @kernel
 def _no_way_back(y, constants):
     return -math.inf
@@ -118,11 +127,12 @@ def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Lea
 
 
 def stiff_problem(
-    rhs: Any, project: Any, constants: Any, workspace: Any, jacobian: Any, move: Any, exact: Any, tangent: Any
+    rhs: Any, project: Any, constants: Any, workspace: Any, linear: Linear, leaping: Leaping | None = None
 ) -> StiffProblem:
     """Likewise."""
+    jacobian, move, exact, tangent = linear
     return StiffProblem(
-        *problem(rhs, project, constants, workspace),
+        *problem(rhs, project, constants, workspace, leaping),
         pointer(jacobian, STATUS, REAL, VECTOR, MATRIX, exact, tangent),
         pointer(move, NOTHING, VECTOR, VECTOR, VECTOR, constants),
         AnyBundle(exact),

@@ -343,8 +343,8 @@ class SceneBuilder:
     ) -> Self:  # fmt: skip
         """What happens where `watch` comes to `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in this order.
 
-        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", or a rate, "pivot.rotation.rate"
-        or "wheel.speed".
+        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", a rate, "pivot.rotation.rate" or
+        "wheel.speed", or one number of a sensor or controller, "height[2]".
         """
         return self._append(s.SceneEvent, name=name, watch=watch, level=level, crossing=crossing, actions=actions)
 
@@ -421,9 +421,17 @@ class SceneBuilder:
         or "specific_force", in World axes or its own."""
         return self._append(s.MarkerSensor, name=name, marker=marker, quantity=quantity, frame=frame)
 
+    def sense_distance(self, name: str, marker_a: str, marker_b: str) -> Self:
+        """The distance of two markers (m) and its rate (m/s)."""
+        return self._append(s.DistanceSensor, name=name, marker_a=marker_a, marker_b=marker_b)
+
     def sense_load(self, name: str, hinge: str) -> Self:
         """The load across a hinge, [torque; force] on the outboard body, World axes."""
         return self._append(s.LoadSensor, name=name, hinge=hinge)
+
+    def sense_drive(self, name: str, coordinate: str) -> Self:
+        """The load of the drive of a prescribed or latched coordinate, "pivot.rotation"; of a free one 0."""
+        return self._append(s.DriveSensor, name=name, coordinate=coordinate)
 
     def sense_time(self, name: str) -> Self:
         """Time (s) as a signal."""

@@ -19,13 +19,13 @@ from crosscheck.report.store import Store
 from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.sweep import PROVIDER
-from flexmb.scene.bodies import SidBody
+from flexmb.scene.connectors import HingeFriction
 from flexmb.typing import Real
 from tests.crosscheck.sessions import CASE
 
 
 @pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
-def test_every_body_and_wheel_is_drawn(case: Case) -> None:
+def test_every_body_wheel_mass_and_connector_is_drawn(case: Case) -> None:
     record, _ = plan(case, (), PROVIDER, films=True)
     for variant in record.run.variants:
         info = record.variants[variant.name]
@@ -35,10 +35,9 @@ def test_every_body_and_wheel_is_drawn(case: Case) -> None:
         scene = case.scene(variant)
         if variant.transform != "modal_points":
             scene = variant_scene(scene, variant)
-        if any(isinstance(body, SidBody) for body in scene.bodies):
-            continue
         assert drawing is not None
-        assert {line.body for line in drawing.lines} == {body.name for body in scene.bodies}, variant.name
+        shown = (*scene.bodies, *scene.point_masses, *(x for x in scene.connectors if not isinstance(x, HingeFriction)))
+        assert {line.body for line in drawing.lines} == {each.name for each in shown}, variant.name
         assert {wheel.name for wheel in drawing.wheels} == {wheel.name for wheel in scene.wheels}, variant.name
 
 

@@ -51,7 +51,8 @@ METHODS = {
     "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
     "linear_friction": s.LinearFriction, "event": s.SceneEvent,
     "sense_coordinate": s.CoordinateSensor, "sense_marker": s.MarkerSensor,
-    "sense_load": s.LoadSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
+    "sense_load": s.LoadSensor, "sense_drive": s.DriveSensor,
+    "sense_distance": s.DistanceSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
     "state_space": s.StateSpace, "pid": s.Pid, "saturation": s.Saturation, "gain_table": s.GainTable,
     "user_law": s.UserLaw,
 }  # fmt: skip
