@@ -237,6 +237,10 @@ class Closures:
         dynamics.count_rows(self._chain.cc, self._own)
         self._ranks, self._size = self._own.rank.copy(), self._own.size.copy()
 
+    def count_as(self, other: Closures) -> None:
+        """As many independent rows as the same closures have on a tree of the same freedom."""
+        self._ranks, self._size = other._ranks.copy(), other._size.copy()
+
     @property
     def rank(self) -> int:
         """Independent rows of a closed configuration; -1 before the first one is known."""

@@ -38,11 +38,11 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.settling import prepare_settling, settle
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -204,6 +204,14 @@ def state_at(problem, step, y, s, t, accuracy, result):
 
 
 @helper
+def inside(problem, step, ends, s, t, result, run):
+    """The same as `flexmb.integrate.watch` asks for it."""
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
+    return OK
+
+
+@helper
 def store_samples(problem, step, y, s, samples, accuracy, counts):
     """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
 
@@ -218,35 +226,6 @@ def store_samples(problem, step, y, s, samples, accuracy, counts):
             state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
-
-
-@helper
-def end_at_crossing(problem, step, y, s, samples, accuracy, counts, watch):
-    """y, and the samples before it, at the first level that the flow of the step crosses; (CROSSED, the time)."""
-    (times, out), trial, t, first = samples, np.empty(y.shape[0]), step.end, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, accuracy, trial)
-                if crosses(watch.side[i], trial[entry] - level, 0):
-                    high = middle
-                else:
-                    low = middle
-            if high <= t:
-                t, first = high, i
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], accuracy, out[counts[SAMPLES]])
-        counts[SAMPLES] += 1
-    if t < step.end:
-        state_at(problem, step, y, s, t, accuracy, trial)
-    else:
-        copy(s.y_new, trial)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
 
 
 @helper
@@ -305,12 +284,18 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
                 if far > 0.0:
                     t_new, length, status, error = t + far, far, OK, CALM
                     step, leapt = Interval(t, t_new, last), True
-                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
-                # a level that is crossed within a leap is found at its end, by the step that follows
-                if watch is not None and not leapt and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, (times, out), accuracy, counts, watch)
+                if watch is not None:
+                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                    if leapt:
+                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                    else:
+                        status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    if status != OK:
+                        return status, t_at
+                if leapt:
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
                 store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)

@@ -31,12 +31,12 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
 from flexmb.integrate.settling import settle
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -235,6 +235,14 @@ def state_at(problem, step, y, s, t, accuracy, result):
 
 
 @helper
+def inside(problem, step, ends, s, t, result, run):
+    """The same as `flexmb.integrate.watch` asks for it."""
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
+    return OK
+
+
+@helper
 def store_samples(problem, step, y, s, samples, accuracy, counts):
     """Store the samples in the step, its end included; samples: (times, states)."""
     times, out = samples
@@ -246,35 +254,6 @@ def store_samples(problem, step, y, s, samples, accuracy, counts):
             state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
-
-
-@helper
-def end_at_crossing(problem, step, y, s, samples, accuracy, counts, watch):
-    """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
-    (times, out), trial, t, first = samples, np.empty(y.shape[0]), step.end, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, accuracy, trial)
-                if crosses(watch.side[i], trial[entry] - level, 0):
-                    high = middle
-                else:
-                    low = middle
-            if high <= t:
-                t, first = high, i
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], accuracy, out[counts[SAMPLES]])
-        counts[SAMPLES] += 1
-    if t < step.end:
-        state_at(problem, step, y, s, t, accuracy, trial)
-    else:
-        copy(s.y_new, trial)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
 
 
 @helper
@@ -376,7 +355,13 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
             if may_leap(status):
                 far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
                 if far > 0.0:
-                    store_leapt(Interval(t, t + far, last), y, s.f, s.y_new, s.f_new, times, out, counts)
+                    step = Interval(t, t + far, last)
+                    if watch is not None:
+                        ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                        if status != OK:
+                            return status, t_at
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
                     # beyond it everything begins anew
                     t, h, h_factored, h_before, error_before = t + far, far, 0.0, 0.0, 0.0
                     renew, fresh, rejected = True, False, False
@@ -389,8 +374,11 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                if watch is not None and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, (times, out), accuracy, counts, watch)
+                if watch is not None:
+                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                    status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    if status != OK:
+                        return status, t_at
                 store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)

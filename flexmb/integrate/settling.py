@@ -18,7 +18,7 @@ from flexmb.jit.kernel import helper
 
 @helper
 def settle(problem, t, rate, y, s, accuracy):
-    """Put y on its manifold at time t; s has J (n,n), factors `real` and `real_pivots` of rate - J, and `change` (n,)."""
+    """Put y on its manifold at time t; s: J (n,n), factors `real` and `real_pivots` of rate - J, and `change` (n,)."""
     if problem.settles:
         n = accuracy.controlled
         copy(y, s.change)

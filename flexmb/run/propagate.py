@@ -22,6 +22,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
 from flexmb.run.switching import segment_ends
+from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -67,8 +68,8 @@ class Integration:
         constants, self._workspace = route.tables()
         self._integrator = integrator
         self.feedback: Feedback | None = None
-        """Of a scene with controllers."""
-        if system.scene.controllers:
+        """Of a scene with controllers, or with events that watch signals."""
+        if system.scene.controllers or watches_signals(system.scene):
             from flexmb.control.feedback import Feedback  # few scenes need it
 
             self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
@@ -157,6 +158,9 @@ def integrate(
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
     memory = method.memory(len(y)) if begin.memory is None else begin.memory
     out = np.empty((len(times), len(y)))
+    if watch is not None and np.any(watch.entry < 0):
+        assert solve.feedback is not None  # somebody watches signals
+        watch = solve.feedback.watching(watch)
     given = y, clock, accuracy, out, counts, memory, watch
     start = perf_counter()
     solve.compile(*given)

@@ -14,7 +14,7 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.run.eventful import EventfulRun, refuse_events
+from flexmb.run.eventful import EventfulRun
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
 from flexmb.run.origin import Beginning, Values, origin, start_time
@@ -107,7 +107,6 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
-    refuse_events(system, method)
     same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
     made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
