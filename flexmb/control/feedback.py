@@ -11,12 +11,13 @@ from flexmb.control import tables as a
 from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
+from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
 from flexmb.control.wiring import widest, wired
 from flexmb.entry.observation import sense_markers
 from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR
+from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.motion.retraction import move
 from flexmb.scene.control import LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
@@ -83,8 +84,8 @@ class Feedback:
     def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). Instants that were due before
-        the start are gone: what they put out is remembered, or zero.
+        linear: empty, or what a `StiffProblem` of the motion needs besides: (jacobian, exact, tangent). Instants that
+        were due before the start are gone: what they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
@@ -104,9 +105,11 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
-        if linear:
-            jacobian, exact, tangent = linear
-            posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
+        if linear and made.continuous[0]:
+            posed: Any = stiff_problem(*kernels, jacobian, loop.move, made, self._tangent(linear, len(y)))
+        elif linear:
+            of_motion, exact, moving = linear
+            posed = stiff_problem(*kernels, of_motion, loop.move, exact, moving)
         else:
             posed = problem(*kernels)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
@@ -245,6 +248,22 @@ class Feedback:
             found.append(Called(law, arrays))
             row["function"] = found[-1].address
         return found
+
+    def _tangent(self, linear: tuple[Any, ...], n: int) -> a.LoopTangent:
+        """For the Jacobian of y (n,) = [q, u, x, work], from that of the motion."""
+        motion, drives = self._plant.nq + self._plant.nu, len(self._wiring.drive)
+        read = np.zeros(n - 1, bool)
+        read[motion:] = True
+        read[:motion] = self._has_markers or self._wiring.reads_at_once
+        for sensor in self._wiring.sensor[self._wiring.sensor["kind"] <= a.RATE]:
+            read[sensor["place"] : sensor["place"] + sensor["width"]] = True
+        of_motion, exact, moving = linear
+        return a.LoopTangent(
+            address=np.array(addresses(of_motion, STATUS, REAL, VECTOR, MATRIX, exact, moving)),
+            column=np.flatnonzero(read), y=np.zeros(n), of_motion=np.zeros((motion + 1, motion + 1)),
+            slope=np.zeros(motion + 1), effect=np.zeros((drives, motion + 1)),
+            ahead=np.zeros(drives + n - 1 - motion), behind=np.zeros(drives + n - 1 - motion),
+        )  # fmt: skip
 
     def _loop(self, table: Any, held: Real, apart: float) -> a.Loop:
         w, plant, out = self._wiring, self._plant, self._outputs

@@ -19,12 +19,12 @@ from flexmb.tables.status import OK
 @kernel
 def rhs(t, y, dy, s, same):
     """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
-    _take(y, s)
+    take(y, s)
     status = _set(t, s)
     if status == OK:
-        status = _move(t, s)
+        status = accelerate(t, s)
     if status == OK and s.follows[0]:
-        status = _follow(t, s)
+        status = follow(t, s)
     _give(s.dy, s.change, s, dy)
     return status
 
@@ -32,14 +32,14 @@ def rhs(t, y, dy, s, same):
 @kernel
 def project(t, y, s):
     """Put the mechanics' part of y on its manifold."""
-    _take(y, s)
+    take(y, s)
     nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
     _give(s.y, s.state, s, y)
 
 
 @kernel
 def move(y, increment, result, s):
-    """Coordinates of result = q o exp(increment), as of the mechanics alone; for loops without continuous states."""
+    """Coordinates of result = q o exp(increment), as of the mechanics alone; increments of x move none."""
     nothing_at(s.address[a.RETRACTION], (y, increment, result, s.address[a.CONSTANTS]))
 
 
@@ -55,7 +55,7 @@ def start(t, y, s):
 
     Puts the continuous controllers' states into y.
     """
-    _take(y, s)
+    take(y, s)
     measure_motion(t, s)
     for i in range(s.controller.shape[0]):
         _gather(i, s)
@@ -69,11 +69,11 @@ def retrace(times, states, s, course):
     """Signals (T,S) at the output times (T,) of a run that is over, from its states (T,n); how many could be found."""
     for sample in range(times.shape[0]):
         t = times[sample]
-        _take(states[sample], s)
-        if _keep_time(t, s) != OK or _steer(t, s) != OK:
+        take(states[sample], s)
+        if _keep_time(t, s) != OK or steer(t, s) != OK:
             return sample
         if s.has_at_once[0]:
-            if _move(t, s) != OK:
+            if accelerate(t, s) != OK:
                 return sample
             measure_at_once(t, s)
         for i in range(s.signal.shape[0]):
@@ -84,7 +84,7 @@ def retrace(times, states, s, course):
 @kernel
 def hold(t, y, s):
     """Have the functions of the mechanics say what the controllers say at t, at y; returns a status code."""
-    _take(y, s)
+    take(y, s)
     return _set(t, s)
 
 
@@ -93,13 +93,13 @@ def _set(t, s):
     """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
     status = _keep_time(t, s)
     if status == OK and s.continuous[0]:
-        return _steer(t, s)
+        return steer(t, s)
     _drive(s)
     return status
 
 
 @helper
-def _take(y, s):
+def take(y, s):
     """s.y = [q, u, work] and the continuous controllers' states from y = [q, u, x, work]."""
     n = s.y.shape[0] - 1
     for i in range(n):
@@ -168,9 +168,9 @@ def _rewind(s):
 @helper
 def _look(t, s):
     """Everything that a sampled controller may read at t: sensors of all kinds, and continuous controllers."""
-    status = _steer(t, s)
+    status = steer(t, s)
     if status == OK and s.has_at_once[0]:
-        status = _move(t, s)
+        status = accelerate(t, s)
         if status == OK:
             measure_at_once(t, s)
     return status
@@ -205,7 +205,7 @@ def _gather(i, s):
 
 
 @helper
-def _steer(t, s):
+def steer(t, s):
     """Sensors, continuous controllers, and what they drive; returns a status code.
 
     What depends on forces at once is not known yet: it reaches outputs through states only, and is zero here.
@@ -248,13 +248,13 @@ def _act_continuously(t, s):
 
 
 @helper
-def _move(t, s):
+def accelerate(t, s):
     """The mechanics' right-hand side: s.dy."""
     return status_at(s.address[a.MOTION], (t, s.y, s.dy, s.address[a.CONSTANTS], s.address[a.WORKSPACE]))
 
 
 @helper
-def _follow(t, s):
+def follow(t, s):
     """Rates of controllers that read what depends on forces at once, now that it is known."""
     measure_at_once(t, s)
     return _act_continuously(t, s)

@@ -23,6 +23,8 @@ SAMPLE, APPLY = range(2)
 # Kernels and tables that the loop reaches by address: places in `Loop.address`.
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
 ADDRESSES = 10
+# The same of `LoopTangent.address`.
+JACOBIAN, EXACT, TANGENT = range(3)
 
 _F, _I = np.float64, np.int64
 
@@ -103,3 +105,17 @@ class Loop:
     markers: Real  # (K,24) as in flexmb.entry.observation
     loads: Real  # (N,6)
     doubt: Index  # (1,) of the mechanics' workspace
+
+
+@bundle
+class LoopTangent:
+    """What the Jacobian of a closed loop needs besides, y = [q, u, x, work] (n,)."""
+
+    address: Index  # (3,) of the mechanics' Jacobian and its tables
+    column: Index  # places in y that sensors read, and those of x
+    y: Real  # (n,)
+    of_motion: Real  # (nq+nu+1, nq+nu+1)
+    slope: Real  # (nq+nu+1,)
+    effect: Real  # (drives, nq+nu+1)
+    ahead: Real  # (drives + X,) what is driven, and rates of x, on one side of y ...
+    behind: Real  # ... and on the other

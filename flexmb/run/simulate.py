@@ -145,12 +145,6 @@ def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
     if system.scene.closures:
         raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
-    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
-    if continuous:
-        raise NotImplementedError(
-            f'method "{method}" needs Jacobians, which continuous controllers have none of: use {others}, or give '
-            f'"{continuous[0]}" a period_s'
-        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(
