@@ -6,7 +6,7 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from flexmb.control import loop
+from flexmb.control import leaping, loop
 from flexmb.control import tables as a
 from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
@@ -15,7 +15,7 @@ from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
 from flexmb.control.wiring import widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Leaping, Problem, StiffProblem, problem, stiff_problem
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.motion.retraction import move
@@ -72,6 +72,10 @@ class Feedback:
             )
         if algorithm.observing is not None and not plant.scene.closures:
             where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
+        self._leaps = route.leaping is not None
+        if route.leaping is not None:
+            where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
+            where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
         self._where, self._held = where, self._buffers()
         self._called = self._callbacks()
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
@@ -111,7 +115,7 @@ class Feedback:
             of_motion, exact, moving = linear
             posed = stiff_problem(*kernels, of_motion, loop.move, exact, moving)
         else:
-            posed = problem(*kernels)
+            posed = problem(*kernels, Leaping(leaping.back, leaping.leap) if self._leaps else None)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
@@ -267,6 +271,7 @@ class Feedback:
 
     def _loop(self, table: Any, held: Real, apart: float) -> a.Loop:
         w, plant, out = self._wiring, self._plant, self._outputs
+        n = plant.nq + plant.nu + 1
         at_once = bool(np.any(w.sensor["kind"] >= a.AT_ONCE))
         return a.Loop(
             address=self._where, sensor=w.sensor, controller=w.controller, wire=w.wire, number=w.number, drive=w.drive,
@@ -275,8 +280,9 @@ class Feedback:
             has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
-            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
-            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
+            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(n), dy=np.zeros(n),
+            good=np.zeros(len(w.initial)), before=np.zeros(n), slope_before=np.zeros(n), after=np.zeros(n),
+            slope_after=np.zeros(n), rates=out.rates, markers=out.markers, loads=out.loads,
             doubt=self._doubt, **self._held,
         )  # fmt: skip
 

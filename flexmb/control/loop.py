@@ -11,7 +11,7 @@ A loop is passed as constants and as workspace: `s`, and the `same` once more.
 from flexmb.control import tables as a
 from flexmb.control.laws import FILTERED, act, pid_error
 from flexmb.control.measuring import measure_at_once, measure_motion
-from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import OK
 
@@ -25,16 +25,14 @@ def rhs(t, y, dy, s, same):
         status = accelerate(t, s)
     if status == OK and s.follows[0]:
         status = follow(t, s)
-    _give(s.dy, s.change, s, dy)
+    give(s.dy, s.change, s, dy)
     return status
 
 
 @kernel
 def project(t, y, s):
     """Put the mechanics' part of y on its manifold."""
-    take(y, s)
-    nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
-    _give(s.y, s.state, s, y)
+    settle(t, y, s)
 
 
 @kernel
@@ -61,7 +59,7 @@ def start(t, y, s):
         _gather(i, s)
         if s.controller[i].law == a.PID:
             s.state[s.controller[i].state + FILTERED] = pid_error(i, s)
-    _give(s.y, s.state, s, y)
+    give(s.y, s.state, s, y)
 
 
 @kernel
@@ -89,6 +87,17 @@ def hold(t, y, s):
 
 
 @helper
+def settle(t, y, s):
+    """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""
+    take(y, s)
+    nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
+    if s.address[a.BACK] and real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS])) == t:
+        for i in range(s.state.shape[0]):
+            s.good[i] = s.state[i]
+    give(s.y, s.state, s, y)
+
+
+@helper
 def _set(t, s):
     """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
     status = _keep_time(t, s)
@@ -113,7 +122,7 @@ def take(y, s):
 
 
 @helper
-def _give(of_mechanics, of_controllers, s, y):
+def give(of_mechanics, of_controllers, s, y):
     """The other way round, for states or their rates."""
     n = s.y.shape[0] - 1
     for i in range(n):

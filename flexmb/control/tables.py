@@ -22,7 +22,7 @@ SAMPLE, APPLY = range(2)
 
 # Kernels and tables that the loop reaches by address: places in `Loop.address`.
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
-ADDRESSES = 10
+BACK, LEAP, ADDRESSES = range(10, 13)  # of closed chains; 0 elsewhere
 # The same of `LoopTangent.address`.
 JACOBIAN, EXACT, TANGENT = range(3)
 
@@ -101,6 +101,11 @@ class Loop:
     now: Real  # (1,) s, of the last evaluation while replaying
     y: Real  # (nq+nu+1,) [q, u, work]
     dy: Real
+    good: Real  # `state` at the last good state of a closed chain's run
+    before: Real  # (nq+nu+1,) on one side of a leap, with its slope ...
+    slope_before: Real
+    after: Real  # ... and on the other
+    slope_after: Real
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
     loads: Real  # (N,6)
