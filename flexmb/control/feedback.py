@@ -19,10 +19,9 @@ from flexmb.integrate.problem import Accuracy, Clock, Leaping, Problem, StiffPro
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.motion.retraction import move
-from flexmb.scene.control import LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
 
@@ -49,14 +48,12 @@ class Starting(Protocol):
 class Feedback:
     """Controllers around a system that is theirs alone: its functions of time are written to.
 
-    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that
-    cannot be had, NotImplementedError for what cannot be combined.
+    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that cannot be had.
     """
 
     def __init__(self, plant: System, algorithm: DynamicsAlgorithm, route: Route, tables: tuple[Any, Any]) -> None:
         self._plant, self._algorithm, self._tables = plant, algorithm, tables
         self._wiring = wired(plant)
-        self._refuse(algorithm)
         constants, workspace = tables
         self._outputs = plant._observation.outputs()
         self._tree, self._tree_workspace = plant.constants, plant.workspace()
@@ -77,7 +74,11 @@ class Feedback:
             where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
             where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
         self._where, self._held = where, self._buffers()
-        self._called = self._callbacks()
+        self._called, self._loads = self._callbacks(), self._outputs.loads
+        if np.any(self._wiring.sensor["kind"] == a.LOAD) and not where[a.OBSERVING]:
+            self._loads = np.zeros((len(plant._observation.names.hinges) + len(plant.scene.closures), 6))
+            self._called.append(Called(self._find_loads, ()))
+            where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
@@ -218,14 +219,16 @@ class Feedback:
         seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
-    def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
-        """NotImplementedError for loads that this algorithm does not have in compiled code."""
-        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor)]
-        if loads and (algorithm.observing is None or self._plant.scene.closures):
-            raise NotImplementedError(
-                f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
-                "measure an acceleration, or leave it out"
-            )
+    def _find_loads(self, t: float) -> None:
+        """Loads at s.y as outputs have them; NaN where there are none, which ends a run that uses them."""
+        observation = self._plant._observation
+        row = np.zeros((1, observation.width))
+        try:
+            self._plant._observe_row(t, self.running.y.copy(), self._algorithm.name, row[0])
+        except DynamicsError:
+            row[:] = np.nan
+        found = observation.columns_of(row)
+        self._loads[:] = np.concatenate([found["loads"][0], found["closures"][0]])
 
     def _buffers(self) -> dict[str, Real]:
         """The arrays that laws read and write, which stay where they are."""
@@ -281,9 +284,9 @@ class Feedback:
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(n), dy=np.zeros(n),
-            good=np.zeros(len(w.initial)), before=np.zeros(n), slope_before=np.zeros(n), after=np.zeros(n),
-            slope_after=np.zeros(n), rates=out.rates, markers=out.markers, loads=out.loads,
-            doubt=self._doubt, **self._held,
+            stuck=np.zeros(1, np.int64), good=np.zeros(len(w.initial)), before=np.zeros(n),
+            slope_before=np.zeros(n), after=np.zeros(n), slope_after=np.zeros(n), mean=np.zeros(len(w.drive)),
+            rates=out.rates, markers=out.markers, loads=self._loads, doubt=self._doubt, **self._held,
         )  # fmt: skip
 
 

@@ -13,12 +13,14 @@ from flexmb.control.laws import FILTERED, act, pid_error
 from flexmb.control.measuring import measure_at_once, measure_motion
 from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
-from flexmb.tables.status import OK
+from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
 
 @kernel
 def rhs(t, y, dy, s, same):
     """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
+    if s.stuck[0]:
+        return CLOSURE_SINGULAR
     take(y, s)
     status = _set(t, s)
     if status == OK:

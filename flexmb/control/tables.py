@@ -22,7 +22,9 @@ SAMPLE, APPLY = range(2)
 
 # Kernels and tables that the loop reaches by address: places in `Loop.address`.
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
-BACK, LEAP, ADDRESSES = range(10, 13)  # of closed chains; 0 elsewhere
+BACK, LEAP = range(10, 12)  # of closed chains; 0 elsewhere
+ASKING = 12  # Python, for loads that no kernel finds where the motion was just evaluated; 0 where there is one
+ADDRESSES = 13
 # The same of `LoopTangent.address`.
 JACOBIAN, EXACT, TANGENT = range(3)
 
@@ -101,14 +103,16 @@ class Loop:
     now: Real  # (1,) s, of the last evaluation while replaying
     y: Real  # (nq+nu+1,) [q, u, work]
     dy: Real
+    stuck: Index  # (1,) whether controllers are too fast for a leap that has been tried
     good: Real  # `state` at the last good state of a closed chain's run
     before: Real  # (nq+nu+1,) on one side of a leap, with its slope ...
     slope_before: Real
     after: Real  # ... and on the other
     slope_after: Real
+    mean: Real  # (drives,) what is driven in a leap, on average
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
-    loads: Real  # (N,6)
+    loads: Real  # (N+C,6) of hinges, then of closures
     doubt: Index  # (1,) of the mechanics' workspace
 
 

@@ -137,7 +137,7 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
             width = 4 if quantity == "orientation" else 3
             return _QUANTITIES[quantity], list(observed.markers).index(marker), width, axes
         case LoadSensor(hinge=hinge):
-            return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
+            return a.LOAD, [*observed.hinges, *observed.closures].index(hinge), 6, a.WORLD
         case TimeSensor():
             return a.TIME, 0, 1, a.WORLD
     return a.PROFILE, 0, 2, a.WORLD

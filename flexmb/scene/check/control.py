@@ -120,7 +120,7 @@ def _sensors(scene: Scene) -> Iterator[Defect]:
     known: dict[Any, tuple[str, str, list[str]]] = {
         CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
         MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
-        LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),
+        LoadSensor: ("hinge", "hinge or closure", [each.name for each in (*scene.hinges, *scene.closures)]),
     }
     for place, sensor in entries(scene, "sensors"):
         if type(sensor) in known:
