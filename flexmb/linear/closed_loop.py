@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.control.feedback import Feedback
-from flexmb.control.loop import rhs
+from flexmb.control.loop import project, rhs
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.variations import Equations
+from flexmb.linear.variations import Equations, equations_of
 from flexmb.motion.retraction import move
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
@@ -37,10 +37,11 @@ STEP = 1e-3
 def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
     """About a state, and the controllers' initial states; `model` makes the linear model of a motion.
 
-    NotImplementedError for closed chains, and for controllers that are sampled or read what depends on forces of the
-    same instant.
+    NotImplementedError for controllers that are sampled or read what depends on forces of the same instant.
     """
     _refuse(system)
+    if isinstance(system, ClosedSystem):
+        state = system._admissible(*system.layout.entering(state))
     plant = system._anew()
     made = algorithms.chosen("articulated").route
     assert made is not None
@@ -50,7 +51,8 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
         raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
     clock = Clock(np.array([state.t, state.t + 1.0]), np.array([state.t + 1.0]))
     y = feedback.begin(_Start(state), clock, Accuracy(0.0, 0.0, 0, 0), ()).y
-    equations = Equations(plant)
+    project(state.t, y, feedback.running)  # which finds the independent rows of closures
+    equations = equations_of(plant)
     seen = _Seen(feedback, state.t, plant.nq + plant.nu)
     derivative = np.column_stack([
         (at[0] - at[3] + 8.0 * (at[2] - at[1])) / (12.0 * size)
@@ -58,11 +60,14 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
         for at in [[seen(move_by(k * size)) for k in (-2, -1, 1, 2)]]
     ])  # fmt: skip
     drives = len(seen(y)) - len(feedback.state_names)  # and the controllers say again what they say at the state
-    of_motion = model(equations, state)
-    n, states = len(equations.free), len(feedback.state_names)
+    of_motion, at = model(equations, state), equations.variations(state)
+    n, states = equations.freedom, len(feedback.state_names)
+    by_independent = np.eye(len(at.by_chosen) + states, 2 * n + states, 2 * n - len(at.by_chosen))
+    by_independent[: len(at.by_chosen), : 2 * n] = at.by_chosen
+    derivative = derivative @ by_independent
     A = np.zeros((2 * n + states, 2 * n + states))
     A[: 2 * n, : 2 * n] = of_motion.A
-    A[n : 2 * n] += _effect(equations, state, feedback.driven) @ derivative[:drives]
+    A[n : 2 * n] += _effect(equations, state, feedback.driven)[at.chosen] @ derivative[:drives]
     A[2 * n :] = derivative[drives:]
     return replace(
         of_motion,
@@ -102,8 +107,6 @@ class _Seen:
 
 
 def _refuse(system: System) -> None:
-    if isinstance(system, ClosedSystem):
-        raise NotImplementedError(f'scene "{system.scene.name}" has closures and controllers: {REMEDY}')
     sampled = [each.name for each in system.scene.controllers if each.period_s is not None]
     if sampled:
         raise NotImplementedError(

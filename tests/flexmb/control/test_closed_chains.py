@@ -154,3 +154,22 @@ def test_loads_of_hinges_and_closures_are_measured(period: float | None, algorit
         assert np.abs(run.signals["law"][1:, 0] - expected).max() < 0.1 * np.abs(expected).max()
     assert np.abs(run.energy_drift).max() < 1e-6
     assert np.abs(run.signals["law"][-1]).max() > 1e-3
+
+
+def test_a_controlled_chain_has_the_linear_model_of_its_motion() -> None:
+    """Small motions about the state in which the law holds the crank, by the model and by a run."""
+    at = fm.linearize(controlled(m.four_bar(gravity=0.0, rate=0.0), "drive", LAGGING))
+    sprung = m.four_bar(gravity=0.0, rate=0.0)
+    hinges = tuple(
+        msgspec.structs.replace(
+            each, rotation=msgspec.structs.replace(each.rotation, stiffness_Nm_rad=STIFFNESS, rest_angle_rad=0.0)
+        ) if each.name == "drive" else each
+        for each in sprung.hinges
+    )  # fmt: skip
+    spring = fm.linearize(msgspec.structs.replace(sprung, hinges=hinges))
+    proportional = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, 0.0),))
+    law = fm.linearize(controlled(sprung, "drive", proportional))
+    assert np.abs(law.A - spring.A).max() < 1e-8 * np.abs(spring.A).max()
+    assert at.A.shape == (3, 3) and [name for name, _ in at.states][2] == "law.state[0]"
+    assert at.A[2] == pytest.approx([1 / LAG, 0.2, -1 / LAG], abs=1e-9)  # the crank is the independent coordinate
+    assert at.A[1, 2] == pytest.approx(spring.A[1, 0], rel=1e-6)  # the lag's state acts as the spring's angle does
