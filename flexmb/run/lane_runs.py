@@ -69,7 +69,8 @@ class BatchRun:
         controlled = bool(self._batch.systems[0].scene.controllers)
         in_lanes = self._batch.in_lanes and not controlled and self._settings.method in _IN_LANES
         blocks = list(range(0, n, LANES)) if in_lanes else []
-        in_threads(self._in_lanes, blocks, threads)
+        if blocks:
+            in_threads(self._in_lanes, blocks, threads)
         left = [copy for copy in range(n) if self._found.status[copy] == _NOT_YET]
         in_threads(self._alone, left, threads if self._batch.in_lanes and not controlled else 1)
 

@@ -41,8 +41,8 @@ def simulate_batch(
     one compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds
     of all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
     eight copies at once in the lanes of the processor, each with steps of its own; the other methods, and scenes with
-    closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly. threads: how many, by default one for
-    each processor.
+    closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly. threads: how
+    many, by default one for each processor.
 
     A run that fails fails no other one and raises nothing: `status` and `message` of the result say why it stopped.
     Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError where states do not

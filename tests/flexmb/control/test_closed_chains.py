@@ -157,19 +157,21 @@ def test_loads_of_hinges_and_closures_are_measured(period: float | None, algorit
 
 
 def test_a_controlled_chain_has_the_linear_model_of_its_motion() -> None:
-    """Small motions about the state in which the law holds the crank, by the model and by a run."""
-    at = fm.linearize(controlled(m.four_bar(gravity=0.0, rate=0.0), "drive", LAGGING))
-    sprung = m.four_bar(gravity=0.0, rate=0.0)
+    """A proportional law is a spring, at rest and in motion; a lag's state acts as what it follows would."""
+    rest, moving = m.four_bar(gravity=0.0, rate=0.0), m.four_bar()
     hinges = tuple(
         msgspec.structs.replace(
-            each, rotation=msgspec.structs.replace(each.rotation, stiffness_Nm_rad=STIFFNESS, rest_angle_rad=0.0)
+            each, rotation=msgspec.structs.replace(each.rotation, stiffness_Nm_rad=STIFFNESS)
         ) if each.name == "drive" else each
-        for each in sprung.hinges
+        for each in moving.hinges
     )  # fmt: skip
-    spring = fm.linearize(msgspec.structs.replace(sprung, hinges=hinges))
     proportional = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, 0.0),))
-    law = fm.linearize(controlled(sprung, "drive", proportional))
-    assert np.abs(law.A - spring.A).max() < 1e-8 * np.abs(spring.A).max()
-    assert at.A.shape == (3, 3) and [name for name, _ in at.states][2] == "law.state[0]"
-    assert at.A[2] == pytest.approx([1 / LAG, 0.2, -1 / LAG], abs=1e-9)  # the crank is the independent coordinate
-    assert at.A[1, 2] == pytest.approx(spring.A[1, 0], rel=1e-6)  # the lag's state acts as the spring's angle does
+    spring = fm.linearize(msgspec.structs.replace(moving, hinges=hinges)).A
+    law = fm.linearize(controlled(moving, "drive", proportional)).A
+    assert np.abs(law - spring).max() < 1e-8 * np.abs(spring).max()
+    assert np.abs(fm.linearize(moving).A - spring).max() > 1.0  # and without the law it is another model
+    damper = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((0.0, -STIFFNESS),))
+    lag = fm.linearize(controlled(rest, "drive", LAGGING))
+    assert [name for name, _ in lag.states] == ["drive.rotation", "drive.rotation.rate", "law.state[0]"]
+    assert lag.A[2] == pytest.approx([1 / LAG, 0.2, -1 / LAG], abs=1e-9)
+    assert lag.A[1, 2] == pytest.approx(fm.linearize(controlled(rest, "drive", damper)).A[1, 1], rel=1e-9)
