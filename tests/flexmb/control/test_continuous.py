@@ -221,3 +221,21 @@ def test_a_profile_and_a_controller_on_one_hinge_add_up(period: float | None) ->
     assert np.abs(both.q - apart.q).max() < 1e-9
     assert np.abs(both.work - apart.work).max() < 1e-8
     assert np.abs(both.signals["law"] - both.signals["pd"]).max() > 0.5
+
+
+@pytest.mark.parametrize("algorithm", ["composite", "frisch", "frisch_as_printed"])
+@pytest.mark.parametrize("period", [0.05, None])
+def test_loads_are_measured_by_every_algorithm(period: float | None, algorithm: Any) -> None:
+    """As the recursion measures them, by laws that only the measured load moves."""
+    sensor = fm.LoadSensor(name="load", hinge="elbow")
+    read = {"name": "law", "inputs": ("load[0]", "load[5]")}
+    law = (
+        fm.StateSpace(**read, D=((0.0, 0.1),), period_s=period, delay_s=0.01) if period
+        else fm.StateSpace(**read, A=((-5.0,),), B=((0.0, 0.5),), C=((1.0,),))
+    )  # fmt: skip
+    scene = pendulum(sensor, law, torque=TORQUE).scene()
+    known, run = fm.simulate(scene, 0.5, samples=11), fm.simulate(scene, 0.5, samples=11, algorithm=algorithm)
+    assert np.abs(known.signals["law"]).max() > 0.1
+    assert np.abs(run.q - known.q).max() < 1e-9
+    assert np.abs(run.signals["load"] - run.loads["elbow"]).max() < 1e-10
+    assert np.abs(run.signals["law"] - known.signals["law"]).max() < 1e-8
