@@ -13,12 +13,12 @@ from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
 from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
-from flexmb.control.wiring import widest, wired
+from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Leaping, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Leaping, Linear, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
-from flexmb.motion.retraction import move
+from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, pointer
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
@@ -74,23 +74,24 @@ class Feedback:
             where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
             where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
         self._where, self._held = where, self._buffers()
-        self._called, self._loads = self._callbacks(), self._outputs.loads
-        if np.any(self._wiring.sensor["kind"] == a.LOAD) and not where[a.OBSERVING]:
+        self._called = self._callbacks()
+        self._loads, self._drives = self._outputs.loads, self._outputs.drives
+        if np.any(self._wiring.sensor["kind"] >= a.LOAD) and not where[a.OBSERVING]:
             self._loads = np.zeros((len(plant._observation.names.hinges) + len(plant.scene.closures), 6))
             self._called.append(Called(self._find_loads, ()))
             where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
-    def with_retraction(self) -> None:
+    def with_retraction(self, move: Any) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
-    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: empty, or what a `StiffProblem` of the motion needs besides: (jacobian, exact, tangent). Instants that
-        were due before the start are gone: what they put out is remembered, or zero.
+        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone:
+        what they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
@@ -110,22 +111,44 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
-        if linear and made.continuous[0]:
-            posed: Any = stiff_problem(*kernels, jacobian, loop.move, made, self._tangent(linear, len(y)))
-        elif linear:
-            of_motion, exact, moving = linear
-            posed = stiff_problem(*kernels, of_motion, loop.move, exact, moving)
+        leaps = Leaping(leaping.back, leaping.leap) if self._leaps else None
+        if linear is not None:
+            if made.continuous[0]:
+                linear = linear._replace(jacobian=jacobian, exact=made, tangent=self._tangent(linear, len(y)))
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move), leaps)
         else:
-            posed = problem(*kernels, Leaping(leaping.back, leaping.leap) if self._leaps else None)
+            posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
 
     def look(self, begin: Starting) -> None:
         """At one state, as at the only sample of a run that is over."""
+        self._only_at(begin)
+
+    def accelerations(self, begin: Starting) -> Real:
+        """(nu,) at one state, under what controllers say there."""
+        y, nq, nu = self._only_at(begin), self._plant.nq, self._plant.nu
+        slope = np.empty(len(y))
+        loop.rhs(begin.state.t, y, slope, self.running, self.running)
+        self.raise_trouble()
+        return slope[nq : nq + nu]
+
+    def _only_at(self, begin: Starting) -> Real:
         t = begin.state.t
-        self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
+        clock = Clock(np.array([t]), np.array([np.nextafter(t, np.inf)]))
+        y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.replay()
+        return y
+
+    def place_of(self, signal: str) -> int:
+        """The number of a signal, "gyro[2]", among all of them."""
+        return numbers_of(self._wiring.names, signal)[0]
+
+    def watching(self, watch: Watch) -> Watch:
+        """The same that finds these signals: of a run that was begun."""
+        look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
+        return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
 
     def remember(self) -> LoopMemory:
         """At the end of a run, before it is replayed."""
@@ -216,7 +239,7 @@ class Feedback:
     @property
     def _has_markers(self) -> bool:
         kinds = self._wiring.sensor["kind"]
-        seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
+        seen = (kinds >= a.POSITION) & (kinds <= a.DISTANCE)
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
     def _find_loads(self, t: float) -> None:
@@ -229,6 +252,7 @@ class Feedback:
             row[:] = np.nan
         found = observation.columns_of(row)
         self._loads[:] = np.concatenate([found["loads"][0], found["closures"][0]])
+        self._drives[:] = found["drives"][0]
 
     def _buffers(self) -> dict[str, Real]:
         """The arrays that laws read and write, which stay where they are."""
@@ -256,7 +280,7 @@ class Feedback:
             row["function"] = found[-1].address
         return found
 
-    def _tangent(self, linear: tuple[Any, ...], n: int) -> a.LoopTangent:
+    def _tangent(self, linear: Linear, n: int) -> a.LoopTangent:
         """For the Jacobian of y (n,) = [q, u, x, work], from that of the motion."""
         motion, drives = self._plant.nq + self._plant.nu, len(self._wiring.drive)
         read = np.zeros(n - 1, bool)
@@ -264,9 +288,9 @@ class Feedback:
         read[:motion] = self._has_markers or self._wiring.reads_at_once
         for sensor in self._wiring.sensor[self._wiring.sensor["kind"] <= a.RATE]:
             read[sensor["place"] : sensor["place"] + sensor["width"]] = True
-        of_motion, exact, moving = linear
+        of_motion = linear.jacobian, STATUS, REAL, VECTOR, MATRIX, linear.exact, linear.tangent
         return a.LoopTangent(
-            address=np.array(addresses(of_motion, STATUS, REAL, VECTOR, MATRIX, exact, moving)),
+            address=np.array(addresses(*of_motion)),
             column=np.flatnonzero(read), y=np.zeros(n), of_motion=np.zeros((motion + 1, motion + 1)),
             slope=np.zeros(motion + 1), effect=np.zeros((drives, motion + 1)),
             ahead=np.zeros(drives + n - 1 - motion), behind=np.zeros(drives + n - 1 - motion),
@@ -286,7 +310,8 @@ class Feedback:
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(n), dy=np.zeros(n),
             stuck=np.zeros(1, np.int64), good=np.zeros(len(w.initial)), before=np.zeros(n),
             slope_before=np.zeros(n), after=np.zeros(n), slope_after=np.zeros(n), mean=np.zeros(len(w.drive)),
-            rates=out.rates, markers=out.markers, loads=self._loads, doubt=self._doubt, **self._held,
+            rates=out.rates, markers=out.markers, loads=self._loads, drives=self._drives, doubt=self._doubt,
+            **self._held,
         )  # fmt: skip
 
 

@@ -88,6 +88,16 @@ def hold(t, y, s):
     return _set(t, s)
 
 
+@kernel
+def look(t, y, signal, s):
+    """All signals (S,) at t and y, between instants; a status code."""
+    take(y, s)
+    status = _look(t, s)
+    for i in range(signal.shape[0]):
+        signal[i] = s.signal[i]
+    return status
+
+
 @helper
 def settle(t, y, s):
     """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""

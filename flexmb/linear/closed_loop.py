@@ -72,7 +72,7 @@ class ClosedLoop:
         if feedback.reads_at_once:
             raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
         clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
-        y = feedback.begin(_Start(start), clock, Accuracy(0.0, 0.0, 0, 0), ()).y
+        y = feedback.begin(_Start(start), clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.initial: Real = y[plant.nq + plant.nu : -1]
         """(X,) states of controllers at the start."""
         self.state_names = feedback.state_names

@@ -13,7 +13,6 @@ from flexmb.control.feedback import Feedback
 from flexmb.control.loop import rhs
 from flexmb.control.tables import Loop, LoopTangent
 from flexmb.control.tangent import jacobian
-from flexmb.entry import tangent
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.run.origin import origin
 from flexmb.scene.schema import Modes
@@ -58,10 +57,11 @@ def posed(scene: fm.Scene) -> Posed:
     plant = fm.compile(scene)._anew()
     chosen = algorithms.chosen("articulated")
     route = plant.route()
-    feedback = Feedback(plant, chosen, route, route.tables())
-    feedback.with_retraction()
-    exact = plant.constants
-    linear = tangent.jacobian, exact, tangent.tangent_workspace(exact, plant.nq, plant.nu)
+    tables = route.tables()
+    feedback = Feedback(plant, chosen, route, tables)
+    assert route.linear is not None
+    linear = route.linear(*tables)
+    feedback.with_retraction(linear.move)
     begun = feedback.begin(
         origin(plant, 0.0, None, "radau5"), Clock(np.array([0.0, 1.0]), np.array([1.0])),
         Accuracy(1e-8, 1e-8, plant.nq + plant.nu, 1), linear,
