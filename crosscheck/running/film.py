@@ -6,6 +6,8 @@ library's own engine, so that what is judged stays as the case says; it is drawn
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 
@@ -61,7 +63,7 @@ def _hung(scene: Scene) -> Scene:
         return scene
     bodies, hinges = list(scene.bodies), list(scene.hinges)
     for mass in moving:
-        place = {"parent": mass.body, "parent_node": mass.node, "parent_position_m": mass.offset_m}
+        place: dict[str, Any] = {"parent": mass.body, "parent_node": mass.node, "parent_position_m": mass.offset_m}
         for number, (axis, named) in enumerate(zip(mass.directions, coordinates(mass), strict=True), start=1):
             last = number == len(mass.directions)
             own = mass.name if last else f"{mass.name} {ADDED} {number}"

@@ -190,11 +190,11 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 __all__ = [
     "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body",
     "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller", "CoordinateSensor",
-    "Cylindrical", "DistanceSensor", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
-    "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
-    "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
-    "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",
-    "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver",
-    "Weld", "Wheel",
+    "Cylindrical", "DistanceSensor", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge",
+    "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
+    "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
+    "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
+    "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
+    "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
+    "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

@@ -9,7 +9,8 @@ import pytest
 
 from flexmb.scene import build
 from flexmb.scene import schema as s
-from flexmb.scene.build import COLLECTIONS, SceneBuilder, angular
+from flexmb.scene.build import SceneBuilder, angular
+from flexmb.scene.collecting import COLLECTIONS
 from flexmb.scene.problems import SceneError
 from flexmb.scene.shapes import beam_section, cuboid_inertia, cylinder_inertia, inertia_moments
 from flexmb.scene.units import split_unit
