@@ -223,14 +223,16 @@ def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signa
     """A channel told back, with the rounding of what was added to it or taken from it, and of what it is the sum of.
 
     A load that vanishes is a sum that vanishes: of forces at distances, and of gyroscopic torques, which are of the
-    size of the kinetic energy. In other axes and units this sum rounds otherwise, as do places along a chain of bodies.
+    size of the kinetic energy; so does little work of large forces. In other axes and units this sum rounds otherwise,
+    as do places along a chain of bodies.
     """
     signal = told.signal(name, across=False)
     sizes = signal.sizes
-    if name.endswith(".torque") and "energy.kinetic" in told.channels:
+    is_sum = name == "work" or name.endswith(".torque")
+    if is_sum and "energy.kinetic" in told.channels:
         sizes = (*sizes, magnitude("energy.kinetic", told.values("energy.kinetic")))
     moved = magnitude(name, other.values(name) - told.values(name))
-    terms = max(sizes) if name.endswith(".torque") else 0.0
+    terms = max(sizes) if is_sum else 0.0
     floor = roundoff_floor(max(moved, terms), max(told.finest.evaluations, len(told.times)) + bodies)
     doubt = signal.uncertainty
     raised = Uncertainty(doubt.envelope + floor, doubt.value + floor, doubt.how, doubt.order)

@@ -14,7 +14,7 @@ from flexmb.tables.workspaces import workspace
 from flexmb.typing import Real
 
 
-class Rows:
+class RowMotion:
     """The rows of closures at y = [q, u, work] and time t (s), whose rates are J u, of all speeds, prescribed too."""
 
     def __init__(self, closures: Closures, t: float, y: Real) -> None:

@@ -41,6 +41,7 @@ from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
+from flexmb.integrate.settling import prepare_settling, settle
 from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
@@ -54,6 +55,7 @@ WITHOUT_MIDDLE = np.array([0.0, -3.0 / 16.0, 19.0 / 8.0, -12.0, 24.0])
 
 _SWEEPS = 8  # of the iteration, at most
 _CONVERGED = 0.02  # what the iteration may leave, in units of the tolerance
+RATE = 4.0  # per step, at which settles what projection has moved: within the step
 _ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
 
 
@@ -77,6 +79,9 @@ class Collocation(NamedTuple):
     error: np.ndarray
     term: np.ndarray
     product: np.ndarray
+    real: np.ndarray
+    real_pivots: np.ndarray
+    change: np.ndarray
 
 
 @helper
@@ -182,38 +187,43 @@ def attempt(problem, step, y, s, accuracy, counts):
         s.y_new[i] = y[i] + s.flow.scale[i] * s.x[3, i]
     error = estimate(y, s, accuracy)
     if error < 1.0:
-        problem.project(step.end, s.y_new, problem.constants)
+        prepare_settling(problem, RATE / (step.end - step.start), s)
+        settle(problem, step.end, RATE / (step.end - step.start), s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error
 
 
 @helper
-def state_at(problem, step, y, s, t, result):
+def state_at(problem, step, y, s, t, accuracy, result):
     """The state inside a step, by the exact flow under the same polynomial, projected."""
     theta = (t - step.start) / (step.end - step.start)
     at_fraction(s.flow, s.v, s.X, s.x, theta, result, s.term, s.product)
     for i in range(y.shape[0]):
         result[i] = y[i] + s.flow.scale[i] * result[i]
-    problem.project(t, result, problem.constants)
+    settle(problem, t, RATE / (step.end - step.start), result, s, accuracy)
 
 
 @helper
 def inside(problem, step, ends, s, t, result, run):
     """The same as `flexmb.integrate.watch` asks for it."""
-    state_at(problem, step, ends.y, s, t, result)
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
     return OK
 
 
 @helper
-def store_samples(problem, step, y, s, times, out, counts):
+def store_samples(problem, step, y, s, samples, accuracy, counts):
     """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
+
+    samples: (times, states).
     """
+    times, out = samples
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            state_at(problem, step, y, s, times[sample], out[sample])
+            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
 
@@ -228,7 +238,7 @@ def scratch(n):
     return Collocation(
         flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, np.int64), np.empty(n),
     )  # fmt: skip
 
 
@@ -286,7 +296,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
                         return status, t_at
                 if leapt:
                     store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
-                store_samples(problem, step, y, s, times, out, counts)
+                store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)
                 t, error_before = t_new, error

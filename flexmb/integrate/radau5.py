@@ -35,6 +35,7 @@ from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
+from flexmb.integrate.settling import settle
 from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
@@ -69,6 +70,7 @@ class RadauStages(NamedTuple):
     f_new: np.ndarray
     error: np.ndarray
     trial: np.ndarray
+    change: np.ndarray
 
 
 @helper
@@ -218,36 +220,38 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
         if status == OK:
             error = estimate(y, s.f_new, h, s, accuracy)
     if status == OK and error < 1.0:
-        problem.project(step.end, s.y_new, problem.constants)
+        settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error, iterations, rate
 
 
 @helper
-def state_at(problem, step, y, s, t, result):
+def state_at(problem, step, y, s, t, accuracy, result):
     """The state inside a step, by the collocation polynomial, projected."""
     evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
     for i in range(y.shape[0]):
         result[i] += y[i]
-    problem.project(t, result, problem.constants)
+    settle(problem, t, REAL / (step.end - step.start), result, s, accuracy)
 
 
 @helper
 def inside(problem, step, ends, s, t, result, run):
     """The same as `flexmb.integrate.watch` asks for it."""
-    state_at(problem, step, ends.y, s, t, result)
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
     return OK
 
 
 @helper
-def store_samples(problem, step, y, s, times, out, counts):
-    """Store the samples in the step, its end included."""
+def store_samples(problem, step, y, s, samples, accuracy, counts):
+    """Store the samples in the step, its end included; samples: (times, states)."""
+    times, out = samples
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            state_at(problem, step, y, s, times[sample], out[sample])
+            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
 
@@ -294,7 +298,7 @@ def scratch(n):
         np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
         np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n),
+        np.empty(n), np.empty(n),
     )  # fmt: skip
 
 
@@ -375,7 +379,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                     status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
                     if status != OK:
                         return status, t_at
-                store_samples(problem, step, y, s, times, out, counts)
+                store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)

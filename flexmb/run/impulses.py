@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.impulses import Rows
+from flexmb.closure.impulses import RowMotion
 from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State, pack
@@ -48,7 +48,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     """
     prescribed = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
     places = sorted({*prescribed, *speeds})
-    rows = Rows(system.closures, state.t, pack(state)) if isinstance(system, ClosedSystem) else None
+    rows = RowMotion(system.closures, state.t, pack(state)) if isinstance(system, ClosedSystem) else None
     along = np.eye(system.nu)[places] if rows is None else np.vstack([np.eye(system.nu)[places], rows.jacobian])
     change = -along @ state.u
     change[: len(places)] = [speeds.get(j, state.u[j]) - state.u[j] for j in places]

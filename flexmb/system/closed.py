@@ -204,7 +204,7 @@ class ClosedSystem(System):
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:
         tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)
-        return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent)
+        return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent, settles=True)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""

@@ -115,13 +115,18 @@ def turned(angle, arm, y):
     return np.column_stack([arm * np.cos(angle), y + arm * np.sin(angle), np.zeros_like(angle)])
 
 
+def passing(angle, rate, arm):
+    return rate[:, None] * np.column_stack([-arm * np.sin(angle), arm * np.cos(angle), np.zeros_like(angle)])
+
+
 def exact(times):
     x, v = trolley(times)
     piston, piston_rate = ram(times)
-    angle, _ = flap(times)
+    angle, swing = flap(times)
     drum_angle, drum_rate = braked(times, 4.0, 0.08, BRAKE)
     spin_angle, spin = braked(times, SPIN, 1.0 / (1.0 / HUB + 1.0 / WHEEL), BEARING)
-    hub = ((HUB * TURNTABLE + WHEEL * (TURNTABLE + SPIN)) * times - WHEEL * spin_angle) / (HUB + WHEEL)
+    momentum = HUB * TURNTABLE + WHEEL * (TURNTABLE + SPIN)
+    hub, hub_rate = ((momentum * each - WHEEL * by) / (HUB + WHEEL) for each, by in ((times, spin_angle), (1.0, spin)))
     place, speed, leaf = slug(times)
     push = 30.0 * np.sin(7.0 * times + 0.4)
     tension = 20.0 + 150.0 * (piston - 0.2) + 6.0 * piston_rate - push
@@ -133,8 +138,11 @@ def exact(times):
         "marker:ram.position": along(piston, 1.0),
         "marker:ram.velocity": along(piston_rate, 0.0),
         "marker:flap.position": turned(angle, 0.2, 2.0),
+        "marker:flap.velocity": passing(angle, swing, 0.2),
         "marker:drum.position": turned(drum_angle, 0.2, 3.0),
+        "marker:drum.velocity": passing(drum_angle, drum_rate, 0.2),
         "marker:hub.position": turned(hub, 0.3, 4.0),
+        "marker:hub.velocity": passing(hub, hub_rate, 0.3),
         "marker:slug.position": along(place, 5.0),
         "marker:slug.velocity": along(speed, 0.0),
         "connector:cable.force": np.column_stack([-800.0 * np.maximum(x - 0.3, 0.0), none, none]),

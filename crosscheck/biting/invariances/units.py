@@ -16,6 +16,7 @@ from crosscheck.biting.invariances.counterpart import (
     without_feedback,
 )
 from crosscheck.library.time_functions import scaled, slowed
+from flexmb.run.warm_up import general_kernels
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.connectors import AngularSpring, Bushing, LinearFriction, LinearSpring, SpringDamper
 from flexmb.scene.functions import Function
@@ -24,6 +25,7 @@ from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 # Speeds, accelerations, forces, energies and all else have another factor than 1.
@@ -88,12 +90,24 @@ def _rescaled(scene: Scene) -> Counterpart:
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)
-    drives = _drives(scene)
+    drives, left_out = _drives(scene), _undetermined(scene)
 
     def back(times: Real, channels: Channels) -> Channels:
-        return {name: rows / _factor(name, drives) for name, rows in channels.items()}
+        return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
 
     return Counterpart(msgspec.structs.replace(_in_units(scene), allow=UNUSUAL), back, clock=TIME)
+
+
+def _undetermined(scene: Scene) -> set[str]:
+    """Channels of loads that the motion leaves open, in overconstrained mechanisms: the least ones, which an engine may
+    take, are others in other units."""
+    if not scene.closures:
+        return set()
+    with general_kernels():
+        system = compile(scene)
+        determined = system.determined_loads(system.initial_state)
+    parts = ("torque", slice(0, 3)), ("force", slice(3, 6))
+    return {f"load:{name}.{part}" for name, known in determined.items() for part, at in parts if not known[at].all()}
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:

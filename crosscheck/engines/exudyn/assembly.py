@@ -288,9 +288,9 @@ def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes)
         own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
         body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
         if body == GROUND:
-            ends.append(springs.End(shop.ground, still, own))
+            ends.append(springs.ConnectorEnd(shop.ground, still, own))
         else:
-            ends.append(springs.End(placed[body].carrier, placed[body].shape(node), own))
+            ends.append(springs.ConnectorEnd(placed[body].carrier, placed[body].shape(node), own))
     springs.between(shop, connector, ends)
 
 

@@ -25,7 +25,7 @@ from flexmb.typing import Real
 
 
 @dataclass(frozen=True)
-class End:
+class ConnectorEnd:
     """Frame A or B of a connector: `own` in the axes of a node of `carrier`, the node's `shape` in Exudyn axes."""
 
     carrier: Carrier
@@ -33,7 +33,7 @@ class End:
     own: Frame
 
 
-def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[End]) -> None:
+def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]) -> None:
     """A connector between its frames A and B."""
     if isinstance(connector, SpringDamper) and not any(end.shape.deforms for end in ends):
         _line(shop, connector, ends)
@@ -56,7 +56,7 @@ def along(shop: Workshop, stage: Stage, load: Callable[[float, float], Along]) -
     return shop.mbs.AddObject(spring)
 
 
-def _line(shop: Workshop, connector: SpringDamper, ends: Sequence[End]) -> None:
+def _line(shop: Workshop, connector: SpringDamper, ends: Sequence[ConnectorEnd]) -> None:
     tension = tension_of(connector)
     points = [end.shape.position + end.shape.rotation @ end.own.position for end in ends]
     shop.mbs.AddObject(
@@ -68,7 +68,7 @@ def _line(shop: Workshop, connector: SpringDamper, ends: Sequence[End]) -> None:
     )  # fmt: skip
 
 
-def _force(shop: Workshop, connector: BetweenNodes, ends: Sequence[End]) -> None:
+def _force(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd]) -> None:
     law = exerts(connector)
     held = [_Held(shop, end) for end in ends]
     sizes = {node: size for each in held for node, size in each.nodes.items()}
@@ -94,7 +94,7 @@ class _Held:
     `nodes`: number and count of coordinates of the frame's node, and of the node of modal coordinates where it bends.
     """
 
-    def __init__(self, shop: Workshop, end: End) -> None:
+    def __init__(self, shop: Workshop, end: ConnectorEnd) -> None:
         carrier, modes = end.carrier, end.shape.translation.shape[1]
         self._end, self._rest, self.nodes = end, np.zeros(7), {}
         self._body = FrameMotion(np.zeros(3), np.eye(3), np.zeros(3), np.zeros(3))

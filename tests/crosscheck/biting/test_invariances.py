@@ -15,6 +15,7 @@ from crosscheck.biting.invariances.counterpart import Channels
 from crosscheck.biting.invariances.later import LATER
 from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.trajectories import stack
+from crosscheck.library.find import resolve
 from flexmb.run.channels import channels_of, distance, family, magnitude
 from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Pulse
@@ -158,6 +159,19 @@ def test_what_stands_on_the_ground_is_not_boosted() -> None:
     scene = random_rigid(np.random.default_rng(0), ("revolute",))
     with pytest.raises(NotApplicable, match="stands on the ground by h0"):
         BY_NAME["boosted"].of(scene)
+
+
+def test_loads_that_no_motion_determines_are_not_told_in_other_units() -> None:
+    """Of Bennett's linkage with four revolutes, all; of its determined twin, none."""
+    (case,) = resolve(("bennett",))
+    left_out = {}
+    for variant in case.run.variants:
+        scene = case.scene(variant)
+        told = BY_NAME["rescaled"].of(scene).back(AT, channels := seen(scene))
+        left_out[variant.name] = {name.partition(".")[0] for name in set(channels) - set(told)}
+        assert strangers(scene, BY_NAME["rescaled"].of(scene)) == []
+    assert left_out["slide and ball"] == set()
+    assert len(left_out["four revolutes"]) == 5
 
 
 def test_what_needs_a_start_time_has_no_other_clock() -> None:
