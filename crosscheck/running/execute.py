@@ -91,12 +91,12 @@ def describe(error: BaseException) -> str:
 
 def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit: Emit) -> None:
     version = checked_version(engine.version())
-    support = support_of(engine, scene)
+    support = support_of(engine, scene, float(job.times[0]))
     blank = msgspec.structs.replace(blank, version=version, support=support.reason)
     if support.kind == "no":
         emit(msgspec.structs.replace(blank, status="refused", message=support.reason))
         return
-    ladder = job.efforts or efforts_of(engine, scene, float(job.times[-1]))
+    ladder = job.efforts or efforts_of(engine, scene, float(np.ptp(job.times)))
     rungs = len(ladder)
     key = _key(engine, version, job, rungs)
     chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]
