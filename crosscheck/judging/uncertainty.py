@@ -25,9 +25,9 @@ By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and
 d_23, because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are
 counted. Where they grow by no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap):
 U = SPREAD d_23. Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond
-`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. Neither do evaluations whose growth beside the tolerance's,
-in logarithms, is more than `MUCH_MORE` times the growth before: error control fights round-off that the scene magnifies.
-Otherwise U may be less than d_23, with S = `SPREAD` and for q the least of
+`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. Neither do evaluations whose growth beside the
+tolerance's, in logarithms, is more than `MUCH_MORE` times the growth before: error control fights round-off that the
+scene magnifies. Otherwise U may be less than d_23, with S = `SPREAD` and for q the least of
 
 - the fall that was seen, d_12 / d_23, and the ratio of the tolerances;
 - that ratio, divided by as much as the fall seen exceeds it: what fell too far by chance falls too little next;

@@ -139,8 +139,8 @@ def four_tolerances() -> list[RunRecord]:
     made = ladder("one", {TIP: way()})
     return [
         msgspec.structs.replace(
-            run, effort=f"rtol {n}", effort_value=1e-2 * 1e-2**n, rung=n, rungs=4, evaluations=round(100 * 10 ** (n / 2)),
-            channels={TIP: pack(way(1.0 + 1e-2**n))},
+            run, effort=f"rtol {n}", effort_value=1e-2 * 1e-2**n, rung=n, rungs=4,
+            evaluations=round(100 * 10 ** (n / 2)), channels={TIP: pack(way(1.0 + 1e-2**n))},
         )
         for n, run in enumerate((made[0], *made))
     ]  # fmt: skip
