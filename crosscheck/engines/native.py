@@ -32,7 +32,6 @@ from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.modal.flexible import flexible_model
-from flexmb.run.eventful import refuse_events
 from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
 from flexmb.scene.events import EndRun
@@ -117,11 +116,8 @@ class NativeEngine:
     def _made(self, scene: Scene) -> NativeModel:
         system = compile(scene)
         system.route(self._algorithm)
-        if scene.closures and INTEGRATORS[self._method].linearises:
-            raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)
-        refuse_events(system, self._method)
         for event in scene.events:
             if any(isinstance(action, EndRun) for action in event.actions):
                 raise NotImplementedError(f'event "{event.name}" ends the run, and engines are asked for all samples')

@@ -31,7 +31,7 @@ from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
 
 Emit = Callable[[RunRecord | Confirmed | str], None]
-FULLY_STORED = 3  # the finest efforts, which the uncertainty needs in every channel
+FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
 SHORT_S = 0.1  # a shorter solve is repeated, as the clock and the caches disturb it
 REPEATS = 3
 

@@ -109,7 +109,7 @@ def general_kernels() -> Iterator[None]:
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
     """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
-    if INTEGRATORS[method].linearises and (kind == "closed" or algorithm not in WITH_JACOBIAN):
+    if INTEGRATORS[method].linearises and algorithm not in WITH_JACOBIAN:
         return False
     if kind == "closed":
         return algorithm in ON_CHAINS

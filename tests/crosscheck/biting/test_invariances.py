@@ -17,10 +17,12 @@ from crosscheck.engines.native import NativeEngine
 from crosscheck.engines.trajectories import stack
 from crosscheck.library.find import resolve
 from flexmb.run.channels import channels_of, distance, family, magnitude
+from flexmb.scene.files import load_scene
 from flexmb.scene.functions import Pulse
 from flexmb.scene.schema import Scene
 from flexmb.surrogate import modal_points
 from tests.crosscheck.engines.random_scenes import random_scene as random_rigid
+from tests.repo.project import ROOT
 from tests.trees import random_scene as random_flexible
 
 BY_NAME = {each.name: each for each in INVARIANCES}
@@ -76,6 +78,32 @@ def test_nothing_changes_in_a_scene_with_flexible_bodies(name: str) -> None:
     counterpart = BY_NAME[name].of(flexible())
     assert counterpart.scene != flexible()
     assert strangers(flexible(), counterpart) == []
+
+
+@cache
+def connected() -> Scene:
+    """Every kind of connector, none of them at rest."""
+    scene = load_scene(ROOT / "cases" / "connectors" / "sprung_platform" / "scene.toml")
+    moved = msgspec.structs.replace(scene.hinges[1], position_m=(0.01, -0.02, 0.03), quaternion=(0.96, 0.0, 0.28, 0.0))
+    return msgspec.structs.replace(scene, hinges=(scene.hinges[0], moved, *scene.hinges[2:]))
+
+
+@pytest.mark.parametrize("name", ["turned", "moved", "reordered", "rescaled", "mirrored"])
+def test_nothing_changes_in_a_scene_of_connectors(name: str) -> None:
+    counterpart = BY_NAME[name].of(connected())
+    assert counterpart.scene != connected()
+    assert strangers(connected(), counterpart) == []
+
+
+@pytest.mark.parametrize("key", ["stiffening", "stiffness", "damping", "table_m", "free_length_m"])
+def test_a_connector_left_in_its_units_is_noticed(key: str) -> None:
+    whole = BY_NAME["rescaled"].of(connected())
+    pairs = zip(whole.scene.connectors, connected().connectors, strict=True)
+    spoilt = tuple(
+        msgspec.structs.replace(new, **{key: getattr(old, key)}) if hasattr(old, key) else new for new, old in pairs
+    )
+    scene = msgspec.structs.replace(whole.scene, connectors=spoilt)
+    assert strangers(connected(), Counterpart(scene, whole.back, whole.clock))
 
 
 def _still_gravity(scene: Scene) -> Scene:
