@@ -23,7 +23,15 @@ TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
 TO_LEAP = 2.0**-12
 AT_CROSSING = 2.0**-20
 ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
+RESOLVED = 2.0**-4  # of the distance to a singular position that a step of fixed length may cover: it errs by its fifth power
+NEARBY = 2.0  # times what a mechanism moves in a step, in its sizes: more of a row changes only near a singular position
+HALF = 0.5  # of that distance no step of fixed length covers, however far its mechanism moves
 FASTEST = 2.0**10  # fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large
+
+
+def watch_steps(chain):
+    """Let steps fail that are too long near a singular position: of a method whose errors do not shorten them."""
+    chain.cw.resolved[0] = RESOLVED
 
 
 @helper
@@ -76,16 +84,43 @@ def at_crossing(t, cc, cw):
 
 
 @helper
+def along(cc, cw, g, a):
+    """Cosine of the angle by which row a of Q of group g has turned since the step started."""
+    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
+    total, at = 0.0, cc.group[g].half + a * (stop - start)
+    for j in range(at, at + own - start):
+        total += cw.basis[j] * cw.former[j]
+    return total
+
+
+@helper
 def turned_over(cc, cw):
     """The first chosen row that points another way than when the step started, or -1. Needs the same."""
     for g in range(cc.group.shape[0]):
-        start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
         for a in range(cw.rank[g]):
-            total, at = 0.0, cc.group[g].half + a * (stop - start)
-            for j in range(at, at + own - start):
-                total += cw.basis[j] * cw.former[j]
-            if not total >= TURNED:
+            if not along(cc, cw, g, a) >= TURNED:
                 return cw.chosen[cc.group[g].row_start + a]
+    return -1
+
+
+@helper
+def unresolved(t, cc, cw):
+    """The first chosen row of which the step has changed too much, or -1: near a singular position. Needs the same.
+
+    What is left of a row is a vector that vanishes at the position, R[a, a] times row a of Q. In terms of its length
+    the step changes it by what it covers of the distance, whether the mechanism goes there or only passes.
+    """
+    if cw.resolved[0] == 0.0:
+        return -1
+    for g in range(cc.group.shape[0]):
+        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
+        most = min(max(cw.resolved[0], NEARBY * moved), HALF)
+        for a in range(cw.rank[g]):
+            place = cc.group[g].row_start + a
+            before, now = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
+            changed = (now - before) ** 2 + 2.0 * before * now * (1.0 - along(cc, cw, g, a))
+            if not changed <= (most * min(before, now)) ** 2:
+                return cw.chosen[place]
     return -1
 
 

@@ -18,13 +18,17 @@ Else there is no leap, and steps may come closer (cw.closer): they pass by what 
 the run ends with the status it had.
 """
 
+import math
 from math import inf
 
-from flexmb.closure.branch import TO_LEAP, TURNED, passing_time, recall, remember
+import numpy as np
+
+from flexmb.closure.branch import TO_LEAP, TURNED, along, passing_time, recall, remember
 from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
+from flexmb.integrate.leap import between
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, store_slope
@@ -37,7 +41,8 @@ TIGHT = 2.0**-50  # gap of closures at both ends of a leap: rounding
 PROBE = 2.0**-14  # sizes of the mechanism that are tried to see how pivots fall
 APART = 3.0  # times the distance of a singular position, that of the next one that is not leapt over too
 BEYOND = 0.25  # of the distance before it, the least beyond the position
-SMOOTH = 2.0**-4  # change of accelerations in a leap, as part of them and of speed squared over size
+ROUGH = 8.0  # times the part of their size that ports move in a leap, change of accelerations as part of what is usual
+INNER = 0.5 - math.sqrt(0.05)  # of a leap from either end: the inner nodes of Lobatto's rule of order 6
 APPROACHES = 3  # by which the implicit rule converges: Euler's, then its own twice
 
 
@@ -140,7 +145,7 @@ def _vanish(probe, cc, cw):
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
             before, after = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
-            if _along(cc, cw, g, a) < 0.0:
+            if along(cc, cw, g, a) < 0.0:
                 after = -after
             ahead = before * probe / (before - after) if before > after else inf
             cw.vanishing[place] = ahead
@@ -163,13 +168,27 @@ def _vanish(probe, cc, cw):
 
 @helper
 def _lands(t, h, y, dy, y_new, dy_new, s):
-    """Whether the trapezoidal rule leads from y to y_new on the same branch."""
+    """Whether there is a y_new on the same branch: by the trapezoidal rule, then by Lobatto's."""
     for approach in range(APPROACHES):
         for i in range(y.shape[0]):
             slope = dy[i] if approach == 0 else 0.5 * (dy[i] + dy_new[i])
             y_new[i] = y[i] + h * slope
         if _slope(t + h, y_new, dy_new, s) != OK:
             return False
+    inner, slope, total = np.empty(y.shape[0]), np.empty(y.shape[0]), np.empty(y.shape[0])
+    for i in range(y.shape[0]):
+        total[i] = (dy[i] + dy_new[i]) / 12.0
+    for x in (INNER, 1.0 - INNER):
+        for i in range(y.shape[0]):
+            inner[i] = between(x, h, (y[i], y_new[i]), (dy[i], dy_new[i]))
+        if _slope(t + x * h, inner, slope, s) != OK:
+            return False
+        for i in range(y.shape[0]):
+            total[i] += 5.0 / 12.0 * slope[i]
+    for i in range(y.shape[0]):
+        y_new[i] = y[i] + h * total[i]
+    if _slope(t + h, y_new, dy_new, s) != OK:
+        return False
     return largest_gap(s.cc, s.cw)[0] <= OPEN and _same_branch(h, s.cc, s.cw)
 
 
@@ -179,31 +198,21 @@ def _same_branch(h, cc, cw):
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
             r = cw.chosen[place]
-            along, ahead = _along(cc, cw, g, a), cw.vanishing[place]
+            turned, ahead = along(cc, cw, g, a), cw.vanishing[place]
             if not ahead < inf:
-                if not along >= TURNED:
+                if not turned >= TURNED:
                     return False
             else:
                 expected = cw.former_pivot[place] * (h - ahead) / ahead
                 found = cw.factor[entry(cc, g, a, a)]
-                if not (-along >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
+                if not (-turned >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
                     return False
                 closure = cw.closure[cc.row[r].closure]
                 before, after = cw.demand[place], -_demand(cc, cw, g, a)  # Q points the other way
                 usual = closure.speed**2 / closure.size + cw.size[r] * min(abs(before), abs(after))
-                if not cw.size[r] * abs(after - before) <= SMOOTH * usual:
+                if not cw.size[r] * abs(after - before) <= ROUGH * h / passing_time(cc, cw, g) * usual:
                     return False
     return True
-
-
-@helper
-def _along(cc, cw, g, a):
-    """Cosine of the angle by which row a of Q of group g has turned since the last good state."""
-    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
-    total, at = 0.0, cc.group[g].half + a * (stop - start)
-    for j in range(at, at + own - start):
-        total += cw.basis[j] * cw.former[j]
-    return total
 
 
 @helper

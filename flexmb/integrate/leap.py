@@ -10,7 +10,7 @@ from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR
 
-EVALUATED = 5  # about as often a leap evaluates equations of motion
+EVALUATED = 8  # about as often a leap evaluates equations of motion
 
 
 @helper
@@ -30,6 +30,14 @@ def leap(problem, end, y, dy, y_new, dy_new, counts):
 
 
 @helper
+def between(x, h, y, dy):
+    """The value of Hermite's cubic at the fraction x of an interval h, from values and slopes at both its ends."""
+    change = y[1] - y[0]
+    bend = (1.0 - x) * (h * dy[0] - change) - x * (h * dy[1] - change)
+    return y[0] + x * (change + (1.0 - x) * bend)
+
+
+@helper
 def store_leapt(step, y, dy, y_new, dy_new, times, out, counts):
     """Store the samples in a leap by Hermite's cubic: it is much shorter than a step."""
     h, sample = step.end - step.start, counts[SAMPLES]
@@ -39,8 +47,6 @@ def store_leapt(step, y, dy, y_new, dy_new, times, out, counts):
         else:
             x = (times[sample] - step.start) / h
             for i in range(y.shape[0]):
-                change = y_new[i] - y[i]
-                bend = (1.0 - x) * (h * dy[i] - change) - x * (h * dy_new[i] - change)
-                out[sample, i] = y[i] + x * (change + (1.0 - x) * bend)
+                out[sample, i] = between(x, h, (y[i], y_new[i]), (dy[i], dy_new[i]))
         sample += 1
     counts[SAMPLES] = sample

@@ -100,15 +100,14 @@ def end_at_crossing(problem, step, y, k, trial, counts, watch):
 def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
     """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
 
-    Returns a status code and the time of y, which is again the last good state. Without a leap it is still `trouble`:
-    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be. scratch:
-    slopes (4,n) and a state (n,); output: times of samples, and samples.
+    Returns a status code and the time of y, which is again the last good state. scratch: slopes (4,n) and a state (n,);
+    output: times of samples, and samples.
     """
     (k, trial), (times, out), target, last = scratch, output, step.end, step.last
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
-    h, failed, outcome = RETREAT * (target - t), True, trouble
+    h, failed = RETREAT * (target - t), True
     while t < target:
         status = permitted(accuracy.max_steps, counts)
         if status != OK:
@@ -116,7 +115,7 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
         far = leap(problem, last, y, k[0], trial, k[1], counts) if failed else 0.0
         if far > 0.0:
             store_leapt(Interval(t, t + far, last), y, k[0], trial, k[1], times, out, counts)
-            t, h, outcome = t + far, far, OK
+            t, h = t + far, far
         else:
             status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
             if status != OK:
@@ -136,7 +135,7 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
         copy(trial, y)
         counts[ACCEPTED] += 1
         failed = False
-    return outcome, t
+    return OK, t
 
 
 @kernel

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure.assembly import consistent
+from flexmb.closure.branch import watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.leap import back, leap
@@ -178,7 +179,7 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap))
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap, watch_steps))
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
