@@ -9,9 +9,13 @@ So every evaluation of a step compares its Q with that of the state from which t
 has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
 their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
 branches apart: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
-to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, well above 2^-22.
 What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
 come closer than `TO_LEAP` only where there was no leap.
+
+Errors of a step are powers of what it covers of the distance to a singular position, be it one that the mechanism only
+passes. Methods that estimate their errors shorten their steps there; of others, whose steps are equal, those fail that
+are too long for the distance (`unresolved`).
 """
 
 from math import inf
@@ -19,14 +23,26 @@ from math import inf
 from flexmb.closure.factor import entry
 from flexmb.jit.kernel import helper
 
-TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
+# Cosine of the angle by which a row of Q may turn in a step. A near miss turns it by a right angle in all, and no step
+# takes the whole of it.
+TURNED = 0.5
+# Leaps go from 2^-10 and are tried wherever a step fails: steps fail before they leave that range.
 TO_LEAP = 2.0**-12
+# There branches differ by 2^-40 in the gap of a closure: 16 times what closed closures are left open by.
 AT_CROSSING = 2.0**-20
-ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
-RESOLVED = 2.0**-4  # of the distance to a singular position that a step of fixed length may cover: it errs by its fifth power
-NEARBY = 2.0  # times what a mechanism moves in a step, in its sizes: more of a row changes only near a singular position
-HALF = 0.5  # of that distance no step of fixed length covers, however far its mechanism moves
-FASTEST = 2.0**10  # fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large
+# What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
+ROUND_OFF = 2.0**-40
+# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. Not derived: random
+# mechanisms with masses six decades apart pass with it (tests/flexmb/closure/near_singular.py).
+FASTEST = 2.0**10
+# Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
+# 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
+RESOLVED = 2.0**-4
+# Far from singular positions a step changes a row by less than what its mechanism moves, in its sizes: `passing_time`
+# adds the ports' speeds up, several times the true one. Twice that is a distance below half of the size.
+NEARBY = 2.0
+# Of the distance no step covers more, however far its mechanism moves: the row could vanish within two of them.
+HALF = 0.5
 
 
 def watch_steps(chain):

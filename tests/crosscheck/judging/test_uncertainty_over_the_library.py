@@ -18,9 +18,6 @@ from flexmb.run.channels import channels_of, distance, family, magnitude
 
 TOLERANCES = tuple(10.0**-n for n in range(4, 13))
 CLOSED = [case for case in resolve(("all",)) if case.provenance is not None and case.provenance.family == "closed_form"]
-BEYOND = {
-    "closed_chains/windows": "a leap over a singular position is one step whose error no tolerance bounds: 1.3 times U"
-}
 
 
 def ladders(case: Case, engine: str) -> tuple[int, list[str]]:
@@ -59,7 +56,5 @@ def test_u_bounds_the_error(case: Case, engine: str) -> None:
     runs_it = engine in case.run.variant(case.run.reference.variant).engines
     if not (runs_it and engine in held(case.run, (engine,))):
         pytest.skip(f"{case.name} does not hold {engine} against its reference")
-    if case.name in BEYOND:
-        pytest.xfail(BEYOND[case.name])
     count, exceeded = ladders(case, engine)
     assert count and not exceeded

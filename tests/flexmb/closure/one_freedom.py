@@ -1,6 +1,6 @@
-"""Rows of planar four-bars, one freedom whatever their number, and their motion by a way that shares nothing with runs.
+"""Rows of planar four-bars, of one freedom, and their motion by a way that shares nothing with runs.
 
-Bars lie in a plane and are known by the angles of each against the x axis: feet of uprights are fixed on the ground, and
+Bars lie in a plane and are known by their angles against the x axis: feet of uprights are fixed on the ground, and
 sill i goes from the top of upright i to that of upright i + 1. Which lengths are equal decides what is singular:
 parallelograms, kites, anything whose shortest and longest bar together are as long as the other two.
 
@@ -53,16 +53,20 @@ class Row:
 
     @property
     def numbers(self) -> tuple:
-        """What the kernels below ask for: distances of feet, lengths, inertias (I, their cosines' factors), weights."""
+        """What kernels ask for: distances of feet, lengths, inertia of bars and of their arms, weights' moments."""
         arms = self.arms
         products = arms.T @ (self.mass[:, None] * arms)
         turned = np.diag(self.mass * self.lengths**2 / 12.0)
         return np.diff(self.feet), self.lengths, turned, products, self.gravity * (self.mass @ arms)
 
+    @property
+    def kinetic(self) -> float:
+        """Energy (J) of motion at the start."""
+        return kinetic(self, self.angles, self.rates)
+
     def energy(self, x: Array, rate: Array) -> float:
         """Kinetic and of height (J)."""
-        _, _, turned, products, weights = self.numbers
-        return float(0.5 * rate @ _mass(x, turned, products) @ rate - weights @ np.sin(x))
+        return kinetic(self, x, rate) - float(self.numbers[-1] @ np.sin(x))
 
     def narrowness(self, x: Array) -> float:
         """The least singular value of dK/dx beside the largest: 0 where branches cross."""
@@ -84,7 +88,7 @@ class Row:
         out, rates = _motion(times, self.angles, self.rates, self.tangent(self.angles), exact, *self.numbers)
         start = self.energy(self.angles, self.rates)
         worst = max(abs(self.energy(*each) - start) for each in zip(out, rates, strict=True))
-        return out, worst / (0.5 * self.rates @ _mass(self.angles, *self.numbers[2:4]) @ self.rates)
+        return out, worst / self.kinetic
 
     def scene(self) -> s.Scene:
         """Cut at the tops of all uprights but the first."""
@@ -113,6 +117,11 @@ class Row:
                 f"window {i}", self.closure, f"sill {i}", f"upright {i + 1}", node_a="tip", node_b="tip", **turn
             )
         return made.scene()
+
+
+def kinetic(row: Row, x: Array, rate: Array) -> float:
+    """Energy (J) of rates at the angles x."""
+    return float(0.5 * rate @ _mass(x, *row.numbers[2:4]) @ rate)
 
 
 @njit(cache=True)
