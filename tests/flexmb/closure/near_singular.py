@@ -32,7 +32,7 @@ def random_row(rng: Generator) -> tuple[Row, float]:
     row = Row(feet, uprights, sills, mass, still, still, gravity, str(rng.choice(CLOSURES)))
     while True:
         angles = _angles(row, kind, rng)
-        if angles is not None and row.narrowness(angles) > 0.05:
+        if angles is not None and row.narrowness(angles) > 0.05 / count:
             break
     angles = row.closed(angles)
     n = row.tangent(angles) * rng.choice([-1.0, 1.0])

@@ -22,6 +22,7 @@ from flexmb.scene.build import SceneBuilder, s
 Array = np.ndarray
 PATCH = 0.2  # of the distance to a branch that is only nearly one
 ACROSS = 1e-2  # rad, a patch that goes over one
+PATCHES = 4000  # after so many the reference gives up: rows of rhombi may stay near singular positions for good
 STEPS = 8  # of the classical Runge-Kutta method in a patch
 
 
@@ -83,12 +84,12 @@ class Row:
     def motion(self, times: Array, *, exact: bool) -> tuple[Array, float]:
         """Angles (T,2N+1) at the times, and the largest change of energy beside the kinetic one at the start.
 
-        `exact`: branches cross, they do not only nearly do so.
+        Not numbers from where it gives up. `exact`: branches cross, they do not only nearly do so.
         """
         out, rates = _motion(times, self.angles, self.rates, self.tangent(self.angles), exact, *self.numbers)
         start = self.energy(self.angles, self.rates)
-        worst = max(abs(self.energy(*each) - start) for each in zip(out, rates, strict=True))
-        return out, worst / self.kinetic
+        changes = [abs(self.energy(*each) - start) for each in zip(out, rates, strict=True)]
+        return out, float(np.max(changes)) / self.kinetic
 
     def scene(self) -> s.Scene:
         """Cut at the tops of all uprights but the first."""
@@ -211,9 +212,10 @@ def _slope(y, x0, n, apart, lengths, turned, products, weights):
 
 @njit(cache=True)
 def _motion(times, x, u, n, exact, apart, lengths, turned, products, weights):
-    t, sample = times[0], 0
-    out, rates = np.zeros((times.shape[0], x.shape[0])), np.zeros((times.shape[0], x.shape[0]))
-    while sample < times.shape[0]:
+    t, sample, patches = times[0], 0, 0
+    out, rates = np.full((times.shape[0], x.shape[0]), np.nan), np.full((times.shape[0], x.shape[0]), np.nan)
+    while sample < times.shape[0] and patches < PATCHES:
+        patches += 1
         longest = PATCH * _narrowness(x, apart, lengths)
         if exact:
             longest = max(longest, ACROSS)
