@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from crosscheck.engines.contract import ENERGIES, OUTPUTS, MarkerPath, Trajectory
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import rest_frames
@@ -20,6 +21,7 @@ from flexmb.typing import Real
 
 MILLI = 1e3
 SHIFT = 0.01  # of the scene's extent
+ALONG = ("drive", "hinge_force")  # channels of one part, called after a hinge, wheel or connector
 
 
 @dataclass(frozen=True)
@@ -44,7 +46,23 @@ def _drives_reversed(run: Trajectory, scene: Scene) -> Trajectory:
     return replace(run, drives={name: -drive for name, drive in run.drives.items()})
 
 
+def _connectors_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, connectors={name: -load for name, load in run.connectors.items()})
+
+
+def _hinge_forces_reversed(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, hinge_forces={name: -force for name, force in run.hinge_forces.items()})
+
+
 def _load_point(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, loads=_about_another_point(run, run.loads))
+
+
+def _connector_point(run: Trajectory, scene: Scene) -> Trajectory:
+    return replace(run, connectors=_about_another_point(run, run.connectors))
+
+
+def _about_another_point(run: Trajectory, loads: dict[str, Real]) -> dict[str, Real]:
     """Torques about a point that is off by `SHIFT` of the scene's extent along (1, 1, 1)."""
     extent = max((float(np.max(np.abs(path.position))) for path in run.markers.values()), default=1.0) or 1.0
     arm = np.full(3, SHIFT * extent)
@@ -52,7 +70,7 @@ def _load_point(run: Trajectory, scene: Scene) -> Trajectory:
     def shifted(load: Real) -> Real:
         return np.hstack([load[:, :3] + np.cross(arm, load[:, 3:]), load[:, 3:]])
 
-    return replace(run, loads={name: shifted(load) for name, load in run.loads.items()})
+    return {name: shifted(load) for name, load in loads.items()}
 
 
 def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
@@ -63,6 +81,16 @@ def _load_axes(run: Trajectory, scene: Scene) -> Trajectory:
         if hinge.child in shown and hinge.name in loads:
             loads[hinge.name] = _in_axes(shown[hinge.child], loads[hinge.name])
     return replace(run, loads=loads)
+
+
+def _connector_axes(run: Trajectory, scene: Scene) -> Trajectory:
+    """Loads of connectors in the axes of a marker on `body_b`, where there is one."""
+    shown = {marker.body: run.markers[marker.name] for marker in scene.markers if marker.name in run.markers}
+    loads = dict(run.connectors)
+    for each in scene.connectors:
+        if isinstance(each, BetweenNodes) and each.body_b in shown and each.name in loads:
+            loads[each.name] = _in_axes(shown[each.body_b], loads[each.name])
+    return replace(run, connectors=loads)
 
 
 def _on_paths(change: Callable[[MarkerPath], MarkerPath]) -> Callable[[Trajectory, Scene], Trajectory]:
@@ -155,6 +183,21 @@ FAULTS = (
     AnswerFault("load_reference", "hinge torques about another point", "another reference point", _load_point),
     AnswerFault("load_axes", "hinge loads in body axes", "axes of the outboard body for World axes", _load_axes),
     AnswerFault(
+        "connector_reaction", "loads of connectors negated", "load on body A for that on body B", _connectors_reversed
+    ),
+    AnswerFault(
+        "connector_reference", "torques of connectors about another point", "another reference point", _connector_point
+    ),
+    AnswerFault(
+        "connector_axes", "loads of connectors in axes of body B", "axes of a body for World axes", _connector_axes
+    ),
+    AnswerFault(
+        "hinge_force_reaction",
+        "loads of connectors along hinges negated",
+        "what acts on the hinge for what resists it",
+        _hinge_forces_reversed,
+    ),
+    AnswerFault(
         "wheel_load_reaction", "wheel loads negated", "load on the body for that on the wheel", _wheel_loads_reversed
     ),
     AnswerFault("drive_reaction", "drive loads negated", "load of the motion for load of the drive", _drives_reversed),
@@ -185,11 +228,12 @@ FAULTS = (
 
 def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
     """The run whose channels (T, k) these are: `channels_of` the other way."""
-    names: dict[str, dict[str, None]] = {kind: {} for kind in ("marker", "load", "wheel_load", "drive")}
+    kinds = ("marker", "load", "wheel_load", "connector", *ALONG)
+    names: dict[str, dict[str, None]] = {kind: {} for kind in kinds}
     for channel in channels:
         kind, of_item, rest = channel.partition(":")
         if of_item:
-            names[kind][rest if kind == "drive" else rest.rpartition(".")[0]] = None
+            names[kind][rest if kind in ALONG else rest.rpartition(".")[0]] = None
 
     def pair(prefix: str, first: str, second: str) -> Real:
         return np.hstack([channels[f"{prefix}.{first}"], channels[f"{prefix}.{second}"]])
@@ -209,6 +253,8 @@ def run_of(times: Real, channels: dict[str, Real]) -> Trajectory:
         loads={name: pair(f"load:{name}", "torque", "force") for name in names["load"]},
         wheel_loads={name: pair(f"wheel_load:{name}", "torque", "force") for name in names["wheel_load"]},
         drives={name: channels[f"drive:{name}"] for name in names["drive"]},
+        connectors={name: pair(f"connector:{name}", "torque", "force") for name in names["connector"]},
+        hinge_forces={name: channels[f"hinge_force:{name}"] for name in names["hinge_force"]},
         energy={kind: channels[f"energy.{kind}"][:, 0] for kind in ENERGIES if f"energy.{kind}" in channels},
         momentum=pair("momentum", "angular", "linear") if "momentum.linear" in channels else None,
         work=channels["work"][:, 0] if "work" in channels else None,

@@ -15,6 +15,7 @@ import numpy as np
 
 from crosscheck.biting.invariances import INVARIANCES, Counterpart, NotApplicable
 from crosscheck.biting.subject import JudgedVariant, reduced, subject
+from crosscheck.engines.answers import NO_START
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.judging.uncertainty import Uncertainty, roundoff_floor
 from crosscheck.judging.verdict import Finding, Signal, Status, compare
@@ -112,9 +113,6 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
         if true.scene is None:
             without[invariance.name] = f"the case's own scene cannot be made: {true.error}"
             continue
-        if true.scene.controllers:
-            without[invariance.name] = "the scene has controllers, which would have to be told in the other frame too"
-            continue
         try:
             counterpart = invariance.of(true.scene)
         except NotApplicable as error:
@@ -129,7 +127,7 @@ def _planned(what: JudgedVariant, provider: str, limits: Limits) -> _Set:
 
 def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
     """The counterpart's job. Steps of fixed efforts are told on its clock."""
-    times = counterpart.clock * true.times
+    times = counterpart.starts_s + counterpart.clock * true.times
     efforts = tuple(
         replace(effort, value=counterpart.clock * effort.value) if effort.kind == "step" else effort
         for effort in true.efforts
@@ -143,7 +141,7 @@ def _job(true: Job, name: str, counterpart: Counterpart) -> Job:
         efforts=efforts,
     )
     try:
-        check_scene(counterpart.scene, t_end=float(times[-1]))
+        check_scene(counterpart.scene, t_end=float(times[-1]), t_start=float(times[0]))
     except ValueError as error:
         return replace(job, scene=None, error=str(error))
     return job
@@ -170,6 +168,9 @@ def _judged(each: _Set, results: CaseResults) -> list[InvarianceVerdict]:
             found.append(msgspec.structs.replace(head, reason=each.without[invariance.name]))
             continue
         other = results.get(what.variant.name, what.engine, role(invariance.name))
+        if other.status == "refused" and NO_START in other.message:
+            found.append(msgspec.structs.replace(head, reason=other.message))
+            continue
         ended = next((one for one in (true, other) if one.status != "finished"), None)
         if ended is not None:
             found.append(msgspec.structs.replace(head, status=ended.status, reason=ended.message))
@@ -208,7 +209,7 @@ def _told(other: Result, counterpart: Counterpart) -> Result:
 def _run(run: RunRecord, other: Result, counterpart: Counterpart) -> RunRecord:
     if run.times is None or set(run.channels) != set(other.finest.channels):
         return msgspec.structs.replace(run, channels={})
-    times = unpack(run.times) / counterpart.clock
+    times = (unpack(run.times) - counterpart.starts_s) / counterpart.clock
     channels = counterpart.back(times, {name: unpack(packed) for name, packed in run.channels.items()})
     return msgspec.structs.replace(
         run,
@@ -222,14 +223,16 @@ def _with_rounding(name: str, told: Result, other: Result, bodies: int) -> Signa
     """A channel told back, with the rounding of what was added to it or taken from it, and of what it is the sum of.
 
     A load that vanishes is a sum that vanishes: of forces at distances, and of gyroscopic torques, which are of the
-    size of the kinetic energy. In other axes and units this sum rounds otherwise, as do places along a chain of bodies.
+    size of the kinetic energy; so does little work of large forces. In other axes and units this sum rounds otherwise,
+    as do places along a chain of bodies.
     """
     signal = told.signal(name, across=False)
     sizes = signal.sizes
-    if name.endswith(".torque") and "energy.kinetic" in told.channels:
+    is_sum = name == "work" or name.endswith(".torque")
+    if is_sum and "energy.kinetic" in told.channels:
         sizes = (*sizes, magnitude("energy.kinetic", told.values("energy.kinetic")))
     moved = magnitude(name, other.values(name) - told.values(name))
-    terms = max(sizes) if name.endswith(".torque") else 0.0
+    terms = max(sizes) if is_sum else 0.0
     floor = roundoff_floor(max(moved, terms), max(told.finest.evaluations, len(told.times)) + bodies)
     doubt = signal.uncertainty
     raised = Uncertainty(doubt.envelope + floor, doubt.value + floor, doubt.how, doubt.order)

@@ -7,16 +7,21 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import msgspec
+import numpy as np
 
 from crosscheck.biting.subject import JudgedVariant, reduced
 from crosscheck.library.case import TAKES_APART, ComparisonSide, Control, MutationKind
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from crosscheck.running.plan import at_level, variant_scene
+from flexmb.run.warm_up import general_kernels
 from flexmb.scene.bodies import BeamBody, ModalBody
 from flexmb.scene.check import check_scene
 from flexmb.scene.schema import Scene
+from flexmb.system.compile import compile
 
+OF_THE_START: tuple[MutationKind, ...] = ("initial_place", "initial_unit", "initial_rate", "initial_speed_sign")
+SAME = 1e-12  # of the largest coordinate or speed: what projections leave
 ROUNDING = 1e-9  # of an eigenproblem and of sums over its modes; the smallest mutation changes 3e-4
 
 
@@ -77,7 +82,19 @@ def _no_mutant(scene: Scene, kind: MutationKind, target: str, true: Scene, what:
         return f"it makes no scene: {' '.join(str(error).split())}"
     if same_to_rounding(mutant, true):
         return f'variant "{variant.name}" does not model what it changes'
+    if kind in OF_THE_START and true.closures and _begin_alike(mutant, true):
+        return "the closures say where it begins: the scene's value is where the search for it starts"
     return ""
+
+
+def _begin_alike(one: Scene, other: Scene) -> bool:
+    """Whether two closed chains that differ in the values which they start from begin in the same state."""
+    with general_kernels():
+        try:
+            a, b = (compile(scene).initial_state for scene in (one, other))
+        except (ValueError, NotImplementedError):  # the engine will say why
+            return False
+    return all(np.max(np.abs(p - q)) <= SAME * np.max(np.abs(q)) for p, q in ((a.q, b.q), (a.u, b.u)) if len(q))
 
 
 def _takes_apart(what: JudgedVariant, scene: Scene, faulty: Scene, target: str) -> bool:

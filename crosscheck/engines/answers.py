@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 import numbers
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import fields, replace
+from dataclasses import fields
 from typing import Any, get_args
 
 import numpy as np
@@ -25,6 +25,7 @@ from crosscheck.engines.contract import (
     Support,
     Trajectory,
 )
+from crosscheck.engines.trajectories import first_samples
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.schema import Scene, UserLaw
 from flexmb.typing import Real
@@ -32,6 +33,7 @@ from flexmb.typing import Real
 RUNGS = 3
 LATER = ("connectors", "controllers", "events")
 """Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
+NO_START = "begins all runs at t = 0"
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -56,14 +58,18 @@ def checked_version(found: Any) -> str:
     return text
 
 
-def support_of(engine: Engine, scene: Scene) -> Support:
-    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out.
+def support_of(engine: Engine, scene: Scene, t_start: float = 0.0) -> Support:
+    """What `supports` says; "no" where the scene holds what an adapter that does not know of it would leave out, or
+    where the run begins at another time (s) than the adapter's runs do.
 
     Laws of controllers that are not in this distribution are refused for all: what they do may change, and records
     would not know.
     """
+    known = getattr(engine, "takes", ())
+    if t_start != 0.0 and "t_start" not in known:
+        return Support("no", f"the adapter of engine {engine.name} {NO_START}")
     for collection in LATER:
-        items, known = getattr(scene, collection), getattr(engine, "takes", ())
+        items = getattr(scene, collection)
         if items and collection not in known:
             return Support("no", f'"{items[0].name}": the adapter of engine {engine.name} knows no {collection}')
     for law in scene.controllers:
@@ -127,7 +133,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         evaluations=_count(found.evaluations),
     )
     good = _finite_samples(run, finished)
-    run = run if good == count else _cut(run, good)
+    run = run if good == count else first_samples(run, good)
     for name, path in run.markers.items():
         defect = np.abs(np.linalg.norm(path.quaternion, axis=1) - 1.0)
         if np.any(defect > UNIT):
@@ -227,25 +233,6 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
             yield from ((f"{output}[{name!r}]", values) for name, values in found.items())
         elif found is not None:
             yield output, found
-
-
-def _cut(run: Trajectory, count: int) -> Trajectory:
-    """The first `count` samples."""
-    return replace(
-        run,
-        times=run.times[:count],
-        markers={
-            name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
-            for name, path in run.markers.items()
-        },
-        **{name: _first_samples(getattr(run, name), count) for name in OUTPUTS},
-    )
-
-
-def _first_samples(output: Any, count: int) -> Any:
-    if isinstance(output, dict):
-        return {name: values[:count] for name, values in output.items()}
-    return None if output is None else output[:count]
 
 
 def _effort(found: Any, where: str) -> Effort:

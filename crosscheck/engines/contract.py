@@ -27,9 +27,18 @@ class Support:
 
 @dataclass(frozen=True)
 class Run:
-    """What to simulate: from t = 0 to the last of `times` (s, strictly increasing, first is 0)."""
+    """What to simulate: from the first of `times` (s, strictly increasing) to the last.
+
+    The first is 0, but for engines whose `takes` names "t_start": those may be asked for a run that begins later. The
+    scene's initial state is that at the first time, and functions of time, controllers and events know the time.
+    """
 
     times: Real
+
+    @property
+    def t_start(self) -> float:
+        """When the run begins (s)."""
+        return float(self.times[0])
 
 
 @dataclass(frozen=True)
@@ -158,8 +167,9 @@ class Engine(Protocol):
     a few words, and `settings`, a sentence or two on how it is run so that the race is fair: its best solver, what is
     switched off, whose loop steps it, and what its `wall_s` contains. `takes` names the collections of a scene beyond
     the first contract that its adapter knows, such as "connectors" or "controllers"; a scene that has others is refused
-    for it. `efforts_for(scene, duration_s)` is asked in place of `efforts` where an engine has it: a ladder of fixed
-    steps depends on how long the run is (s), one of tolerances does not (see `crosscheck.engines.steps`).
+    for it. "t_start" among them says that its runs may begin at another time than 0. `efforts_for(scene, duration_s)`
+    is asked in place of `efforts` where an engine has it: a ladder of fixed steps depends on how long the run is (s),
+    one of tolerances does not (see `crosscheck.engines.steps`).
     """
 
     name: str

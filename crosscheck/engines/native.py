@@ -28,12 +28,13 @@ from crosscheck.engines.contract import (
 )
 from crosscheck.engines.pace import fastest_mode, pace
 from crosscheck.engines.steps import USUAL_S, ladder
+from crosscheck.engines.trajectories import first_samples
 from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.integrator import Method
 from flexmb.modal.flexible import flexible_model
-from flexmb.run.eventful import refuse_events
-from flexmb.run.simulate import refuse_without_jacobian, simulate
+from flexmb.run.simulate import RunSettings, refuse_without_jacobian, simulate
 from flexmb.run.trajectory import Trajectory as NativeTrajectory
+from flexmb.scene.events import EndRun
 from flexmb.scene.schema import BeamBody, ModalBody, RigidBody, Scene
 from flexmb.system.algorithm import Algorithm
 from flexmb.system.algorithms import ALGORITHMS
@@ -54,7 +55,7 @@ class NativeEngine:
         "faster. Compiling is apart, and outputs are observed after the timed solve."
     )
 
-    takes = ("connectors", "controllers", "events")
+    takes = ("connectors", "controllers", "events", "t_start")
 
     def __init__(
         self,
@@ -115,11 +116,11 @@ class NativeEngine:
     def _made(self, scene: Scene) -> NativeModel:
         system = compile(scene)
         system.route(self._algorithm)
-        if scene.closures and INTEGRATORS[self._method].linearises:
-            raise NotImplementedError(f"{self._method} runs trees: closures are for engine native")
         if INTEGRATORS[self._method].linearises:
             refuse_without_jacobian(system, self._algorithm, self._method)
-        refuse_events(system, self._method)
+        for event in scene.events:
+            if any(isinstance(action, EndRun) for action in event.actions):
+                raise NotImplementedError(f'event "{event.name}" ends the run, and engines are asked for all samples')
         return NativeModel(system, self._algorithm, self._method)
 
 
@@ -195,7 +196,7 @@ class NativeModel:
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
         """The method is the effort's; of a tolerance, atol is a hundredth."""
-        accuracy = (
+        accuracy: RunSettings = (
             {"rtol": effort.value, "atol": _ABSOLUTE * effort.value}
             if effort.kind == "tolerance"
             else {"step": effort.value}
@@ -204,12 +205,13 @@ class NativeModel:
             self._system,
             float(run.times[-1]),
             effort.method,  # type: ignore[arg-type]  # simulate refuses what is none
+            t_start=run.t_start,
             samples=run.times,
             algorithm=self._algorithm,
             **accuracy,
         )
-        return Trajectory(
-            status=_status(done),
+        found = Trajectory(
+            status=_status(done, run.t_start),
             message="" if done.finished else done.message,
             times=done.t,
             markers={
@@ -219,6 +221,7 @@ class NativeModel:
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
         )
+        return first_samples(found, int(np.isin(done.t, run.times).sum()))  # events that chatter end a run in between
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:
@@ -246,8 +249,8 @@ def _fastest_mode(scene: Scene) -> float:
     )
 
 
-def _status(done: NativeTrajectory) -> Status:
+def _status(done: NativeTrajectory, t_start: float) -> Status:
     """A run that never left its initial state has failed; one that left it has diverged."""
     if done.finished:
         return "finished"
-    return "diverged" if done.stopped_at > 0.0 else "failed"
+    return "diverged" if done.stopped_at > t_start else "failed"

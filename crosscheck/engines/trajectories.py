@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +49,25 @@ def _stacked(values: Sequence[Any]) -> Any:
     if isinstance(first, dict):
         return {name: np.array([value[name] for value in values]) for name in first}
     return None if first is None else np.array(values)
+
+
+def first_samples(run: Trajectory, count: int) -> Trajectory:
+    """The run up to its sample number `count`, which is left out."""
+
+    def cut(output: Any) -> Any:
+        if isinstance(output, dict):
+            return {name: values[:count] for name, values in output.items()}
+        return None if output is None else output[:count]
+
+    return replace(
+        run,
+        times=run.times[:count],
+        markers={
+            name: MarkerPath(path.position[:count], path.quaternion[:count], path.velocity[:count])
+            for name, path in run.markers.items()
+        },
+        **{name: cut(getattr(run, name)) for name in OUTPUTS},
+    )
 
 
 def continuous(quaternions: Real) -> Real:

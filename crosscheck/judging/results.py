@@ -9,14 +9,14 @@ from functools import cached_property
 import numpy as np
 
 from crosscheck.judging.sizes import Sizes
-from crosscheck.judging.uncertainty import RungSignal, Uncertainty, estimate, spatial, unknown
+from crosscheck.judging.uncertainty import RUNGS, RungSignal, Uncertainty, estimate, spatial, unknown
 from crosscheck.judging.verdict import Ending, Signal
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Environment, Record, RunRecord, RunStatus
 from crosscheck.records.packing import Packed, unpack
 from flexmb.typing import Real
 
+NEEDED = 3  # efforts without a gap; what is before them may help
 Key = tuple[str, str, str]  # variant, engine, role
-RUNGS = 3
 
 
 @dataclass
@@ -70,7 +70,7 @@ class Result:
         return Ending(self.status, f"{self.engine} on {self.variant}: {self.message}", self.reached_s)
 
     def uncertainty(self, channel: str) -> Uncertainty:
-        """Numerical U of a channel of the finest run, from the last three efforts of its method.
+        """Numerical U of a channel of the finest run, from the last efforts of its method.
 
         An effort too coarse to be followed may diverge and is left out. One that is missing for any other reason says
         nothing about convergence, and neither do the others without it: U is unknown.
@@ -84,11 +84,11 @@ class Result:
         gap = self._gap(channel)
         if gap:
             return unknown(len(self.values(channel)), gap)
-        ladder = [run for run in self._ladder() if run.status == "finished"]
+        ladder = [run for run in self._ladder() if run.status == "finished" and channel in run.channels]
         if _without_effect(ladder):
             ladder = ladder[-1:]
-        rungs = [RungSignal(run.effort_value, self.values(channel, run)) for run in ladder]
-        return estimate(channel, finest.effort_kind, rungs, finest.evaluations, self._sizes.magnitude(channel))
+        rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
+        return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel))
 
     def _ladder(self) -> list[RunRecord]:
         """The last efforts of the finest run's method."""
@@ -101,7 +101,7 @@ class Result:
         missing = [rung for rung in range(self.finest.rungs) if rung not in recorded]
         if missing:
             return f"effort {missing[0] + 1} of {self.finest.rungs} is not recorded"
-        for run in self._ladder():
+        for run in self._ladder()[-NEEDED:]:
             if run.status not in ("finished", "diverged"):
                 return f"effort {run.effort} {_past(run.status)}: {run.message}"
             if run.status == "finished" and channel not in run.channels:

@@ -16,11 +16,24 @@ of the grid convergence index for an unproven order.
 
 **Tolerance.** Error is not a power of the tolerance, but it falls. If the finest error is at most half the one before,
 |f_2 - f_3| >= e_2 - e_3 >= e_3: the difference bounds the error. d_12 >= 2 d_23 is the sign of it; without it
-U = 3 max(d_12, d_23) again. How fast errors fall scatters: in runs of the library whose solutions are known in closed
-form, from one tolerance to the next the error fell by at least the tolerances' ratio over `SPREAD`. Where the fall q,
-the smaller of d_12/d_23 and that ratio, leaves no factor of 2 after such a scatter, U = SPREAD/(q - SPREAD) d_23, at
-most 3 d_23. A faster fall earns no credit: at the finest tolerance errors may have stopped to fall, for round-off that
-stiffness has magnified, and differences do not show it.
+U = 3 max(d_12, d_23) again. How far an error falls scatters: at a finer tolerance it is at most a spread S times what
+the fall q foretells, e_3 <= S/q e_2. With e_2 <= d_23 + e_3, that is
+
+    U = S/(q - S) d_23,        at most 3 d_23.
+
+By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and the tolerances' ratio; U is at least
+d_23, because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are
+counted. Where they grow by no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap):
+U = SPREAD d_23. Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond
+`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. With a smaller one U may be less than d_23, with
+S = `SPREAD` and for q the least of
+
+- the fall that was seen, d_12 / d_23, and the ratio of the tolerances;
+- that ratio, divided by as much as the fall seen exceeds it: what fell too far by chance falls too little next;
+- (N_3 / N_2)^p.
+
+Four efforts tell p twice. Where both agree within a factor of `SAME_ORDER` errors fall evenly: S is EVEN_SPREAD, and a
+fall beyond the tolerances' ratio is no chance. The spreads are those of the library, see docs/verdicts.md.
 
 **Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
 eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
@@ -45,8 +58,13 @@ from flexmb.typing import Real
 
 SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
+RUNGS = 4  # of a ladder that can count
 ORDER_BAND = 0.1
-SPREAD = 10.0
+SPREAD = 15.0
+EVEN_SPREAD = 10.0
+SAME_ORDER = 1.25
+LARGEST_ORDER_IN_WORK = 12.0
+HARDLY_MORE = 1.03  # evaluations at the finer of two tolerances, over those at the coarser
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
 LARGEST_RATIO = 1e6  # of two steps: an order seen across more is seen nowhere
@@ -64,10 +82,14 @@ class Uncertainty:
 
 @dataclass(frozen=True)
 class RungSignal:
-    """One run of a ladder in one channel: the effort's step (s) or relative tolerance, and the signal (T, k)."""
+    """One run of a ladder in one channel: the effort's step (s) or relative tolerance, and the signal (T, k).
+
+    `evaluations`: the number of right-hand sides, 0 if not counted.
+    """
 
     effort: float
     values: Real
+    evaluations: int = 0
 
 
 def unknown(samples: int, why: str) -> Uncertainty:
@@ -75,27 +97,25 @@ def unknown(samples: int, why: str) -> Uncertainty:
     return Uncertainty(np.full(samples, np.inf), float("inf"), f"unknown: {why}")
 
 
-def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], evaluations: int, size: float) -> Uncertainty:
+def estimate(channel: str, kind: str, rungs: Sequence[RungSignal], size: float) -> Uncertainty:
     """U of the finest of `rungs` (coarse to fine, all of one method; `kind` is "step" or "tolerance").
 
-    `size` is the magnitude of the signal's family, `evaluations` the number of right-hand sides (0 if not counted).
-    Never raises: U is infinite where the rungs say nothing.
+    The last three count, of tolerances the last four. `size` is the magnitude of the signal's family. Never raises: U
+    is infinite where the rungs say nothing.
     """
     samples = len(rungs[-1].values) if rungs else 0
-    fault = _fault(kind, rungs, evaluations, size)
+    fault = _fault(kind, rungs, size)
     if fault:
         return unknown(samples, fault)
-    finest = rungs[-1].values
-    floor = roundoff_floor(size, max(evaluations, samples))
-    gap = distance(channel, rungs[-2].values, finest)
-    if len(rungs) == 2:
-        return _enveloped(UNPROVEN_SAFETY, gap, floor, "3 x the difference of the only two efforts", None)
-    wider = distance(channel, rungs[-3].values, rungs[-2].values)
-    factor, gap, how, order = _bound(kind, [rung.effort for rung in rungs[-3:]], wider, gap)
+    floor = roundoff_floor(size, max(rungs[-1].evaluations, samples))
+    gaps = [distance(channel, coarse.values, fine.values) for coarse, fine in pairwise(rungs[-RUNGS:])]
+    if len(gaps) == 1:
+        return _enveloped(UNPROVEN_SAFETY, gaps[0], floor, "3 x the difference of the only two efforts", None)
+    factor, gap, how, order = _by_tolerances(rungs, gaps) if kind == "tolerance" else _by_steps(rungs, gaps)
     return _enveloped(factor, gap, floor, how, order)
 
 
-def _fault(kind: str, rungs: Sequence[RungSignal], evaluations: int, size: float) -> str:
+def _fault(kind: str, rungs: Sequence[RungSignal], size: float) -> str:
     """Why nothing can be said from such runs; "" if something can."""
     if len(rungs) < 2:
         return "fewer than two efforts finished with different results"
@@ -108,8 +128,10 @@ def _fault(kind: str, rungs: Sequence[RungSignal], evaluations: int, size: float
         return "the efforts have results of different shapes, or empty ones"
     if not all(np.all(np.isfinite(rung.values)) for rung in rungs):
         return "an effort has values that are not numbers"
-    if not (0 <= evaluations < np.inf and 0.0 <= size < np.inf):
-        return f"{evaluations} evaluations of a signal of size {size:g} leave no round-off to be told"
+    evaluations = [rung.evaluations for rung in rungs]
+    if not (all(0 <= count < np.inf for count in evaluations) and 0.0 <= size < np.inf):
+        count = next((each for each in evaluations if not 0 <= each < np.inf), evaluations[-1])
+        return f"{count} evaluations of a signal of size {size:g} leave no round-off to be told"
     return ""
 
 
@@ -160,26 +182,66 @@ def observed_order(steps: Sequence[float], wider: float, gap: float) -> float | 
     return float(brentq(mismatch, low, high))
 
 
-def _bound(kind: str, efforts: Sequence[float], wider: Real, gap: Real) -> tuple[float, Real, str, float | None]:
-    """Factor, the difference (T,) it applies to, an explanation, and the observed order if there is one."""
-    far, near = float(np.max(wider)), float(np.max(gap))
-    unproven = UNPROVEN_SAFETY, np.maximum(wider, gap), "3 x the larger difference: the runs do not converge yet", None
-    if kind == "tolerance":
-        if far < 2.0 * near:
-            return unproven
-        factor = _after_scatter(min(far / near if near > 0.0 else np.inf, efforts[1] / efforts[2]))
-        return factor, gap, f"{factor:.2g} x the difference of the two finest tolerances", None
-    order = observed_order(efforts, far, near)
+Bound = tuple[float, Real, str, float | None]
+"""Factor, the difference (T,) it applies to, an explanation, and the observed order if there is one."""
+
+
+def _unproven(gaps: Sequence[Real], why: str) -> Bound:
+    return UNPROVEN_SAFETY, np.maximum(*gaps[-2:]), f"3 x the larger difference: {why}", None
+
+
+def _by_steps(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
+    """Of at least three fixed steps, by the last three."""
+    steps = [rung.effort for rung in rungs[-3:]]
+    order = observed_order(steps, *(float(np.max(gap)) for gap in gaps[-2:]))
     if order is None or order < 1.0 - ORDER_BAND:
-        return unproven
-    ratio = efforts[1] / efforts[2]
+        return _unproven(gaps, "the runs do not converge yet")
+    ratio = steps[1] / steps[2]
     if abs(order - round(order)) > ORDER_BAND:
         how = f"difference of the two finest steps, as order {order:.2f} is not whole"
-        return SAFETY / (ratio - 1.0), gap, how, order
+        return SAFETY / (ratio - 1.0), gaps[-1], how, order
     credited = min(order, ORDER_CREDIT)
-    return SAFETY / float(np.expm1(credited * np.log(ratio))), gap, f"Richardson, observed order {order:.2f}", order
+    how = f"Richardson, observed order {order:.2f}"
+    return SAFETY / float(np.expm1(credited * np.log(ratio))), gaps[-1], how, order
 
 
-def _after_scatter(fall: float) -> float:
-    """Bound of e_3 over d_23, if e_3 is at most SPREAD/fall times e_2 <= d_23 + e_3; never less than 1."""
-    return UNPROVEN_SAFETY if fall <= SPREAD else min(UNPROVEN_SAFETY, max(1.0, SPREAD / (fall - SPREAD)))
+def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
+    """Of at least three tolerances, by the last three or four."""
+    sizes = [float(np.max(gap)) for gap in gaps]
+    if sizes[-2] < 2.0 * sizes[-1]:
+        return _unproven(gaps, "the runs do not converge yet")
+    work = [rung.evaluations for rung in rungs[-RUNGS:]]
+    growth = [fine / coarse if coarse > 0 else np.nan for coarse, fine in pairwise(work)]
+    if any(more <= HARDLY_MORE for more in growth[-2:]):
+        why = "as a finer one took hardly more evaluations"
+        return SPREAD, gaps[-1], f"{SPREAD:g} x the difference of the two finest tolerances, {why}", None
+    seen = sizes[-2] / sizes[-1] if sizes[-1] > 0.0 else np.inf
+    ratio = rungs[-2].effort / rungs[-1].effort
+    foretold, spread = _foretold(sizes, growth, ratio)
+    factor = min(max(1.0, _after_scatter(min(seen, ratio), EVEN_SPREAD)), _after_scatter(foretold, spread))
+    return factor, gaps[-1], f"{factor:.2g} x the difference of the two finest tolerances", None
+
+
+def _foretold(sizes: Sequence[float], growth: Sequence[float], ratio: float) -> tuple[float, float]:
+    """How far evaluations foretell that the error falls at the last effort, and how that scatters.
+
+    `sizes` of the differences, `growth` of the evaluations, which leads from each difference to the next; its last one
+    leads to the finest effort. `ratio` of the two finest tolerances. A fall of 1 is none: evaluations were not counted
+    or tell no order.
+    """
+    falls = [wide / near if near > 0.0 else np.inf for wide, near in pairwise(sizes)]
+    orders = [
+        float(np.log(fall) / np.log(more)) if fall > 1.0 and more > 1.0 else np.inf
+        for fall, more in zip(falls, growth, strict=False)
+    ]
+    if not (orders[-1] <= LARGEST_ORDER_IN_WORK and growth[-1] > 1.0):
+        return 1.0, SPREAD
+    fall = min(falls[-1], ratio, growth[-1] ** orders[-1])
+    if len(orders) > 1 and max(orders) <= SAME_ORDER * min(orders):
+        return fall, EVEN_SPREAD
+    return min(fall, ratio * ratio / falls[-1]), SPREAD
+
+
+def _after_scatter(fall: float, spread: float) -> float:
+    """Bound of e_3 over d_23, if e_3 is at most spread/fall times e_2 <= d_23 + e_3."""
+    return UNPROVEN_SAFETY if fall <= spread else min(UNPROVEN_SAFETY, spread / (fall - spread))

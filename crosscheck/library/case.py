@@ -127,7 +127,12 @@ MutationKind = Literal[
     "wheel_offset", "gravity_sign", "gravity_size", "gravity_axis", "gravity_dropped", "load_sign", "load_point",
     "load_frame", "dropped_stiffening", "dropped_deformation", "mode_sign", "mode_order", "mode_rotation",
     "section_axes", "motor_sign", "function_size", "function_phase", "connector_stiffness", "connector_rest",
-    "connector_losses",
+    "connector_losses", "connector_damping", "connector_preload", "connector_one_sided", "connector_stop",
+    "stop_stiffness", "friction_torque", "friction_speed", "connector_position", "bushing_rotation", "bushing_ends",
+    "bushing_order", "controller_gain", "controller_sign", "controller_dynamics", "controller_limit",
+    "controller_setpoint", "controller_period", "controller_offset", "controller_delay", "sensor_frame",
+    "sensor_sign", "sensor_component", "event_level", "event_crossing", "event_dropped", "event_hold",
+    "event_restitution", "event_value", "event_order",
 ]  # fmt: skip
 Family = Literal["closed_form", "published", "converged", "agreed"]
 FAMILIES: dict[str, Family] = {

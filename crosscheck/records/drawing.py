@@ -19,11 +19,12 @@ class CarriedPoint(msgspec.Struct, frozen=True, array_like=True, forbid_unknown_
 
 
 class Line(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """What is drawn of one body; `kind` says how its points are to be taken.
+    """What is drawn of one body or connector, which `body` names; `kind` says how its points are to be taken.
 
     "solid": the eight corners of a box, the first coordinate's sign changing slowest. "arm": a straight line. "beam": a
-    line through its points that bends with their tangents. Records of older versions have "box", one edge of a box, and
-    "wheel", a rim: straight lines both.
+    line through its points that bends with their tangents. "ball": a point with mass. "spring": a coil between its two
+    points. "mount": a mark at each of its points, the frames of a bushing or the hinge of a spring. Records of older
+    versions have "box", one edge of a box, and "wheel", a rim: straight lines both.
     """
 
     body: str

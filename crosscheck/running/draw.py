@@ -1,7 +1,8 @@
 """How to draw a scene from its markers: every drawn point is a marker plus a fixed offset in the marker's axes.
 
-Rigid bodies become the box with the same mass and inertia, carried by any marker on the body; flexible bodies a line
-through the nodes that carry markers, which bends with them; wheels become discs. Markers are all that runs record, so
+Rigid bodies become the box with the same mass and inertia, carried by any marker on the body, or a ball where they have
+none; flexible bodies a line through the nodes that carry markers, which bends with them; wheels become discs, point
+masses that are fixed balls, springs coils, bushings and springs of hinges marks. Markers are all that runs record, so
 that drawing needs no mechanics; bodies without a marker are not drawn. `film.py` gives each body the markers it needs.
 """
 
@@ -15,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.records.drawing import CarriedPoint, Drawing, DrawnWheel, Line
 from flexmb.scene.bodies import ZERO, Body, RigidBody, Vector
+from flexmb.scene.connectors import BetweenNodes, HingeSpring, SpringDamper
 from flexmb.scene.schema import Marker, Scene, Wheel
 from flexmb.scene.tree import GROUND, node_frame
 from flexmb.typing import Real
@@ -39,6 +41,8 @@ def draw(scene: Scene, trails: Sequence[str] | None = None) -> Drawing:
             marker = next((each for each in markers if _turns_with(body, each, wheel)), None)
             if wheel.body == body.name and marker is not None:
                 wheels.append(_wheel(body, wheel, marker))
+    lines += _masses(scene)
+    lines += _connectors(scene)
     names = tuple(marker.name for marker in scene.markers) if trails is None else tuple(trails)
     return Drawing(lines=tuple(lines), trails=names, wheels=tuple(wheels), gravity=scene.gravity_m_s2)
 
@@ -51,10 +55,57 @@ def _rigid(scene: Scene, body: RigidBody, marker: Marker) -> list[Line]:
         return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
 
     com = np.array(body.com_m)
-    lines = [Line(body=body.name, kind="solid", points=tuple(map(carried, _corners(body))))]
+    if np.any(body.inertia_kg_m2):
+        lines = [Line(body=body.name, kind="solid", points=tuple(map(carried, _corners(body))))]
+    else:
+        lines = [Line(body=body.name, kind="ball", points=(carried(com),))] if body.mass_kg else []
     for joint in _joints(scene, body):
-        lines.append(Line(body=body.name, kind="arm", points=(carried(com), carried(joint))))
+        if np.any(joint != com):
+            lines.append(Line(body=body.name, kind="arm", points=(carried(com), carried(joint))))
     return lines
+
+
+def _masses(scene: Scene) -> list[Line]:
+    """Point masses that stay where they are; those that move become bodies in a film."""
+    found = []
+    for mass in scene.point_masses:
+        point = None if mass.directions else _carried(scene, mass.body, mass.node, mass.offset_m)
+        if point is not None:
+            found.append(Line(body=mass.name, kind="ball", points=(point,)))
+    return found
+
+
+def _connectors(scene: Scene) -> list[Line]:
+    """Connectors between nodes, and springs along hinges where these are."""
+    found = []
+    for each in scene.connectors:
+        kind, points = "mount", []
+        if isinstance(each, BetweenNodes):
+            kind = "spring" if isinstance(each, SpringDamper) else "mount"
+            points = [
+                _carried(scene, each.body_a, each.node_a, each.position_a_m),
+                _carried(scene, each.body_b, each.node_b, each.position_b_m),
+            ]
+        elif isinstance(each, HingeSpring):
+            hinges = [hinge for hinge in scene.hinges if hinge.name == each.hinge]
+            points = [_carried(scene, hinge.child, hinge.child_node, hinge.child_position_m) for hinge in hinges]
+        seen = tuple(point for point in points if point is not None)
+        if seen and len(seen) == len(points):
+            found.append(Line(body=each.name, kind=kind, points=seen))
+    return found
+
+
+def _carried(scene: Scene, body: str, node: str, offset: Vector) -> CarriedPoint | None:
+    """A point at a node of a body or of the ground; None where no marker moves with it."""
+    if body == GROUND:
+        return CarriedPoint("", offset)
+    own = next(each for each in scene.bodies if each.name == body)
+    markers = [marker for marker in scene.markers if marker.body == body]
+    marker = next((each for each in markers if isinstance(own, RigidBody) or each.node == node), None)
+    if marker is None:
+        return None
+    position, rotation = _pose(own, marker)
+    return CarriedPoint(marker.name, _vector(rotation.inv().apply(_node_point(own, node, offset) - position)))
 
 
 def _flexible(scene: Scene, body: Body, markers: list[Marker]) -> Line:
@@ -87,13 +138,9 @@ def _root_point(scene: Scene, body: Body) -> CarriedPoint | None:
     hinge = next(hinge for hinge in scene.hinges if hinge.child == body.name)
     if hinge.parent == GROUND:
         return CarriedPoint("", hinge.parent_position_m)
-    parent = next(each for each in scene.bodies if each.name == hinge.parent)
-    marker = next((each for each in scene.markers if each.body == hinge.parent), None)
-    if marker is None or not isinstance(parent, RigidBody):
+    if not isinstance(next(each for each in scene.bodies if each.name == hinge.parent), RigidBody):
         return None
-    position, rotation = _pose(parent, marker)
-    point = _node_point(parent, hinge.parent_node, hinge.parent_position_m)
-    return CarriedPoint(marker.name, _vector(rotation.inv().apply(point - position)))
+    return _carried(scene, hinge.parent, hinge.parent_node, hinge.parent_position_m)
 
 
 def _corners(body: RigidBody) -> list[Real]:
@@ -111,18 +158,18 @@ def _corners(body: RigidBody) -> list[Real]:
 
 
 def _joints(scene: Scene, body: RigidBody) -> list[Real]:
-    """Points at which hinges and closures join the body to others, in the body frame."""
+    """Points at which hinges, closures and connectors join the body to others, in the body frame."""
     points = []
     for hinge in scene.hinges:
         if hinge.child == body.name:
             points.append(_node_point(body, hinge.child_node, hinge.child_position_m))
         elif hinge.parent == body.name:
             points.append(_node_point(body, hinge.parent_node, hinge.parent_position_m))
-    for closure in scene.closures:
-        if closure.body_a == body.name:
-            points.append(_node_point(body, closure.node_a, closure.position_a_m))
-        elif closure.body_b == body.name:
-            points.append(_node_point(body, closure.node_b, closure.position_b_m))
+    for each in (*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))):
+        if each.body_a == body.name:
+            points.append(_node_point(body, each.node_a, each.position_a_m))
+        elif each.body_b == body.name:
+            points.append(_node_point(body, each.node_b, each.position_b_m))
     return points
 
 

@@ -31,7 +31,7 @@ from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
 
 Emit = Callable[[RunRecord | Confirmed | str], None]
-FULLY_STORED = 3  # the finest efforts, which the uncertainty needs in every channel
+FULLY_STORED = 4  # the finest efforts, which the uncertainty needs in every channel
 SHORT_S = 0.1  # a shorter solve is repeated, as the clock and the caches disturb it
 REPEATS = 3
 
@@ -91,12 +91,12 @@ def describe(error: BaseException) -> str:
 
 def _with_engine(engine: Engine, job: Job, scene: Scene, blank: RunRecord, emit: Emit) -> None:
     version = checked_version(engine.version())
-    support = support_of(engine, scene)
+    support = support_of(engine, scene, float(job.times[0]))
     blank = msgspec.structs.replace(blank, version=version, support=support.reason)
     if support.kind == "no":
         emit(msgspec.structs.replace(blank, status="refused", message=support.reason))
         return
-    ladder = job.efforts or efforts_of(engine, scene, float(job.times[-1]))
+    ladder = job.efforts or efforts_of(engine, scene, float(np.ptp(job.times)))
     rungs = len(ladder)
     key = _key(engine, version, job, rungs)
     chosen = [(rung, effort) for rung, effort in enumerate(ladder) if not job.finest_only or rung == rungs - 1]

@@ -11,25 +11,30 @@ import numpy as np
 
 from crosscheck.records.drawing import Drawing
 from crosscheck.running.draw import draw
-from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody, SidBody
+from flexmb.interchange.sid.blocks import SidError
+from flexmb.interchange.sid.to_body import with_sid_bodies
+from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
+from flexmb.scene.hinges import Prismatic
 from flexmb.scene.schema import Marker, Scene
-from flexmb.scene.tree import rest_frames
+from flexmb.scene.tree import coordinates, rest_frames
 
 ENGINE = "native"
 FRAMES = 161
 PIECES = 6  # of a beam, between the nodes that are filmed
 ADDED = "drawn"
+NO_INERTIA = ((0.0,) * 3,) * 3
 
 
 def film(scene: Scene) -> tuple[Scene, Drawing] | None:
-    """The scene to run and how to draw it; None where the scene's own markers show as much, or nodes are in files."""
-    if any(isinstance(body, SidBody) for body in scene.bodies):
+    """The scene to run and how to draw it; None where the scene's own markers show as much, or a SID file is bad."""
+    try:
+        filmed = _hung(with_sid_bodies(scene))
+    except (SidError, OSError):  # runs tell what is wrong with the file
         return None
     carried = {marker.body for marker in scene.markers}
-    if all(isinstance(body, RigidBody) and body.name in carried for body in scene.bodies):
+    if filmed is scene and all(isinstance(body, RigidBody) and body.name in carried for body in scene.bodies):
         return None
-    filmed = scene
-    for body in scene.bodies:
+    for body in filmed.bodies:
         filmed = _with_markers(filmed, body)
     return filmed, draw(filmed, trails=[marker.name for marker in scene.markers])
 
@@ -45,6 +50,27 @@ def film_channels(drawing: Drawing) -> tuple[str, ...]:
     for wheel in drawing.wheels:
         found += [f"marker:{wheel.marker}.angular_velocity", f"wheel_load:{wheel.name}.torque"]
     return tuple(dict.fromkeys(found))
+
+
+def _hung(scene: Scene) -> Scene:
+    """The scene with point masses that move as bodies on slides, which markers can follow, unless something names
+    them."""
+    watching = msgspec.json.encode((scene.connectors, scene.sensors, scene.events)).decode()
+    moving = [mass for mass in scene.point_masses if mass.directions and f'"{mass.name}' not in watching]
+    if not moving:
+        return scene
+    bodies, hinges = list(scene.bodies), list(scene.hinges)
+    for mass in moving:
+        place = {"parent": mass.body, "parent_node": mass.node, "parent_position_m": mass.offset_m}
+        for number, (axis, named) in enumerate(zip(mass.directions, coordinates(mass), strict=True), start=1):
+            last = number == len(mass.directions)
+            own = mass.name if last else f"{mass.name} {ADDED} {number}"
+            bodies.append(RigidBody(name=own, mass_kg=mass.mass_kg if last else 0.0, inertia_kg_m2=NO_INERTIA))
+            slide = f"{mass.name} {ADDED} {number}"
+            hinges.append(Prismatic(name=slide, child=own, axis=axis, translation=named.coordinate, **place))
+            place = {"parent": own}
+    kept = tuple(mass for mass in scene.point_masses if mass not in moving)
+    return msgspec.structs.replace(scene, bodies=tuple(bodies), hinges=tuple(hinges), point_masses=kept)
 
 
 def _with_markers(scene: Scene, body: Body) -> Scene:

@@ -261,7 +261,7 @@ def _judge(
         return Finding("refused", "the case sets no goal for this channel")
     target = reference.signals[channel]
     if rough is not None:
-        doubt = estimate(channel, "tolerance", [RungSignal(2.0, rough), RungSignal(1.0, values)], 0, target.sizes[0])
+        doubt = estimate(channel, "tolerance", [RungSignal(2.0, rough), RungSignal(1.0, values)], target.sizes[0])
         if added:
             doubt = Uncertainty(doubt.envelope + added, doubt.value + added, f"{doubt.how}; {INTERPOLATION}")
     else:

@@ -97,9 +97,13 @@ class Closures:
         c = self.constants[0]
         if algorithm == "composite":
             return matrices(c)
-        if any(LEVELS[c.body["level"][k]].at_rest for k in np.flatnonzero(c.body["modes"])):
-            return response(c)
-        return Recursion()
+        return response(c) if self.at_rest else Recursion()
+
+    @property
+    def at_rest(self) -> list[int]:
+        """Bodies whose inertia is that of their rest shape, and so not where closures join them."""
+        body = self.constants[0].body
+        return [k for k in np.flatnonzero(body["modes"]).tolist() if LEVELS[body["level"][k]].at_rest]
 
     @property
     def _own(self) -> ClosureWorkspace:
@@ -232,6 +236,10 @@ class Closures:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
         self._ranks, self._size = self._own.rank.copy(), self._own.size.copy()
+
+    def count_as(self, other: Closures) -> None:
+        """As many independent rows as the same closures have on a tree of the same freedom."""
+        self._ranks, self._size = other._ranks.copy(), other._size.copy()
 
     @property
     def rank(self) -> int:

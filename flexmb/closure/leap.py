@@ -30,7 +30,8 @@ from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
-from flexmb.integrate.leap import between
+from flexmb.integrate.control import Interval
+from flexmb.integrate.leap import cubic
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, store_slope
@@ -196,8 +197,7 @@ def _lands(t, h, y, dy, y_new, dy_new, s):
     for i in range(y.shape[0]):
         total[i] = (dy[i] + dy_new[i]) / 12.0
     for x in (INNER, 1.0 - INNER):
-        for i in range(y.shape[0]):
-            inner[i] = between(x, h, (y[i], y_new[i]), (dy[i], dy_new[i]))
+        cubic(Interval(t, t + h, t + h), y, dy, y_new, dy_new, t + x * h, inner)
         if _slope(t + x * h, inner, slope, s) != OK:
             return False
         for i in range(y.shape[0]):

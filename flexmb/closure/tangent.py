@@ -6,7 +6,8 @@
 
 The loads f of the rows stay as they are, while the directions along which they act turn with the bodies: what is
 differentiated are the tree's accelerations under J(q)'f, and the rates and accelerations of the rows. How the loads
-change, so that the rows' accelerations stay zero, then is a matter of matrices (`flexmb.linear.closed_variations`).
+change, so that the rows' accelerations stay zero, then is a matter of matrices (`flexmb.linear.closed_variations`), or
+of another evaluation (`flexmb.closure.jacobian`).
 
 As in `flexmb.entry.tangent` the kernels are compiled once more for duals; of the closures they need no pivots.
 """
@@ -17,12 +18,14 @@ import numpy as np
 
 from flexmb.closure.rows import evaluate_closure, load_on_b
 from flexmb.closure.tables import CLOSURE_STATE, ON_GROUND, ROW_STATE, ClosureConstants
+from flexmb.jain.balance import power
 from flexmb.jain.forces import add_port_force
 from flexmb.jain.kinematics import pose_sweep
+from flexmb.jain.loads import drive_loads
 from flexmb.jain.sweeps import bodies, inward, outward
 from flexmb.jit.bundle import bundle
 from flexmb.jit.duals import DUAL, rate, seeded
-from flexmb.jit.kernel import helper, kernel
+from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.jit.lanes import LANES
 from flexmb.jit.wide_arrays import as_duals
 from flexmb.motion.coordinates import load_state, store_slope
@@ -53,7 +56,7 @@ def closure_tangent_workspace(cc: ClosureConstants) -> ClosureTangentWorkspace:
 def closed_jacobian(t, y, load, J, c, w, cc, cw):
     """J (n+2G,n+1) = d[dy/dt; rows' rates; rows' accelerations]/d[y, t], at y (n,) = [q, u, work] and loads (G,).
 
-    Row by row as `flexmb.entry.tangent.jacobian` orders them, without the rate of work; the values themselves are left
+    Row by row as `flexmb.entry.tangent.jacobian` orders them; the values themselves are left
     in w.slope and cw.row. Returns a status code. Columns of prescribed coordinates and speeds vanish.
     """
     n, rows, columns = y.shape[0], cc.row.shape[0], w.column.shape[0]
@@ -70,7 +73,7 @@ def closed_jacobian(t, y, load, J, c, w, cc, cw):
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = seeded(w.state[j], lane)
-        status = _evaluate(c, w, cc, cw)
+        status = evaluate(c, w, cc, cw)
         for lane in range(count):
             j = w.column[first + lane]
             w.state[j] = y[j]
@@ -78,7 +81,7 @@ def closed_jacobian(t, y, load, J, c, w, cc, cw):
         if status != OK:
             return status
     w.time[0] = seeded(w.time[0], 0)
-    status = _evaluate(c, w, cc, cw)
+    status = evaluate(c, w, cc, cw)
     _read_column(J, n, 0, w, cw)
     return status
 
@@ -93,8 +96,8 @@ def _read_column(J, j, lane, w, cw):
         J[n + rows + r, j] = rate(cw.row[r].acceleration, lane)
 
 
-@helper
-def _evaluate(c, w, cc, cw):
+@sweep
+def evaluate(c, w, cc, cw):
     """Slope of the tree under the rows' loads, and what the rows make of it; a status code."""
     load_state(w.time[0], w.state, c, w)
     status = bodies(c, w)
@@ -109,7 +112,8 @@ def _evaluate(c, w, cc, cw):
     outward(c, w)
     for i in range(cc.closure.shape[0]):
         evaluate_closure(c, w, cc, cw, i, True)
-    store_slope(c, w, 0.0, w.slope)
+    drive_loads(c, w)
+    store_slope(c, w, power(c, w), w.slope)
     return OK
 
 

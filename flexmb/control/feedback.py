@@ -12,13 +12,13 @@ from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
 from flexmb.control.user import Called
-from flexmb.control.wiring import widest, wired
+from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR
-from flexmb.motion.retraction import move
-from flexmb.scene.control import LoadSensor
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
+from flexmb.scene.control import DriveSensor, LoadSensor
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -76,15 +76,15 @@ class Feedback:
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
-    def with_retraction(self) -> None:
+    def with_retraction(self, move: Any) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
         self._where[a.RETRACTION], _ = addresses(move, NOTHING, VECTOR, VECTOR, VECTOR, self._tables[0])
 
-    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: tuple[Any, ...]) -> Begun:
+    def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: empty, or what a `StiffProblem` needs besides: (jacobian, exact, tangent). Instants that were due before
-        the start are gone: what they put out is remembered, or zero.
+        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone: what
+        they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
@@ -104,9 +104,8 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
-        if linear:
-            jacobian, exact, tangent = linear
-            posed: Any = stiff_problem(*kernels, jacobian, loop.move, exact, tangent)
+        if linear is not None:
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move))
         else:
             posed = problem(*kernels)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
@@ -115,9 +114,31 @@ class Feedback:
 
     def look(self, begin: Starting) -> None:
         """At one state, as at the only sample of a run that is over."""
+        self._only_at(begin)
+
+    def accelerations(self, begin: Starting) -> Real:
+        """(nu,) at one state, under what controllers say there."""
+        y, nq, nu = self._only_at(begin), self._plant.nq, self._plant.nu
+        slope = np.empty(len(y))
+        loop.rhs(begin.state.t, y, slope, self.running, self.running)
+        self.raise_trouble()
+        return slope[nq : nq + nu]
+
+    def _only_at(self, begin: Starting) -> Real:
         t = begin.state.t
-        self.begin(begin, Clock(np.array([t]), np.array([np.nextafter(t, np.inf)])), Accuracy(0.0, 0.0, 0, 0), ())
+        clock = Clock(np.array([t]), np.array([np.nextafter(t, np.inf)]))
+        y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.replay()
+        return y
+
+    def place_of(self, signal: str) -> int:
+        """The number of a signal, "gyro[2]", among all of them."""
+        return numbers_of(self._wiring.names, signal)[0]
+
+    def watching(self, watch: Watch) -> Watch:
+        """The same that finds these signals: of a run that was begun."""
+        look = pointer(loop.look, STATUS, REAL, VECTOR, VECTOR, self.running)
+        return watch._replace(signal=np.zeros(len(self.running.signal)), look=look)
 
     def remember(self) -> LoopMemory:
         """At the end of a run, before it is replayed."""
@@ -208,12 +229,12 @@ class Feedback:
     @property
     def _has_markers(self) -> bool:
         kinds = self._wiring.sensor["kind"]
-        seen = (kinds >= a.POSITION) & (kinds <= a.ANGULAR_VELOCITY)
+        seen = (kinds >= a.POSITION) & (kinds <= a.DISTANCE)
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
     def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
         """NotImplementedError for loads that this algorithm does not have in compiled code."""
-        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor)]
+        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor | DriveSensor)]
         if loads and (algorithm.observing is None or self._plant.scene.closures):
             raise NotImplementedError(
                 f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
@@ -258,7 +279,7 @@ class Feedback:
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
             dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
-            doubt=self._doubt, **self._held,
+            drives=out.drives, doubt=self._doubt, **self._held,
         )  # fmt: skip
 
 

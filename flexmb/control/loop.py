@@ -88,6 +88,16 @@ def hold(t, y, s):
     return _set(t, s)
 
 
+@kernel
+def look(t, y, signal, s):
+    """All signals (S,) at t and y, between instants; a status code."""
+    _take(y, s)
+    status = _look(t, s)
+    for i in range(signal.shape[0]):
+        signal[i] = s.signal[i]
+    return status
+
+
 @helper
 def _set(t, s):
     """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""

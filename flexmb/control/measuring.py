@@ -4,7 +4,7 @@ from flexmb.control import tables as a
 from flexmb.jit.direct import nothing_at
 from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import sqrt
-from flexmb.spatial.vector import mat3, store3, sub, times_t, vec3
+from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
 from flexmb.tables.functions import evaluate
 
 _R, _VELOCITY, _ACCELERATION = 3, 12, 18  # places in the row of a marker
@@ -61,10 +61,22 @@ def _measure(t, i, s):
     elif kind == a.LOAD:
         for n in range(6):
             s.signal[first + n] = s.loads[place, n]
+    elif kind == a.DRIVE_LOAD:
+        s.signal[first] = s.drives[place] if place >= 0 else 0.0
+    elif kind == a.DISTANCE:
+        s.signal[first], s.signal[first + 1] = _distance(s.markers[place], s.markers[sensor.axes])
     elif kind == a.ORIENTATION:
         _store_quaternion(s.markers[place], s.signal, first)
     else:
         _store_vector(kind, sensor.axes, s.markers[place], s, first)
+
+
+@helper
+def _distance(row_a, row_b):
+    """Of two markers, and its rate; where they are at one place the rate is that of a distance that grows."""
+    along, moving = sub(vec3(row_b, 0), vec3(row_a, 0)), sub(vec3(row_b, _VELOCITY + 3), vec3(row_a, _VELOCITY + 3))
+    length = sqrt(dot(along, along))
+    return length, dot(along, moving) / length if length > 0.0 else sqrt(dot(moving, moving))
 
 
 @helper

@@ -24,18 +24,27 @@ def instants(controllers: Sequence[Controller], t_start: float, t_end: float, fi
     """INSTANT records up to t_end (s), in time; where one comes together with a `fixed` time (s) it is that.
 
     They are counted from t = 0, those before t_start (s) included, so that a run can be taken up. Of one time, what was
-    waiting is applied first, then controllers act in the order of the scene. ValueError for more than MOST.
+    waiting is applied first, then controllers act in the order of the scene. Samples have rows from 0 in the order in
+    which they are taken, so that a run that goes on farther finds the same ones. ValueError for more than MOST.
     """
     parts = [_of_one(i, controller, t_end) for i, controller in enumerate(controllers) if controller.period_s]
     if not parts:
         return np.zeros(0, INSTANT)
-    first = np.cumsum([0, *(int(np.sum(part["kind"] == SAMPLE)) for part in parts)])
-    for part, start in zip(parts, first[:-1], strict=True):
-        part["row"] += start
     table = np.concatenate(parts)
     table["time"] = _together(table["time"], np.array([t_start, *fixed, t_end]), slack(t_start, t_end))
     table = table[table["time"] <= t_end]
-    return table[np.lexsort((table["controller"], table["kind"] == SAMPLE, table["time"]))]
+    table = table[np.lexsort((table["controller"], table["kind"] == SAMPLE, table["time"]))]
+    _number(table)
+    return table
+
+
+def _number(table: Record) -> None:
+    """Rows of samples as they come, in place of those counted for each controller; outputs have their samples'."""
+    sampled = table["kind"] == SAMPLE
+    rows = np.cumsum(sampled) - 1
+    for controller in np.unique(table["controller"]):
+        own = table["controller"] == controller
+        table["row"][own] = rows[own & sampled][table["row"][own]]
 
 
 def _of_one(i: int, controller: Controller, t_end: float) -> Record:

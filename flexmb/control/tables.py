@@ -12,8 +12,8 @@ import numpy as np
 from flexmb.jit.bundle import bundle
 from flexmb.typing import Index, Real, Record
 
-COORDINATE, RATE, POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY, TIME, PROFILE = range(8)
-ACCELERATION, ANGULAR_ACCELERATION, SPECIFIC_FORCE, LOAD = range(8, 12)
+COORDINATE, RATE, POSITION, ORIENTATION, VELOCITY, ANGULAR_VELOCITY, DISTANCE, TIME, PROFILE = range(9)
+ACCELERATION, ANGULAR_ACCELERATION, SPECIFIC_FORCE, LOAD, DRIVE_LOAD = range(9, 14)
 AT_ONCE = ACCELERATION  # sensors of this kind and after depend on the forces of the same instant
 WORLD, OWN = range(2)  # axes of a marker sensor
 
@@ -35,8 +35,8 @@ SENSOR = _record(
     ("kind", _I),
     ("signal", _I),  # its first signal
     ("width", _I),
-    ("place", _I),  # in y, or the number of a marker, hinge or function
-    ("axes", _I),  # WORLD or OWN
+    ("place", _I),  # in y, or the number of a marker, hinge, function or prescribed speed; -1 of one that is free
+    ("axes", _I),  # WORLD or OWN; of a distance the other marker
 )
 CONTROLLER = _record(
     ("law", _I),
@@ -102,4 +102,5 @@ class Loop:
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
     loads: Real  # (N,6)
+    drives: Real  # (nu,)
     doubt: Index  # (1,) of the mechanics' workspace

@@ -16,6 +16,8 @@ from flexmb.scene.check.control import named, output_width
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
+    DriveSensor,
     GainTable,
     LoadSensor,
     MarkerSensor,
@@ -28,6 +30,7 @@ from flexmb.scene.control import (
     UserLaw,
 )
 from flexmb.scene.convert import ROOT, label
+from flexmb.scene.tree import rate_name, scalar_paths
 from flexmb.system.tree_system import System
 from flexmb.tables.functions import pack
 from flexmb.typing import Index, Real, Record
@@ -73,7 +76,7 @@ def wired(system: System) -> Wiring:
     follows, continuous, outputs = False, list[float](), 0
     plain: dict[int, Callable[..., None]] = {}
     for i, (row, each) in enumerate(zip(record, scene.controllers, strict=True)):
-        inputs = [n for reference in each.inputs for n in _signals(names, reference)]
+        inputs = [n for reference in each.inputs for n in numbers_of(names, reference)]
         width = output_width(each, len(inputs)) or 0
         first = max((place.stop for place in names.values()), default=0)
         names[each.name] = slice(first, first + width)
@@ -100,7 +103,7 @@ def wired(system: System) -> Wiring:
         outputs += width
     drive = np.zeros(len(system.signals), a.DRIVE)
     for row, (function, signal) in zip(drive, system.signals.items(), strict=True):
-        row["function"], row["signal"], row["gain"] = function, _signals(names, signal.source)[0], signal.gain
+        row["function"], row["signal"], row["gain"] = function, numbers_of(names, signal.source)[0], signal.gain
     return Wiring(
         sensor, record, np.array(wire, np.int64), np.array(number, float), drive, course, piece,
         np.array(initial, float), names, np.array(continuous, float), follows, plain,
@@ -136,14 +139,25 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
             axes = a.WORLD if frame == "world" else a.OWN
             width = 4 if quantity == "orientation" else 3
             return _QUANTITIES[quantity], list(observed.markers).index(marker), width, axes
+        case DistanceSensor(marker_a=one, marker_b=other):
+            return a.DISTANCE, list(observed.markers).index(one), 2, list(observed.markers).index(other)
         case LoadSensor(hinge=hinge):
             return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
+        case DriveSensor(coordinate=coordinate):
+            return a.DRIVE_LOAD, _driven(system, coordinate), 1, a.WORLD
         case TimeSensor():
             return a.TIME, 0, 1, a.WORLD
     return a.PROFILE, 0, 2, a.WORLD
 
 
-def _signals(names: dict[str, slice], reference: str) -> list[int]:
+def _driven(system: System, coordinate: str) -> int:
+    """The number of its speed, -1 where it is free."""
+    rate = rate_name(coordinate, scalar_paths(system.scene)[coordinate])
+    number = [name for name, _ in system.state_names[1]].index(rate)
+    return number if system.constants.speed["prescribed"][number] >= 0 else -1
+
+
+def numbers_of(names: dict[str, slice], reference: str) -> list[int]:
     """Numbers of the signals that a reference names; ValueError for a number that there is not."""
     at = named(reference)
     assert at is not None  # the scene was checked

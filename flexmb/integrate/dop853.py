@@ -31,9 +31,9 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -155,50 +155,11 @@ def store_samples(problem, step, y, s, times, out, counts):
 
 
 @helper
-def fraction_at(y, f, entry, level, side):
-    """The fraction of the step at which the interpolant has come to a level that it crosses, to rounding."""
-    low, high = 0.0, 1.0
-    while True:
-        x = 0.5 * (low + high)
-        if x <= low or x >= high:
-            return high
-        value = 0.0
-        for row in range(6, -1, -1):
-            value = (value + f[row, entry]) * (x if row % 2 == 0 else 1.0 - x)
-        if crosses(side, (y[entry] - level) + value, 0):
-            high = x
-        else:
-            low = x
-
-
-@helper
-def end_at_crossing(problem, step, y, s, times, out, counts, watch):
-    """y, and the samples before it, at the first level that the interpolant of the step crosses.
-
-    Returns (CROSSED, the time), or the status of a stage that fails.
-    """
-    h, trial = step.end - step.start, np.empty(y.shape[0])
-    status = interpolant(problem, step, y, s, trial, counts)
-    if status != OK:
-        return status, step.start
-    x, first = 2.0, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            found = fraction_at(y, s.f, watch.entry[i], watch.level[i], watch.side[i])
-            if found < x:
-                x, first = found, i
-    t = min(step.start + x * h, step.end)
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        sample = counts[SAMPLES]
-        interpolate(y, s.f, (times[sample] - step.start) / h, out[sample])
-        problem.project(times[sample], out[sample], problem.constants)
-        counts[SAMPLES] = sample + 1
-    interpolate(y, s.f, x, trial)
-    problem.project(t, trial, problem.constants)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
+def state_at(problem, step, ends, s, t, result, run):
+    """The state inside a step whose interpolant is built, projected; see `flexmb.integrate.watch`."""
+    interpolate(ends.y, s.f, (t - step.start) / (step.end - step.start), result)
+    problem.project(t, result, problem.constants)
+    return OK
 
 
 @helper
@@ -213,6 +174,20 @@ def attempt(problem, step, y, s, accuracy, counts):
         problem.project(step.end, s.y_new, problem.constants)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.k[END], counts)
     return status, error
+
+
+@helper
+def pause_within(problem, watch, step, leapt, y, s, samples, run):
+    """y at the first level that a step, or a leap, comes to: (CROSSED, the time); (OK, .) where it comes to none."""
+    ends, trial = Ends(y, s.k[0], s.y_new, s.k[END]), np.empty(y.shape[0])
+    if leapt:
+        return pause(problem, watch, step, ends, in_leap, OK, samples, run)
+    status, some = meets(problem, watch, step, ends)
+    if status == OK and some:
+        status = interpolant(problem, step, y, s, trial, run[1])
+    if status != OK or not some:
+        return status, step.start
+    return end_at_crossing(Within(problem, watch, step, ends, state_at, s, trial, run), samples[0], samples[1])
 
 
 @kernel
@@ -250,13 +225,16 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
                 if far > 0.0:
                     t_new, length, status, error = t + far, far, OK, CALM
                     step, leapt = Interval(t, t_new, last), True
-                    store_leapt(step, y, s.k[0], s.y_new, s.k[END], times, out, counts)
             accepted = status == OK and error < 1.0
             if accepted:
-                # a level that is crossed within a leap is found at its end, by the step that follows
-                if watch is not None and not leapt and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
-                status = store_samples(problem, step, y, s, times, out, counts)
+                if watch is not None:
+                    status, t_at = pause_within(problem, watch, step, leapt, y, s, (times, out), (accuracy, counts))
+                    if status != OK:
+                        return status, t_at
+                if leapt:
+                    store_leapt(step, y, s.k[0], s.y_new, s.k[END], times, out, counts)
+                else:
+                    status = store_samples(problem, step, y, s, times, out, counts)
                 if status != OK:
                     return status, t
                 factor = step_factor(error, error_before, ERROR_EXPONENT, rejected)

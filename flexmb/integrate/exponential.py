@@ -20,6 +20,7 @@ import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
+    CALM,
     FACTORISATIONS,
     REJECTED,
     SAMPLES,
@@ -37,9 +38,11 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.settling import prepare_settling, settle
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -52,6 +55,7 @@ WITHOUT_MIDDLE = np.array([0.0, -3.0 / 16.0, 19.0 / 8.0, -12.0, 24.0])
 
 _SWEEPS = 8  # of the iteration, at most
 _CONVERGED = 0.02  # what the iteration may leave, in units of the tolerance
+RATE = 4.0  # per step, at which settles what projection has moved: within the step
 _ERROR_EXPONENT = 5.0  # the error estimate is O(h^5)
 
 
@@ -75,6 +79,9 @@ class Collocation(NamedTuple):
     error: np.ndarray
     term: np.ndarray
     product: np.ndarray
+    real: np.ndarray
+    real_pivots: np.ndarray
+    change: np.ndarray
 
 
 @helper
@@ -180,62 +187,45 @@ def attempt(problem, step, y, s, accuracy, counts):
         s.y_new[i] = y[i] + s.flow.scale[i] * s.x[3, i]
     error = estimate(y, s, accuracy)
     if error < 1.0:
-        problem.project(step.end, s.y_new, problem.constants)
+        prepare_settling(problem, RATE / (step.end - step.start), s)
+        settle(problem, step.end, RATE / (step.end - step.start), s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error
 
 
 @helper
-def state_at(problem, step, y, s, t, result):
+def state_at(problem, step, y, s, t, accuracy, result):
     """The state inside a step, by the exact flow under the same polynomial, projected."""
     theta = (t - step.start) / (step.end - step.start)
     at_fraction(s.flow, s.v, s.X, s.x, theta, result, s.term, s.product)
     for i in range(y.shape[0]):
         result[i] = y[i] + s.flow.scale[i] * result[i]
-    problem.project(t, result, problem.constants)
+    settle(problem, t, RATE / (step.end - step.start), result, s, accuracy)
 
 
 @helper
-def store_samples(problem, step, y, s, times, out, counts):
+def inside(problem, step, ends, s, t, result, run):
+    """The same as `flexmb.integrate.watch` asks for it."""
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
+    return OK
+
+
+@helper
+def store_samples(problem, step, y, s, samples, accuracy, counts):
     """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
+
+    samples: (times, states).
     """
+    times, out = samples
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            state_at(problem, step, y, s, times[sample], out[sample])
+            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
-
-
-@helper
-def end_at_crossing(problem, step, y, s, times, out, counts, watch):
-    """y, and the samples before it, at the first level that the flow of the step crosses; (CROSSED, the time)."""
-    trial, t, first = np.empty(y.shape[0]), step.end, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, trial)
-                if crosses(watch.side[i], trial[entry] - level, 0):
-                    high = middle
-                else:
-                    low = middle
-            if high <= t:
-                t, first = high, i
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
-        counts[SAMPLES] += 1
-    if t < step.end:
-        state_at(problem, step, y, s, t, trial)
-    else:
-        copy(s.y_new, trial)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
 
 
 @helper
@@ -248,7 +238,7 @@ def scratch(n):
     return Collocation(
         flow, np.empty(n), np.empty((n, n)), np.empty((TERMS, n)), np.empty((TERMS, n)), np.empty((LEVELS, TERMS, n)),
         np.empty((LEVELS, TERMS, n)), np.empty((4, n)), np.empty((4, n)), np.empty((4, n)), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n), np.empty(n), np.empty((n, n)), np.empty(n, np.int64), np.empty(n),
     )  # fmt: skip
 
 
@@ -256,8 +246,8 @@ def scratch(n):
 def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`. Where the iteration does not converge, the step is
-    halved.
+    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where the iteration does not
+    converge, the step is halved.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
@@ -288,12 +278,25 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             counts[FACTORISATIONS] += 1
             if prepare(s.flow, s.J, length):
                 status, error = attempt(problem, step, y, s, accuracy, counts)
-            trouble = reason(status)
+            trouble, leapt = reason(status), False
+            if may_leap(status):
+                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
+                if far > 0.0:
+                    t_new, length, status, error = t + far, far, OK, CALM
+                    step, leapt = Interval(t, t_new, last), True
             accepted = status == OK and error < 1.0
             if accepted:
-                if watch is not None and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
-                store_samples(problem, step, y, s, times, out, counts)
+                if watch is not None:
+                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                    if leapt:
+                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                    else:
+                        status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    if status != OK:
+                        return status, t_at
+                if leapt:
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
+                store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)
                 t, error_before = t_new, error

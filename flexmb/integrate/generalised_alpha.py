@@ -32,6 +32,7 @@ from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import DONE, FACTORED, FRESH, STRETCH, TAKEN_UP, begin, keep_place
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
 
@@ -168,6 +169,27 @@ def step_once(problem, step, y, h, h_factored, s, accuracy, counts):
 
 
 @helper
+def finish(problem, step, y, s, result, controlled):
+    """The state at the end of a step that was made, with its quadratures, projected."""
+    h = step.end - step.start
+    for i in range(controlled):
+        result[i] = s.y_new[i]
+    for i in range(controlled, y.shape[0]):
+        result[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
+    problem.project(step.end, result, problem.constants)
+
+
+@helper
+def inside(problem, step, ends, s, t, result, run):
+    """The state within a step, by a shorter one from the same start with a Jacobian of its own."""
+    accuracy, counts = run
+    shorter = Interval(step.start, t, step.last)
+    status, _ = step_once(problem, shorter, ends.y, t - step.start, 0.0, s, accuracy, counts)
+    finish(problem, shorter, ends.y, s, result, accuracy.controlled)
+    return status
+
+
+@helper
 def keep_slopes(memory, s, at_start, h_factored):
     """What only this method knows before a step: Jacobian, slopes, a."""
     n, nu = s.f.shape[0], s.a.shape[0]
@@ -239,6 +261,15 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
                 status, h_factored = step_once(problem, step, y, h, h_factored, s, accuracy, counts)
                 if status != OK:
                     return status, t
+                if watch is not None:
+                    whole = np.empty(n)
+                    finish(problem, step, y, s, whole, controlled)
+                    ends, samples, run = Ends(y, s.f.copy(), whole, s.f_new.copy()), (times, out), (accuracy, counts)
+                    status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    if status == OK and t_at == t_new:  # it was looked into: what it left is made again
+                        status, h_factored = step_once(problem, step, y, h, 0.0, s, accuracy, counts)
+                    if status != OK:
+                        return status, t_at
                 for i in range(controlled, n):
                     s.y_new[i] = y[i] + 0.5 * h * (s.f[i] + s.f_new[i])
                 t = t_new
@@ -259,7 +290,7 @@ def generalised_alpha(problem, y, clock, accuracy, out, counts, memory, watch):
 
 
 INTEGRATOR = Integrator(
-    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True, pauses=False,
+    "generalised_alpha", generalised_alpha, order=2, fixed=True, linearises=True, keeps_jacobian=True,
     damps=True, algebra=(2.0 / 3.0, 2.0),
     summary="rough answers at large steps, with damping that is chosen",
 )  # fmt: skip

@@ -34,8 +34,6 @@ class Integrator:
     """It takes equal steps, not longer than `step`; others choose theirs by rtol and atol."""
     linearises: bool = False
     """It needs Jacobians."""
-    pauses: bool = True
-    """It finds where a level of a `Watch` is crossed."""
     keeps_jacobian: bool = False
     """Its next step needs the Jacobian of an earlier one: rows of `Memory` are it and three more."""
     damps: bool = False

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
 from flexmb.jit.kernel import helper
-from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR
+from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # about as often a leap evaluates equations of motion
 
@@ -30,23 +30,31 @@ def leap(problem, end, y, dy, y_new, dy_new, counts):
 
 
 @helper
-def between(x, h, y, dy):
-    """The value of Hermite's cubic at the fraction x of an interval h, from values and slopes at both its ends."""
-    change = y[1] - y[0]
-    bend = (1.0 - x) * (h * dy[0] - change) - x * (h * dy[1] - change)
-    return y[0] + x * (change + (1.0 - x) * bend)
+def cubic(step, y, dy, y_new, dy_new, t, result):
+    """The state within a leap, by Hermite's cubic: it is much shorter than a step."""
+    h = step.end - step.start
+    x = (t - step.start) / h
+    for i in range(y.shape[0]):
+        change = y_new[i] - y[i]
+        bend = (1.0 - x) * (h * dy[i] - change) - x * (h * dy_new[i] - change)
+        result[i] = y[i] + x * (change + (1.0 - x) * bend)
+
+
+@helper
+def in_leap(problem, step, ends, s, t, result, run):
+    """The state within a leap, as `flexmb.integrate.watch` asks for it."""
+    cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)
+    return OK
 
 
 @helper
 def store_leapt(step, y, dy, y_new, dy_new, times, out, counts):
-    """Store the samples in a leap by Hermite's cubic: it is much shorter than a step."""
-    h, sample = step.end - step.start, counts[SAMPLES]
+    """Store the samples in a leap."""
+    sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(y_new, out[sample])
         else:
-            x = (times[sample] - step.start) / h
-            for i in range(y.shape[0]):
-                out[sample, i] = between(x, h, (y[i], y_new[i]), (dy[i], dy_new[i]))
+            cubic(step, y, dy, y_new, dy_new, times[sample], out[sample])
         sample += 1
     counts[SAMPLES] = sample

@@ -37,7 +37,7 @@ class StiffProblem(NamedTuple):
 
     jacobian(t, y, J, exact, tangent) puts df/dy (n,n) into J and returns a status code.
     move(y, increment, result, constants) puts y = [q, u, ...] with q o exp(increment) into result, for methods on Lie
-    groups; increment (nu,).
+    groups; increment (nu,). settles: whether `project` moves what is stiff: see `flexmb.integrate.settling`.
     """
 
     rhs: Pointer
@@ -50,6 +50,7 @@ class StiffProblem(NamedTuple):
     move: Pointer
     exact: AnyBundle
     tangent: AnyBundle
+    settles: bool
 
 
 class Clock(NamedTuple):
@@ -98,6 +99,16 @@ class Leaping(NamedTuple):
     watch_steps: Callable[[Any], None]
 
 
+class Linear(NamedTuple):
+    """What a `StiffProblem` has that a `Problem` has not: kernels jacobian and move, bundles exact and tangent."""
+
+    jacobian: Any
+    move: Any
+    exact: Any
+    tangent: Any
+    settles: bool = False
+
+
 @kernel
 def _no_way_back(y, constants):
     return -math.inf
@@ -124,13 +135,15 @@ def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Lea
 
 
 def stiff_problem(
-    rhs: Any, project: Any, constants: Any, workspace: Any, jacobian: Any, move: Any, exact: Any, tangent: Any
+    rhs: Any, project: Any, constants: Any, workspace: Any, linear: Linear, leaping: Leaping | None = None
 ) -> StiffProblem:
     """Likewise."""
+    jacobian, move, exact, tangent, settles = linear
     return StiffProblem(
-        *problem(rhs, project, constants, workspace),
+        *problem(rhs, project, constants, workspace, leaping),
         pointer(jacobian, STATUS, REAL, VECTOR, MATRIX, exact, tangent),
         pointer(move, NOTHING, VECTOR, VECTOR, VECTOR, constants),
         AnyBundle(exact),
         AnyBundle(tangent),
+        settles,
     )

@@ -31,10 +31,12 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.settling import settle
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -68,6 +70,7 @@ class RadauStages(NamedTuple):
     f_new: np.ndarray
     error: np.ndarray
     trial: np.ndarray
+    change: np.ndarray
 
 
 @helper
@@ -217,60 +220,40 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
         if status == OK:
             error = estimate(y, s.f_new, h, s, accuracy)
     if status == OK and error < 1.0:
-        problem.project(step.end, s.y_new, problem.constants)
+        settle(problem, step.end, REAL / h, s.y_new, s, accuracy)
         status = derivative(problem, min(step.end, step.last), s.y_new, s.f_new, counts)
     return status, error, iterations, rate
 
 
 @helper
-def state_at(problem, step, y, s, t, result):
+def state_at(problem, step, y, s, t, accuracy, result):
     """The state inside a step, by the collocation polynomial, projected."""
     evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
     for i in range(y.shape[0]):
         result[i] += y[i]
-    problem.project(t, result, problem.constants)
+    settle(problem, t, REAL / (step.end - step.start), result, s, accuracy)
 
 
 @helper
-def store_samples(problem, step, y, s, times, out, counts):
-    """Store the samples in the step, its end included."""
+def inside(problem, step, ends, s, t, result, run):
+    """The same as `flexmb.integrate.watch` asks for it."""
+    accuracy, _ = run
+    state_at(problem, step, ends.y, s, t, accuracy, result)
+    return OK
+
+
+@helper
+def store_samples(problem, step, y, s, samples, accuracy, counts):
+    """Store the samples in the step, its end included; samples: (times, states)."""
+    times, out = samples
     sample = counts[SAMPLES]
     while sample < times.shape[0] and times[sample] <= step.end:
         if times[sample] == step.end:
             copy(s.y_new, out[sample])
         else:
-            state_at(problem, step, y, s, times[sample], out[sample])
+            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
         sample += 1
     counts[SAMPLES] = sample
-
-
-@helper
-def end_at_crossing(problem, step, y, s, times, out, counts, watch):
-    """y, and the samples before it, at the first level that the polynomial of the step crosses; (CROSSED, the time)."""
-    trial, t, first = np.empty(y.shape[0]), step.end, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, s.y_new):
-            entry, level, low, high = watch.entry[i], watch.level[i], step.start, step.end
-            while low < 0.5 * (low + high) < high:
-                middle = 0.5 * (low + high)
-                state_at(problem, step, y, s, middle, trial)
-                if crosses(watch.side[i], trial[entry] - level, 0):
-                    high = middle
-                else:
-                    low = middle
-            if high <= t:
-                t, first = high, i
-    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
-        state_at(problem, step, y, s, times[counts[SAMPLES]], out[counts[SAMPLES]])
-        counts[SAMPLES] += 1
-    if t < step.end:
-        state_at(problem, step, y, s, t, trial)
-    else:
-        copy(s.y_new, trial)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t
 
 
 @helper
@@ -315,7 +298,7 @@ def scratch(n):
         np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
         np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
         np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n),
+        np.empty(n), np.empty(n),
     )  # fmt: skip
 
 
@@ -330,8 +313,8 @@ def after_acceptance(h, length, cut, factor, rejected, worn):
 def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
-    The retreat from a failing right-hand side is that of `dop853`. Where Newton's method does not converge, an old
-    Jacobian is renewed, then the step is halved.
+    The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where Newton's method does not
+    converge, an old Jacobian is renewed, then the step is halved.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
@@ -369,14 +352,34 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                     problem, step, y, s, rejected or h_before == 0.0, accuracy, counts
                 )
             trouble = reason(status)
+            if may_leap(status):
+                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
+                if far > 0.0:
+                    step = Interval(t, t + far, last)
+                    if watch is not None:
+                        ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                        if status != OK:
+                            return status, t_at
+                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
+                    # beyond it everything begins anew
+                    t, h, h_factored, h_before, error_before = t + far, far, 0.0, 0.0, 0.0
+                    renew, fresh, rejected = True, False, False
+                    copy(s.y_new, y)
+                    copy(s.f_new, s.f)
+                    counts[ACCEPTED] += 1
+                    continue
             factor = 1.0
             if status == OK:
                 caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
-                if watch is not None and is_crossed(watch, s.y_new):
-                    return end_at_crossing(problem, step, y, s, times, out, counts, watch)
-                store_samples(problem, step, y, s, times, out, counts)
+                if watch is not None:
+                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
+                    status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    if status != OK:
+                        return status, t_at
+                store_samples(problem, step, y, s, (times, out), accuracy, counts)
                 renew = iterations > 2 and rate > _SLOW
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)

@@ -20,9 +20,9 @@ from flexmb.integrate.control import (
     stretch,
 )
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.leap import leap, may_leap, store_leapt
+from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
-from flexmb.integrate.watch import CROSSED, crosses, crosses_one, is_crossed, note
+from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel, written_out
 from flexmb.tables.status import NONFINITE, OK
 
@@ -53,57 +53,22 @@ def rk4_step(problem, t, last, y, h, k, trial, counts):
 
 
 @helper
-def end_at_crossing(problem, step, y, k, trial, counts, watch):
-    """y at the first level that a step crosses, by shorter steps from the same start.
-
-    The regula falsi of Illinois for each level, halving where the step starts at it; a shorter step is as accurate as
-    the whole one. Returns (status, the time): CROSSED, or the status of a stage that fails.
-    """
-    t, last, h = step.start, step.last, step.end - step.start
-    whole, shortest, first = trial.copy(), h, 0
-    for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, whole):
-            entry, level = watch.entry[i], watch.level[i]
-            low, high = 0.0, h
-            below, above = y[entry] - level, whole[entry] - level
-            last_side = 0
-            while above != 0.0 and high - low > 4.0 * (np.nextafter(t + high, math.inf) - (t + high)):
-                middle = 0.5 * (low + high)
-                if crosses(watch.side[i], above, 0) and not crosses(watch.side[i], below, 0):
-                    middle = low + (high - low) * below / (below - above)
-                    middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
-                status = rk4_step(problem, t, last, y, middle, k, trial, counts)
-                if status != OK:
-                    return status, t
-                value = trial[entry] - level
-                if crosses(watch.side[i], value, 0):
-                    high, above = middle, value
-                    below = 0.5 * below if last_side > 0 else below
-                    last_side = 1
-                else:
-                    low, below = middle, value
-                    above = 0.5 * above if last_side < 0 else above
-                    last_side = -1
-            if high <= shortest:
-                shortest, first = high, i
-    status = rk4_step(problem, t, last, y, shortest, k, trial, counts)
-    if status != OK:
-        return status, t
-    problem.project(t + shortest, trial, problem.constants)
-    note(watch, first, trial)
-    copy(trial, y)
-    counts[ACCEPTED] += 1
-    return CROSSED, t + shortest
+def inside(problem, step, ends, k, t, result, run):
+    """The state within a step, by a shorter one from the same start, which is as accurate as the whole one."""
+    status = rk4_step(problem, step.start, step.last, ends.y, t - step.start, k, result, run[1])
+    if status == OK:
+        problem.project(t, result, problem.constants)
+    return status
 
 
 @helper
-def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
+def _detour(problem, watch, trouble, step, y, scratch, output, run):
     """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
 
     Returns a status code and the time of y, which is again the last good state. scratch: slopes (4,n) and a state (n,);
-    output: times of samples, and samples.
+    output: times of samples, and samples; run: accuracy and counts. CROSSED, and the time, where it comes to a level.
     """
-    (k, trial), (times, out), target, last = scratch, output, step.end, step.last
+    (k, trial), (times, out), target, last, (accuracy, counts) = scratch, output, step.end, step.last, run
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
@@ -114,7 +79,13 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
             return status, t
         far = leap(problem, last, y, k[0], trial, k[1], counts) if failed else 0.0
         if far > 0.0:
-            store_leapt(Interval(t, t + far, last), y, k[0], trial, k[1], times, out, counts)
+            leapt = Interval(t, t + far, last)
+            if watch is not None:
+                ends = Ends(y, k[0], trial, k[1])
+                status, t_at = pause(problem, watch, leapt, ends, in_leap, OK, output, run)
+                if status != OK:
+                    return status, t_at
+            store_leapt(leapt, y, k[0], trial, k[1], times, out, counts)
             t, h = t + far, far
         else:
             status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
@@ -123,7 +94,7 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
             status = rk4_step(problem, t, last, y, t_new - t, k, trial, counts)
             if status == OK:
                 problem.project(t_new, trial, problem.constants)
-                status = derivative(problem, min(t_new, last), trial, k[0], counts)
+                status = derivative(problem, min(t_new, last), trial, k[3], counts)
             if status != OK and not may_leap(status):
                 return status, t
             failed = status != OK
@@ -131,6 +102,11 @@ def _detour(problem, trouble, step, y, scratch, output, accuracy, counts):
                 trouble, h = status, RETREAT * h
                 counts[REJECTED] += 1
                 continue
+            if watch is not None:
+                ends = Ends(y, k[0], trial, k[3])
+                status, t_at = pause(problem, watch, Interval(t, t_new, last), ends, inside, k, output, run)
+                if status != OK:
+                    return status, t_at
             t, h = t_new, 2.0 * h
         copy(trial, y)
         counts[ACCEPTED] += 1
@@ -160,13 +136,17 @@ def rk4(problem, y, clock, accuracy, out, counts, memory, watch):
                 status = rk4_step(problem, t, last, y, h, k, trial, counts)
                 if may_leap(status):
                     failed = Interval(t, min(t + h, end), last)
-                    status, t = _detour(problem, status, failed, y, (k, trial), (times, out), accuracy, counts)
+                    scratch, output = (k, trial), (times, out)
+                    status, t = _detour(problem, watch, status, failed, y, scratch, output, (accuracy, counts))
                     if status == OK:
                         break
                 if status != OK:
                     return status, t
-                if watch is not None and is_crossed(watch, trial):
-                    return end_at_crossing(problem, Interval(t, t + h, last), y, k, trial, counts, watch)
+                if watch is not None:  # the last stage's slope is nearly that at the end
+                    step, ends = Interval(t, t + h, last), Ends(y, k[0], trial, k[3])
+                    status, t_at = pause(problem, watch, step, ends, inside, k, (times, out), (accuracy, counts))
+                    if status != OK:
+                        return status, t_at
                 t = end if j == steps - 1 else start + (j + 1) * h
                 copy(trial, y)
                 problem.project(t, y, problem.constants)

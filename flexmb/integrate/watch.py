@@ -1,34 +1,87 @@
-"""Places where a run pauses: where an entry of the state crosses a level, in the step or in its dense output.
+"""Places where a run pauses: where an entry of the state, or a signal, comes to a level, in a step's dense output.
 
-A run pauses at the first of several levels that a step crosses. What crosses a level and comes back within a step is
-not seen, as steps resolve the motion, unless the step starts at the level: what flies off and comes back at once is.
+A run pauses at the first of several levels that a step reaches. What is on another side of its level after a step has
+come to it. What is on the same side may have been beyond it in between: where it moves towards the level at the step's
+start and away from it at its end, its turning point is looked for. So what turns once within a step is seen; of what
+turns twice, the motion there and back between both turns is not.
+
+An integrator says what a step is: `Ends`, and a helper `state_at(problem, step, ends, s, t, result, run)` that puts the
+state at a time t (s) within it into `result` (n,) and returns a status code; s is whatever that helper needs.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from flexmb.jit.kernel import helper
+from flexmb.integrate.control import ACCEPTED, SAMPLES, Interval, copy
+from flexmb.integrate.problem import Accuracy
+from flexmb.jit.bundle import AnyBundle
+from flexmb.jit.kernel import helper, kernel, sweep
+from flexmb.jit.pointer import REAL, STATUS, VECTOR, Pointer, pointer
+from flexmb.tables.status import OK
 from flexmb.typing import Index, Real
 
 CROSSED = -1  # returned in place of a status code: no end of the run
+UNKNOWN = 2  # a side that is for the first step to find
+
+_NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
+_NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
+_NOWHERE, _PASSES, _TURNS = range(3)  # what becomes of a level in a step
 
 
 class Watch(NamedTuple):
-    """entry (k,) of y; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
+    """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
-    side (k,): -1 where the entry is below its level, 1 above, kept from step to step; an entry at its level is on the
-    side that it comes from. found (k,): 1 where a level is reached at the time at which a run paused.
+    side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of a signal that is
+    at its level where a run begins, the side that it came from, else 0. still (k,): what moves by less within a step is
+    at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at which a run
+    paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level, its side at
+    the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are watched.
+    look(t, y, signal, constants) finds all signals and returns a status code.
     """
 
     entry: Index
     level: Real
     direction: Index
     side: Index
+    came: Index
+    still: Real
     found: Index
+    rate: Real
+    value: Real
+    after: Index
+    reach: Index
+    signal: Real
+    look: Pointer
+
+
+class Ends(NamedTuple):
+    """State y and slope dy (n,) at the start of a step, y_new and dy_new at its end."""
+
+    y: np.ndarray
+    dy: np.ndarray
+    y_new: np.ndarray
+    dy_new: np.ndarray
+
+
+class Within(NamedTuple):
+    """A step from `start` to `end` (s) to look into, by its `state_at`, which is handed `s`.
+
+    trial (n,): the state where it was looked into last; run: accuracy and counts.
+    """
+
+    problem: Any
+    watch: Watch
+    step: Interval
+    ends: Ends
+    state_at: Any
+    s: Any
+    trial: np.ndarray
+    run: tuple[Accuracy, np.ndarray]
 
 
 @helper
@@ -40,32 +93,255 @@ def crosses(side, after, direction):
 
 
 @helper
-def crosses_one(watch, i, y):
-    """Whether y (n,) has come to level i."""
-    return crosses(watch.side[i], y[watch.entry[i]] - watch.level[i], watch.direction[i])
+def _side(value, still):
+    """On which side of zero a value is; 0 at it."""
+    if abs(value) <= still:
+        return 0
+    return -1 if value < 0.0 else 1
 
 
 @helper
-def is_crossed(watch, y):
-    """Whether a step to y (n,) crosses any level; where it does not, sides are those of y."""
+def _look(problem, watch, t, y):
+    """watch.value of all at t and y (n,); a status code."""
+    status = OK
+    if watch.signal.shape[0] > 0:
+        status = watch.look(t, y, watch.signal, problem.constants)
     for i in range(watch.entry.shape[0]):
-        if crosses_one(watch, i, y):
-            return True
-    for i in range(watch.entry.shape[0]):
-        value = y[watch.entry[i]] - watch.level[i]
-        if value != 0.0:
-            watch.side[i] = -1 if value < 0.0 else 1
-    return False
+        entry = watch.entry[i]
+        watch.value[i] = (y[entry] if entry >= 0 else watch.signal[-1 - entry]) - watch.level[i]
+    return status
 
 
 @helper
-def note(watch, first, y):
-    """What is crossed where a run pauses, at y (n,): the first level, and others that are reached at the same time."""
+def _rates(problem, watch, t, y, dy, ahead, trial):
+    """watch.rate at t and y (n,), whose slope is dy; of signals by a difference over `ahead` (s). A status code."""
+    status = OK
+    if watch.signal.shape[0] > 0:
+        for j in range(y.shape[0]):
+            trial[j] = y[j] + ahead * dy[j]
+        status = _look(problem, watch, t + ahead, trial)
+        copy(watch.value, watch.rate)
+        if status == OK:
+            status = _look(problem, watch, t, y)
+        for i in range(watch.entry.shape[0]):
+            watch.rate[i] = (watch.rate[i] - watch.value[i]) / ahead
+    else:
+        status = _look(problem, watch, t, y)
     for i in range(watch.entry.shape[0]):
-        watch.found[i] = 1 if i == first or crosses_one(watch, i, y) else 0
+        if watch.entry[i] >= 0:
+            watch.rate[i] = dy[watch.entry[i]]
+    return status
 
 
-def watch(entries: Sequence[int], levels: Sequence[float], directions: Sequence[int], sides: Sequence[int]) -> Watch:
-    """Of lists of equal lengths."""
-    whole = (np.array(each, np.int64) for each in (directions, sides, [0] * len(entries)))
-    return Watch(np.array(entries, np.int64), np.array(levels, float), *whole)
+@sweep
+def meets(problem, watch, step, ends):
+    """Whether a step may come to a level: (status, whether). If it does not, sides are those of its end."""
+    h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
+    status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
+    before = watch.rate.copy()
+    for i in range(count):
+        if watch.side[i] == UNKNOWN:
+            watch.side[i] = 0 if watch.came[i] != 0 else _side(watch.value[i], watch.still[i])
+    if status == OK:
+        status = _rates(problem, watch, min(step.end, step.last), ends.y_new, ends.dy_new, -_NEAR * h, trial)
+    if status != OK:
+        return status, False
+    some = False
+    for i in range(count):
+        value = watch.value[i]
+        if watch.came[i] != 0:
+            _leave(watch, i, before[i] * h, value)
+        side = watch.side[i]
+        watch.reach[i] = _NOWHERE
+        if crosses(side, value, watch.direction[i]):
+            watch.reach[i] = _PASSES
+        elif side != 0 and not crosses(side, value, 0) and side * before[i] < 0.0 and side * watch.rate[i] > 0.0:
+            watch.reach[i] = _TURNS
+        some = some or watch.reach[i] != _NOWHERE
+        watch.after[i] = _side(value, watch.still[i] if side == 0 else 0.0)
+    if not some:
+        settle(watch)
+    return OK, some
+
+
+@helper
+def _leave(watch, i, change, value):
+    """The side on which signal i leaves its level, by its first change in a step or, at rest, where it drifts to.
+
+    What drifts beyond the level from rest comes to it again.
+    """
+    came = watch.came[i]
+    if abs(change) > watch.still[i]:
+        watch.side[i], watch.came[i] = came if came * change > 0.0 else -came, 0
+    elif abs(value) > watch.still[i]:
+        watch.side[i], watch.came[i] = came, 0
+
+
+@helper
+def settle(watch):
+    """Sides after a step in which no level was reached."""
+    for i in range(watch.entry.shape[0]):
+        if watch.after[i] != 0:
+            watch.side[i] = watch.after[i]
+
+
+@sweep
+def end_at_crossing(within, times, out):
+    """End a step that `meets` a level at the first one: its state in ends.y, and the samples before it stored.
+
+    Returns (CROSSED, the time); (OK, .) where no level is reached after all, and sides are those of the step's end; or
+    the status of what fails.
+    """
+    problem, watch, step, ends, state_at, s, trial, run = within
+    t, first = math.inf, 0
+    for i in range(watch.entry.shape[0]):
+        if watch.reach[i] != _NOWHERE:
+            status, low, high = OK, step.start, step.end
+            if watch.reach[i] == _TURNS:
+                status, low, high = _beyond(within, i)
+            if status == OK and high < math.inf:
+                status, high = _arrival(within, i, low, high)
+            if status != OK:
+                return status, step.start
+            if high < t:
+                t, first = high, i
+    if t == math.inf:
+        settle(watch)
+        return OK, step.end
+    counts = run[1]
+    while counts[SAMPLES] < times.shape[0] and times[counts[SAMPLES]] < t:
+        status = state_at(problem, step, ends, s, times[counts[SAMPLES]], out[counts[SAMPLES]], run)
+        if status != OK:
+            return status, step.start
+        counts[SAMPLES] += 1
+    status = _note(within, first, t)
+    if status != OK:
+        return status, step.start
+    copy(trial, ends.y)
+    counts[ACCEPTED] += 1
+    return CROSSED, t
+
+
+@sweep
+def pause(problem, watch, step, ends, state_at, s, samples, run):
+    """ends.y at the first level that a step comes to: (CROSSED, the time); or the status of what fails, and the start.
+
+    Where it comes to none: OK, and its end if it was looked into, else its start. samples: times of samples, and
+    samples; run: accuracy and counts.
+    """
+    status, some = meets(problem, watch, step, ends)
+    if status != OK or not some:
+        return status, step.start
+    within = Within(problem, watch, step, ends, state_at, s, np.empty(ends.y.shape[0]), run)
+    return end_at_crossing(within, samples[0], samples[1])
+
+
+@sweep
+def _value_at(within, i, t):
+    """How far i is above its level at a time within a step, with the state in `trial`: (status, value)."""
+    problem, watch, step, ends, state_at, s, trial, run = within
+    status = OK
+    if t >= step.end:
+        copy(ends.y_new, trial)
+    else:
+        status = state_at(problem, step, ends, s, t, trial, run)
+    if status == OK:
+        status = _look(problem, watch, min(t, step.last), trial)
+    return status, watch.value[i]
+
+
+@sweep
+def _beyond(within, i):
+    """Between which times what turns within a step comes to its level: (status, low, high); high is inf if it does not.
+
+    The turning point is bracketed by the sign of differences. Where the level is not crossed in the way that counts, it
+    is on the way back: then the side is that beyond the level from now on.
+    """
+    watch, low, high = within.watch, within.step.start, within.step.end
+    narrow, side = _NARROW * (high - low), watch.side[i]
+    while high - low > narrow:
+        middle = 0.5 * (low + high)
+        status, one = _value_at(within, i, middle - 0.5 * narrow)
+        other = 0.0
+        if status == OK:
+            status, other = _value_at(within, i, middle + 0.5 * narrow)
+        if status != OK:
+            return status, low, math.inf
+        if side * one <= 0.0 or side * other <= 0.0:
+            there = middle - 0.5 * narrow if side * one <= 0.0 else middle + 0.5 * narrow
+            if crosses(side, -1.0 * side, watch.direction[i]):
+                return OK, within.step.start, there
+            watch.side[i] = -side
+            return OK, there, within.step.end
+        if side * other < side * one:
+            low = middle
+        else:
+            high = middle
+    return OK, low, math.inf
+
+
+@sweep
+def _arrival(within, i, low, high):
+    """When i comes to its level between two times, to rounding: (status, time).
+
+    By the regula falsi of Illinois; every third time, and where the step starts at the level, by halving.
+    """
+    side, last_side, count = within.watch.side[i], 0, 0
+    status, below = _value_at(within, i, low)
+    above = 0.0
+    if status == OK:
+        status, above = _value_at(within, i, high)
+    while status == OK and above != 0.0 and high - low > 2.0 * (np.nextafter(high, math.inf) - high):
+        middle, count = 0.5 * (low + high), count + 1
+        if count % 3 != 0 and crosses(side, above, 0) and not crosses(side, below, 0):
+            middle = low + (high - low) * below / (below - above)
+            middle = min(max(middle, np.nextafter(low, high)), np.nextafter(high, low))
+        status, value = _value_at(within, i, middle)
+        if crosses(side, value, 0):
+            high, above = middle, value
+            below = 0.5 * below if last_side > 0 else below
+            last_side = 1
+        else:
+            low, below = middle, value
+            above = 0.5 * above if last_side < 0 else above
+            last_side = -1
+    return status, high
+
+
+@sweep
+def _note(within, first, t):
+    """What is reached at time t, the first level and others at the same time, and the rates of signals there.
+
+    Leaves the state in `trial`; a status code.
+    """
+    watch, step = within.watch, within.step
+    near = _NEAR * (step.end - step.start)
+    other = t + near if t + near <= step.end else t - near
+    status, _ = _value_at(within, first, other)
+    copy(watch.value, watch.rate)
+    if status == OK:
+        status, _ = _value_at(within, first, t)
+    for i in range(watch.entry.shape[0]):
+        watch.rate[i] = (watch.rate[i] - watch.value[i]) / (other - t) if other != t else 0.0
+        arrived = crosses(watch.side[i], watch.value[i], watch.direction[i])
+        watch.found[i] = 1 if i == first or arrived else 0
+    return status
+
+
+@kernel
+def _no_signals(t, y, signal, constants):
+    return OK
+
+
+def watch(
+    entries: Sequence[int], levels: Sequence[float], directions: Sequence[int], sides: Sequence[int],
+    came: Sequence[int], still: Sequence[float],
+) -> Watch:  # fmt: skip
+    """Of lists of equal lengths; its signals are found by `with_signals`."""
+    count = len(entries)
+    whole = [np.array(each, np.int64) for each in (entries, directions, sides, came)]
+    return Watch(
+        whole[0], np.array(levels, float), *whole[1:], np.array(still, float), np.zeros(count, np.int64),
+        np.zeros(count), np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(0),
+        pointer(_no_signals, STATUS, REAL, VECTOR, VECTOR, AnyBundle._numba_type_),
+    )  # fmt: skip

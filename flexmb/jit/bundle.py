@@ -88,8 +88,15 @@ def broaden(bundles: Sequence[Any]) -> None:
 
 
 def _reduce(self: Any) -> tuple[Any, ...]:
-    """Pickle the arrays only: addresses are of one process."""
-    return type(self), tuple(getattr(self, field.name) for field in fields(self))
+    """Pickle the arrays only: addresses are of one process.
+
+    TypeError where arrays are parts of one array: those of a copy would not be, and go on without each other.
+    """
+    members = tuple(getattr(self, name) for name in _names(type(self)))
+    owners = [id(each if each.base is None else each.base) for each in members if isinstance(each, np.ndarray)]
+    if len(set(owners)) < len(owners):
+        raise TypeError(f"{type(self).__name__} cannot be copied: its arrays are parts of each other; copy the system")
+    return type(self), members
 
 
 class BundleType(types.Type):

@@ -49,7 +49,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     if feedback.reads_at_once:
         raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
     clock = Clock(np.array([state.t, state.t + 1.0]), np.array([state.t + 1.0]))
-    y = feedback.begin(_Start(state), clock, Accuracy(0.0, 0.0, 0, 0), ()).y
+    y = feedback.begin(_Start(state), clock, Accuracy(0.0, 0.0, 0, 0), None).y
     equations = Equations(plant)
     seen = _Seen(feedback, state.t, plant.nq + plant.nu)
     derivative = np.column_stack([

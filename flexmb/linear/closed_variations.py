@@ -29,7 +29,6 @@ from flexmb.closure.assembly import consistent
 from flexmb.closure.closures import ClosureError
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tangent import closed_jacobian, closure_tangent_workspace
-from flexmb.levels.body import LEVELS
 from flexmb.linear.variations import Equations, Variations
 from flexmb.system.closed import ClosedSystem
 from flexmb.tables.arrays import Constants
@@ -79,12 +78,12 @@ class ClosedEquations(Equations):
 
     def __init__(self, system: ClosedSystem, constants: Constants | None = None) -> None:
         super().__init__(system, constants)
-        c = self.constants
-        if any(LEVELS[c.body["level"][k]].at_rest for k in np.flatnonzero(c.body["modes"])):
+        if system.closures.at_rest:
             raise NotImplementedError(
                 f'scene "{system.scene.name}" has closures and bodies of level "ruthless", whose inertia is not where '
                 'closures join them: for a linear model use level "linear" or a better one'
             )
+        c = self.constants
         self._closures = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
         self._rank = system.rank
         self._rows_w = closure_tangent_workspace(self._closures.constants[1])

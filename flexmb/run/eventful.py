@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from msgspec import structs
 
-from flexmb.integrate.catalogue import INTEGRATORS
-from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.integrate.watch import Watch, watch
+from flexmb.integrate.watch import UNKNOWN, Watch, watch
 from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import observed
-from flexmb.run.propagate import Raw, integrate, integration
+from flexmb.run.propagate import Integration, Raw, integrate, integration
+from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import EndRun, Impact, Latch
+from flexmb.scene.events import EndRun, Impact
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
+from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -30,27 +31,12 @@ DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
 MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
 
 
-def refuse_events(system: System, method: Method) -> None:
-    """NotImplementedError for events that a method or a closed chain does not have."""
-    if not INTEGRATORS[method].pauses and any(event.watch != "time" for event in _by_what_they_watch(system)):
-        raise NotImplementedError(
-            f'method "{method}" does not find where an event happens within a step: use "dop853", "rk4", '
-            '"radau5" or "exponential"'
-        )
-    for event in system.scene.events if system.scene.closures else ():
-        if any(isinstance(action, Latch | Impact) for action in event.actions):
-            raise NotImplementedError(
-                f'event "{event.name}" has an impulse, and the scene has closures, which would take part of it: that '
-                "is not supported yet; use a stiff spring, or a tree"
-            )
-
-
 def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
     """The scene's events, sensors replaced by what they measure."""
     if not system.scene.events:
         return ()
     names = watchable(system.scene)
-    return tuple(structs.replace(event, watch=names[event.watch]) for event in system.scene.events)
+    return tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in system.scene.events)
 
 
 class EventfulRun:
@@ -60,9 +46,11 @@ class EventfulRun:
         self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float
     ) -> None:
         """times (T,) s of the output."""
-        self._situation, self._times, self._settings = Situation(system), times, settings
+        scene = with_stops(system.scene)
+        whole = system if scene == system.scene else assembled(scene)
+        self._situation, self._times, self._settings = Situation(whole, settings), times, settings
         self._algorithm, self._stabilise = algorithm, stabilise
-        self._events = _by_what_they_watch(system)
+        self._events = _by_what_they_watch(whole)
         self._happened: list[EventRecord] = []
         self._paused_at: list[float] = []
         self._whole: Trajectory | None = None
@@ -74,24 +62,43 @@ class EventfulRun:
 
     def __call__(self, begin: Beginning) -> tuple[Trajectory, Raw]:
         """The trajectory, and the last piece of the run as the integrator left it."""
-        watched = [event for event in self._events if event.watch != "time"]
-        sides = self._sides(watched, begin.y)
+        watched = self._watched
+        sides, came = self._sides(watched, begin.y), [0] * len(watched)
         while True:
-            levels = self._watch(watched, sides)
-            raw, stop = self._piece(begin, levels)
+            raw, stop, levels = self._piece(begin, watched, sides, came)
             found = self._found(raw, stop, watched, levels)
             if not found:
                 return self._ended(raw), raw
-            self._paused_at.append(raw.t)
             y, controlled = self._apart(raw.y)
             arrived = self._arriving(found, watched, levels, y)
-            self._happened += [self._situation.happen(event, raw.t, y) for event in arrived]
+            if not any(isinstance(action, Impact) and action.rests for event in arrived for action in event.actions):
+                self._paused_at.append(raw.t)  # rebounds before a rest come to an end by themselves
+            for event in arrived:
+                self._happened += self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
             ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
                 return self._ended(self._last(raw, ends)), raw
-            sides = self._sides_after(watched, levels, y)
+            names = [event.name for event in watched]
+            side_of = dict(zip(names, self._sides_after(watched, levels, y), strict=True))
+            came_of = dict(zip(names, self._came(watched, levels), strict=True))
+            self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
+            watched = self._watched
+            anew = zip(watched, self._sides(watched, y), strict=True)
+            sides = [side_of.get(event.name, side) for event, side in anew]
+            came = [came_of.get(event.name, 0) for event in watched]
             begin = self._going_on(raw)
+
+    @property
+    def _watched(self) -> list[SceneEvent]:
+        return [event for event in self._events if event.watch != "time"]
+
+    def _accelerations(self, raw: Raw, t: float, y: Real) -> Real:
+        """Under what controllers say where a piece ended, with another motion y = [q, u, work] there."""
+        there = raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
+        with integration(self.system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            assert solve.feedback is not None  # of a scene with stops to rest on
+            return solve.feedback.accelerations(self._going_on(there))
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
         """[q, u, work], and the states of controllers, which events do not touch."""
@@ -103,7 +110,9 @@ class EventfulRun:
         state = self.system.layout.known(raw.t, np.r_[self._apart(raw.y)[0][:-1], 0.0])
         return Beginning(state, raw.y, None, raw.controllers)
 
-    def _piece(self, begin: Beginning, levels: Watch | None) -> tuple[Raw, float]:
+    def _piece(
+        self, begin: Beginning, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int]
+    ) -> tuple[Raw, float, Watch | None]:
         """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
         t, system = begin.state.t, self._situation.system
         start = max(t, self._times[0]) if begin.memory is not None else t
@@ -113,11 +122,12 @@ class EventfulRun:
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
         times = np.unique([start, *wanted, stop])
         with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+            levels = self._watch(watched, sides, came, solve)
             raw = integrate(system, solve, begin, times, self._left(), levels)
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
             self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
-        return raw, stop
+        return raw, stop, levels
 
     def _left(self) -> Settings:
         """The settings with as many steps as the pieces before have left."""
@@ -140,32 +150,65 @@ class EventfulRun:
     def _arriving(
         self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
     ) -> list[SceneEvent]:
-        """Those that come to their levels, which are set exactly; rounding may find one again that flies off."""
+        """Those that come to their levels, where coordinates are set exactly.
+
+        Rounding may find one again that flies off.
+        """
         off = []
         for i, event in enumerate(watched):
             if levels is not None and event in found:
-                y[self._situation.places[event.watch]] = event.level
-                rate = self._situation.rate_of(event.watch)
-                if rate is not None and levels.side[i] * y[rate] > 0.0:
+                if self._is_signal(event):
+                    rate = levels.rate[i]
+                else:
+                    y[self._situation.places[event.watch]] = event.level
+                    place = self._situation.rate_of(event.watch)
+                    rate = 0.0 if place is None else y[place]
+                if levels.side[i] * rate > 0.0:
                     off.append(event)
         return [event for event in found if event not in off]
 
-    def _watch(self, watched: Sequence[SceneEvent], sides: Sequence[int]) -> Watch | None:
+    def _is_signal(self, event: SceneEvent) -> bool:
+        return event.watch not in self._situation.places
+
+    def _watch(
+        self, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int], solve: Integration
+    ) -> Watch | None:
         if not watched:
             return None
-        entries = [self._situation.places[event.watch] for event in watched]
+        entries, still = [], []
+        for event in watched:
+            if self._is_signal(event):
+                assert solve.feedback is not None
+                entries.append(-1 - solve.feedback.place_of(event.watch))
+                still.append(self._settings.atol + self._settings.rtol * abs(event.level))
+            else:
+                entries.append(self._situation.places[event.watch])
+                still.append(0.0)
         directions = [DIRECTIONS[event.crossing] for event in watched]
-        return watch(entries, [event.level for event in watched], directions, sides)
+        return watch(entries, [event.level for event in watched], directions, sides, came, still)
 
     def _sides(self, watched: Sequence[SceneEvent], y: Real) -> list[int]:
-        """On which side of its level everything is; 0 at it."""
-        return [int(np.sign(y[self._situation.places[event.watch]] - event.level)) for event in watched]
+        """On which side of its level everything is; 0 at it. Those of signals are seen in the first step."""
+        places = self._situation.places
+        return [
+            UNKNOWN if self._is_signal(event) else int(np.sign(y[places[event.watch]] - event.level))
+            for event in watched
+        ]
+
+    def _came(self, watched: Sequence[SceneEvent], levels: Watch | None) -> list[int]:
+        """From which side signals came to the levels at which they are; 0 for others."""
+        return [
+            int(levels.side[i]) if levels is not None and levels.found[i] and self._is_signal(event) else 0
+            for i, event in enumerate(watched)
+        ]
 
     def _sides_after(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
         """After an event. What was found at its level is beyond it, or back where it does not go on; held at it: 0."""
         sides = self._sides(watched, y)
         for i, event in enumerate(watched):
             came = int(levels.side[i]) if levels is not None else 0
+            if self._is_signal(event):
+                continue
             if levels is not None and levels.found[i]:
                 rate = self._situation.rate_of(event.watch)
                 goes_on = rate is None or -came * y[rate] > 0.0

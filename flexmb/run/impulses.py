@@ -1,4 +1,12 @@
-"""Impulses along speeds: M du = impulses, which give some speeds new values at once and leave positions as they are."""
+"""Impulses along speeds, which give some speeds new values at once and leave positions as they are.
+
+With A = [E; J], E picking these speeds, J u the rates of closures' rows, M = F F' and impulses p of both,
+
+    M (u+ - u-) = A' p,    A u+ = [given; 0],
+
+and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x: of impulses of
+closures that the motion does not determine, those of redundant rows, the least.
+"""
 
 from __future__ import annotations
 
@@ -7,34 +15,67 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.closure.factor import DEPENDENT
+from flexmb.closure.impulses import RowMotion
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.typing import Real
+
+AT_REST = 2.0**-40  # of the speeds before
+REACHED = 1e-6  # of the largest speed: what is left of a change that closures do not allow is more
 
 
 class Struck(NamedTuple):
-    """u (nu,) afterwards; impulses by place in u (N s or N m s), on the outboard side; energy gained (J)."""
+    """u (nu,) afterwards; impulses by place in u (N s or N m s), on the outboard side; energy gained (J).
+
+    closures: (6,) [N m s; N s] on body_b about frame B, World axes, by name.
+    """
 
     u: Real
     impulses: dict[int, float]
     energy: float
+    closures: dict[str, Real]
 
 
 def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
-    """The speeds of a tree after impulses that give those at some places in u the values that `speeds` says.
+    """The speeds after impulses that give those at some places in u the values that `speeds` says.
 
-    Prescribed speeds keep theirs, by impulses of their drives. All momentum passes through the hinges: that of the
-    whole changes by what the ground hinges take. The energy is the impulses' work, at the mean of the speeds before and
-    after. Raises DynamicsError where the mass matrix is not positive definite.
+    Prescribed speeds keep theirs, by impulses of their drives, and closures stay closed, by theirs. All momentum passes
+    through the hinges: that of the whole changes by what those on the ground take. The energy is the impulses' work, at
+    the mean of the speeds before and after. Raises DynamicsError where the mass matrix is not positive definite, or
+    where closures do not allow such speeds.
     """
     prescribed = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
     places = sorted({*prescribed, *speeds})
-    change = np.array([speeds.get(j, state.u[j]) - state.u[j] for j in places])
-    along = np.zeros((system.nu, len(places)))
-    along[places, range(len(places))] = 1.0
-    response = system.factorise(state).solve(along)
-    impulses = np.linalg.solve(response[places], change)
-    u = state.u + response @ impulses
-    u[places] = state.u[places] + change
-    energy = 0.5 * float(impulses @ (u[places] + state.u[places]))
-    return Struck(u, dict(zip(places, impulses.tolist(), strict=True)), energy)
+    rows = RowMotion(system.closures, state.t, pack(state)) if isinstance(system, ClosedSystem) else None
+    along = np.eye(system.nu)[places] if rows is None else np.vstack([np.eye(system.nu)[places], rows.jacobian])
+    change = -along @ state.u
+    change[: len(places)] = [speeds.get(j, state.u[j]) - state.u[j] for j in places]
+    factors = system.factorise(state)
+    half = factors.half_solve(along.T)
+    moved = np.linalg.lstsq(half.T, change, rcond=DEPENDENT)[0]
+    _refuse_unreached(half.T @ moved - change, state)
+    impulses = np.linalg.lstsq(half, moved, rcond=DEPENDENT)[0]
+    u = state.u + factors.solve(along.T @ impulses)
+    u[places] = state.u[places] + change[: len(places)]
+    if np.max(np.abs(u), initial=0.0) <= AT_REST * np.max(np.abs(state.u), initial=0.0):
+        u[:] = 0.0  # a mechanism that is stopped altogether: of rounding alone closures would seem to open
+    held = impulses[: len(places)]
+    closures = {} if rows is None else _by_name(system, rows.wrenches(impulses[len(places) :]))
+    return Struck(
+        u, dict(zip(places, held.tolist(), strict=True)), 0.5 * float(held @ (u[places] + state.u[places])), closures
+    )
+
+
+def _by_name(system: System, wrenches: Real) -> dict[str, Real]:
+    return {closure.name: wrench for closure, wrench in zip(system.scene.closures, wrenches, strict=True)}
+
+
+def _refuse_unreached(left: Real, state: State) -> None:
+    """DynamicsError where closures and drives leave too little freedom for what an event asks for."""
+    if not np.max(np.abs(left), initial=0.0) <= REACHED * np.max(np.abs(state.u), initial=1e-300):
+        raise DynamicsError(
+            f"at t = {state.t:g} s an event asks for a speed that closures and prescribed motions do not allow: the "
+            "coordinate has no freedom of its own there; prescribe less, or act on what is free"
+        )

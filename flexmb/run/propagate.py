@@ -9,19 +9,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from flexmb.entry import articulated, tangent
+from flexmb.entry import articulated
 from flexmb.integrate.control import COUNTS, SAMPLES, STOP
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.memory import Memory
-from flexmb.integrate.problem import Accuracy, Clock, Problem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, problem, stiff_problem
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import CROSSED, Watch
 from flexmb.jit.direct import undispatched
-from flexmb.motion import coordinates, retraction
+from flexmb.motion import coordinates
 from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
 from flexmb.run.switching import segment_ends
+from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
@@ -67,20 +68,19 @@ class Integration:
         constants, self._workspace = route.tables()
         self._integrator = integrator
         self.feedback: Feedback | None = None
-        """Of a scene with controllers."""
-        if system.scene.controllers:
+        """Of a scene with controllers, or with events that watch signals."""
+        if system.scene.controllers or watches_signals(system.scene):
             from flexmb.control.feedback import Feedback  # few scenes need it
 
             self.feedback = Feedback(system, algorithm, route, (constants, self._workspace))
-        self._linear: tuple[Any, ...] = ()
+        self._linear: Linear | None = None
         motion = route.rhs, route.project, constants, self._workspace
         if integrator.linearises:
-            exact = system.constants  # with every body eliminated explicitly, for Jacobians
-            moving = tangent.tangent_workspace(exact, system.nq, system.nu)
-            self._problem: Any = stiff_problem(*motion, tangent.jacobian, retraction.move, exact, moving)
-            self._linear = tangent.jacobian, exact, moving
+            assert route.linear is not None  # else `refuse_without_jacobian`
+            self._linear = route.linear(constants, self._workspace)
+            self._problem: Any = stiff_problem(*motion, self._linear, route.leaping)
             if self.feedback is not None:
-                self.feedback.with_retraction()
+                self.feedback.with_retraction(self._linear.move)
         else:
             self._problem = problem(*motion, route.leaping)
             if integrator.fixed and route.leaping is not None:
@@ -160,6 +160,9 @@ def integrate(
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
     memory = method.memory(len(y)) if begin.memory is None else begin.memory
     out = np.empty((len(times), len(y)))
+    if watch is not None and np.any(watch.entry < 0):
+        assert solve.feedback is not None  # somebody watches signals
+        watch = solve.feedback.watching(watch)
     given = y, clock, accuracy, out, counts, memory, watch
     start = perf_counter()
     solve.compile(*given)

@@ -14,7 +14,7 @@ from flexmb.integrate.catalogue import INTEGRATORS
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.settings import Settings
-from flexmb.run.eventful import EventfulRun, refuse_events
+from flexmb.run.eventful import EventfulRun
 from flexmb.run.interruption import Interrupted
 from flexmb.run.making import Making
 from flexmb.run.origin import Beginning, Values, origin, start_time
@@ -28,6 +28,7 @@ from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import assembled
 from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
@@ -106,7 +107,6 @@ def simulate(
     refuse_too_many(len(times), system)
     if chosen.integrator.linearises:
         refuse_without_jacobian(system, algorithm, method)
-    refuse_events(system, method)
     same: dict[str, Any] = {"t_start": t, "state": state, "algorithm": algorithm, "stabilise": stabilise}
     made_by = Making(system, times, chosen, partial(_again, system, t_end, samples=times, **same))
     with integration(system, algorithm, stabilise, chosen.integrator) as solve:
@@ -143,8 +143,12 @@ def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Tra
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError where a method that linearises finds no Jacobian."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
-    if system.scene.closures:
-        raise NotImplementedError(f'method "{method}" runs trees, and the scene has closures: use {others}')
+    if isinstance(system, ClosedSystem) and system.closures.at_rest:
+        raise NotImplementedError(
+            f'method "{method}" needs Jacobians, which closed chains have none of where a body is of level "ruthless", '
+            f'as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its inertia is not where '
+            f'closures join it; use level "linear" or a better one, or method {others}'
+        )
     continuous = [each.name for each in system.scene.controllers if each.period_s is None]
     if continuous:
         raise NotImplementedError(

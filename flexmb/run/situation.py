@@ -2,22 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from msgspec.structs import replace
 
+from flexmb.integrate.settings import Settings
 from flexmb.run.impulses import struck
+from flexmb.run.resting import off_stop, on_stop
 from flexmb.scene.events import Action, Change, EndRun, Impact, Latch, Release
 from flexmb.scene.functions import Constant
 from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
 from flexmb.typing import Real
+
+Accelerations = Callable[[float, Real], Real]
+"""(nu,) at a time (s) and y = [q, u, work]."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +33,8 @@ class EventRecord:
     """An event that happened at t (s).
 
     impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
-    (J), which the work of the trajectory counts; before, after: the states.
+    (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
+    (6,) [N m s; N s] on body_b about frame B, World axes; the least, where redundant closures leave it open.
     """
 
     name: str
@@ -34,13 +43,15 @@ class EventRecord:
     energy_change: float
     before: State
     after: State
+    closures: dict[str, Real] = field(default_factory=dict)
 
 
 class Situation:
     """The scene as events have left it, with its system; systems that come back are not built again."""
 
-    def __init__(self, system: System) -> None:
+    def __init__(self, system: System, settings: Settings) -> None:
         self.system = system
+        self._settings = settings
         self._given = system.scene
         self._paths = scalar_paths(system.scene)
         self._built = [system]
@@ -48,42 +59,81 @@ class Situation:
         self.places = {name: i for i, (name, _) in enumerate((*q, *u))}
         """Of coordinates and speeds in [q, u, work], by name."""
 
-    def happen(self, event: SceneEvent, t: float, y: Real) -> EventRecord:
-        """Do what an event says at time t to y = [q, u, work], in place."""
-        before, work, impulses = self._state(t, y), float(y[-1]), dict[str, float]()
+    def happen(self, event: SceneEvent, t: float, y: Real, accelerations: Accelerations) -> list[EventRecord]:
+        """Do what an event says at time t to y = [q, u, work], in place; and have come to rest what does."""
+        before = y.copy()
+        found = [self._recorded(event.name, t, y, [partial(self._do, action) for action in event.actions])]
+        self._become(off_stop(self.system.scene, event), t, y)
         for action in event.actions:
-            self._do(action, t, y, impulses)
-        return EventRecord(event.name, t, impulses, float(y[-1]) - work, before, self._state(t, y))
+            if isinstance(action, Impact) and action.rests:
+                push = -int(np.sign(before[self._rate_place(action.coordinate)]))
+                if self._is_spent(action.coordinate, push, y, accelerations(t, y)):
+                    rest = partial(self._rest, event, action.coordinate, push)
+                    found.append(self._recorded(f"{event.name}: at rest", t, y, [rest]))
+        return found
+
+    def _recorded(self, name: str, t: float, y: Real, actions: Sequence[Callable[..., None]]) -> EventRecord:
+        before, work = self._state(t, y), float(y[-1])
+        impulses, closures = dict[str, float](), dict[str, Real]()
+        for do in actions:
+            do(t, y, impulses, closures)
+        return EventRecord(name, t, impulses, float(y[-1]) - work, before, self._state(t, y), closures)
+
+    def _is_spent(self, name: str, push: int, y: Real, accelerations: Real) -> bool:
+        """Whether a rebound leads no further from a stop, against what presses on it, than the error that is allowed.
+        """
+        place = self._rate_place(name)
+        pressed, rebound = -push * accelerations[place - self.system.nq], push * y[place]
+        allowed = self._settings.atol + self._settings.rtol * abs(y[self.places[name]])
+        return bool(pressed > 0.0 and rebound**2 <= 2.0 * pressed * allowed)
+
+    def _rest(
+        self, event: SceneEvent, name: str, push: int, t: float, y: Real, impulses: dict[str, float],
+        closures: dict[str, Real],
+    ) -> None:  # fmt: skip
+        """Held on a stop from now on, its motor beside it."""
+        self._strike(t, y, name, 0.0, impulses, closures)
+        held = changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]], keeps_motor=True))
+        self._become(on_stop(held, event, name, push), t, y)
+        self.system.project(t, y, self.system.constants)
 
     def rate_of(self, watched: str) -> int | None:
         """Place in [q, u, work] of the rate of a coordinate; None for what is a rate itself."""
         path = self._paths.get(watched)
         return None if path is None else self.places[rate_name(watched, path)]
 
+    def _rate_place(self, coordinate: str) -> int:
+        return self.places[rate_name(coordinate, self._paths[coordinate])]
+
     def is_held(self, watched: str) -> bool:
         """Whether a coordinate is latched or prescribed."""
         place = self.rate_of(watched)
         return place is not None and self.system.constants.speed["prescribed"][place - self.system.nq] >= 0
 
-    def _do(self, action: Action, t: float, y: Real, impulses: dict[str, float]) -> None:
+    def _do(
+        self, action: Action, t: float, y: Real, impulses: dict[str, float], closures: dict[str, Real]
+    ) -> None:
         match action:
             case Latch(coordinate=name):
-                self._strike(t, y, name, 0.0, impulses)
-                self._become(changed_at(self.system.scene, self._paths[name], self._held(y[self.places[name]])))
+                self._strike(t, y, name, 0.0, impulses, closures)
+                held = self._held(y[self.places[name]])
+                self._become(changed_at(self.system.scene, self._paths[name], held), t, y)
                 self.system.project(t, y, self.system.constants)
             case Impact(coordinate=name, restitution=restitution):
-                self._strike(t, y, name, -restitution, impulses)
+                self._strike(t, y, name, -restitution, impulses, closures)
             case Release(coordinate=name):
-                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)))
+                self._become(changed_at(self.system.scene, self._paths[name], self._freed(name)), t, y)
             case Change(path=path, value=value):
                 energy = self._energy(t, y)
-                self._become(self.system.scene.with_values({path: value}))
+                self._become(self.system.scene.with_values({path: value}), t, y)
                 self._given = self._given.with_values({path: value})
                 y[-1] += self._energy(t, y) - energy
             case EndRun():
                 pass
 
-    def _strike(self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float]) -> None:
+    def _strike(
+        self, t: float, y: Real, name: str, factor: float, impulses: dict[str, float], closures: dict[str, Real]
+    ) -> None:
         """An impulse that multiplies a speed."""
         rates = {self.places[rate_name(each, path)]: each for each, path in self._paths.items()}
         place = self.places[rate_name(name, self._paths[name])]
@@ -93,11 +143,14 @@ class Situation:
         for j, impulse in found.impulses.items():
             along = rates[self.system.nq + j]
             impulses[along] = impulses.get(along, 0.0) + impulse
+        for closure, wrench in found.closures.items():
+            closures[closure] = closures.get(closure, 0.0) + wrench
 
-    def _held(self, value: float):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
+    def _held(self, value: float, keeps_motor: bool = False):  # type: ignore[no-untyped-def]  # of a coordinate or a wheel
         def held(item: Coordinate | Wheel) -> Coordinate | Wheel:
             value_key, rate_key, motor, motion = _keys(item)
-            return replace(item, **{value_key: 0.0, rate_key: 0.0, motor: None, motion: Constant(value=float(value))})
+            kept = {motor: getattr(item, motor) if keeps_motor else None}
+            return replace(item, **{value_key: 0.0, rate_key: 0.0, motion: Constant(value=float(value)), **kept})
 
         return held
 
@@ -107,13 +160,17 @@ class Situation:
         motion = _keys(found[0])[3]
         return lambda _: replace(found[0], **{motion: None})
 
-    def _become(self, scene: Scene) -> None:
+    def _become(self, scene: Scene, t: float, y: Real) -> None:
+        if scene == self.system.scene:
+            return
         for system in self._built:
             if system.scene == scene:
                 self.system = system
                 return
-        self.system = assembled(scene)
+        before, self.system = self.system, assembled(scene)
         self._built.append(self.system)
+        if isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem):
+            self.system.begin_at(t, y, before)
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)

@@ -112,6 +112,11 @@ class Trajectory:
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
+    def __repr__(self) -> str:
+        """What a prompt shows: how the run ended and what there is, not thousands of numbers."""
+        size = f"{len(self.t)} times, {len(self.q_names)} coordinates, {len(self.markers)} markers"
+        return f"<Trajectory of {self.scene!r}: {self.message}; {size}>"
+
     def error_estimate(self) -> dict[str, Real]:
         """Error (T,) of every channel, in its unit (orientations: rad), by a second, tighter run from start to end.
 

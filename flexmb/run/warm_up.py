@@ -78,7 +78,7 @@ def warm_up(
         if isinstance(each, Scene):
             _compile(each, "closed" if each.closures else "tree", methods, algorithms)
         else:
-            with _general_kernels():
+            with general_kernels():
                 _compile(SCENES[each](), each, methods, algorithms)
     return perf_counter() - start
 
@@ -94,7 +94,7 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
 
 
 @contextmanager
-def _general_kernels() -> Iterator[None]:
+def general_kernels() -> Iterator[None]:
     """For the tables that are made meanwhile."""
     before = os.environ.get("FLEXMB_KERNELS")
     os.environ["FLEXMB_KERNELS"] = "general"
@@ -109,7 +109,7 @@ def _general_kernels() -> Iterator[None]:
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:
     """Whether `simulate` takes them together; where it is condensed matters to the recursion only."""
-    if INTEGRATORS[method].linearises and (kind == "closed" or algorithm not in WITH_JACOBIAN):
+    if INTEGRATORS[method].linearises and algorithm not in WITH_JACOBIAN:
         return False
     if kind == "closed":
         return algorithm in ON_CHAINS

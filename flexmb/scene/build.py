@@ -6,8 +6,8 @@ length and map outboard components to inboard ones. Arrays are accepted wherever
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from typing import Any, Literal, Self, Unpack, get_args, get_type_hints
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, Self, Unpack
 
 import msgspec
 from numpy.typing import ArrayLike
@@ -15,7 +15,10 @@ from numpy.typing import ArrayLike
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY, ZERO
 from flexmb.scene.check import check_scene
-from flexmb.scene.convert import ROOT, label, plain, to_struct
+from flexmb.scene.collecting import make
+from flexmb.scene.connecting import ConnectorMaker
+from flexmb.scene.convert import plain, to_struct
+from flexmb.scene.feeding_back import FeedbackMaker
 from flexmb.scene.garbage import collector_paused
 from flexmb.scene.hinges import Z_AXIS
 from flexmb.scene.options import (
@@ -23,34 +26,16 @@ from flexmb.scene.options import (
     BeamOptions,
     ClosureFrames,
     Displacement,
-    FrictionOptions,
-    HingeSpringOptions,
-    LinearLaw,
     ModalMatrices,
-    OwnLaw,
-    PidLaw,
     Placement,
-    Sampling,
     SlidingHinge,
-    SpringOptions,
     TurningHinge,
     WheelMotion,
     refuse_others,
 )
-from flexmb.scene.problems import closest
-from flexmb.scene.units import split_unit
 
 AT_REST = s.AngularCoordinate()
 IN_PLACE = s.LinearCoordinate()
-
-
-def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
-    """A schema struct from values named without units; SceneError (at `place`) where a value has a wrong type."""
-    keys = {split_unit(key)[0]: key for key in kind.__struct_fields__}
-    for name in values:
-        if name not in keys:
-            raise TypeError(f'a {kind.__name__} has no "{name}": {closest(name, keys)}')
-    return to_struct(plain({keys[name]: value for name, value in values.items()}), kind, place=place)
 
 
 def angular(**angle: Unpack[Angle]) -> s.AngularCoordinate:
@@ -69,21 +54,7 @@ def _divided(options: Mapping[str, Any], kind: type) -> tuple[dict[str, Any], di
     return own, {key: value for key, value in options.items() if key not in own}
 
 
-def _collections() -> dict[type, str]:
-    """The scene's collection each kind of struct is appended to, read from the schema."""
-    table = {}
-    for key, hint in get_type_hints(s.Scene).items():
-        for item in get_args(hint):
-            for kind in get_args(item) or (item,):
-                if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
-                    table[kind] = key
-    return table
-
-
-COLLECTIONS = _collections()
-
-
-class SceneBuilder:
+class SceneBuilder(ConnectorMaker, FeedbackMaker):
     """Collects bodies, hinges and what acts on them; every method returns the builder, `scene()` the checked Scene.
 
     >>> pendulum = (
@@ -95,24 +66,6 @@ class SceneBuilder:
     ... )
     """
 
-    def __init__(
-        self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
-    ) -> None:
-        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are meant, see `Scene`."""
-        self._head: dict[str, Any] = {
-            "name": name, "description": description, "allow": list(allow), "gravity_m_s2": plain(gravity)
-        }  # fmt: skip
-        self._lists: dict[str, list[msgspec.Struct]] = {key: [] for key in COLLECTIONS.values()}
-
-    def add(self, *structs: msgspec.Struct) -> Self:
-        """Append schema structs of any kind: bodies, hinges, wheels, loads, markers ..."""
-        for struct in structs:
-            if type(struct) not in COLLECTIONS:
-                names = ", ".join(sorted(kind.__name__ for kind in COLLECTIONS))
-                raise TypeError(f"a {type(struct).__name__} is not a part of a scene by itself; these are: {names}")
-            self._lists[COLLECTIONS[type(struct)]].append(struct)
-        return self
-
     def scene(self, *, t_end: float | None = None) -> s.Scene:
         """The scene, checked; raises SceneError listing every problem. `t_end` (s) also checks what the run needs.
 
@@ -123,11 +76,6 @@ class SceneBuilder:
             scene = to_struct(data, s.Scene)
         check_scene(scene, t_end)
         return scene
-
-    def _append(self, kind: type[msgspec.Struct], **values: Any) -> Self:
-        key = COLLECTIONS[kind]
-        place = ROOT.key(key, len(self._lists[key])).named(label(key, values))
-        return self.add(make(kind, place, **values))
 
     # Bodies
 
@@ -343,8 +291,8 @@ class SceneBuilder:
     ) -> Self:  # fmt: skip
         """What happens where `watch` comes to `level`: `Latch`, `Release`, `Impact`, `Change`, `EndRun`, in this order.
 
-        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", or a rate, "pivot.rotation.rate"
-        or "wheel.speed".
+        `watch`: "time", a scalar coordinate such as "pivot.rotation" or "wheel.angle", a rate, "pivot.rotation.rate" or
+        "wheel.speed", or one number of a sensor or controller, "height[2]".
         """
         return self._append(s.SceneEvent, name=name, watch=watch, level=level, crossing=crossing, actions=actions)
 
@@ -365,125 +313,3 @@ class SceneBuilder:
         return self._append(
             s.Closure, name=name, type=type, body_a=body_a, body_b=body_b, axis=axis, **frames
         )
-
-    # Connectors
-
-    def spring_damper(self, name: str, body_a: str, body_b: str, **options: Unpack[SpringOptions]) -> Self:
-        """A spring, damper and actuator along the line between nodes of two bodies ("ground" too).
-
-        Ends: `node_a`, `position_a` (m, node axes) and the same of b. Law: `free_length` (m), `preload` (N),
-        `stiffness` (N/m), `stiffening`, or `table` (m) and `loads` (N); `damping` (N s/m), `acts`, actuator `force`.
-        """
-        refuse_others("a SpringDamper", options, SpringOptions)
-        return self._append(s.SpringDamper, name=name, body_a=body_a, body_b=body_b, **options)
-
-    def bushing(
-        self, name: str, body_a: str, body_b: str, *, stiffness: ArrayLike, damping: ArrayLike | None = None,
-        **frames: Unpack[ClosureFrames],
-    ) -> Self:  # fmt: skip
-        """Stiffness and damping of all relative motions of two frames, symmetric (6,6): [rotation; translation] of B
-        in axes of A. `frames`: as of a closure."""
-        values = frames if damping is None else frames | {"damping": damping}
-        return self._append(s.Bushing, name=name, body_a=body_a, body_b=body_b, stiffness=stiffness, **values)
-
-    def angular_spring(self, name: str, hinge: str, **options: Unpack[HingeSpringOptions]) -> Self:
-        """A nonlinear spring (N m/rad) along an angle of a hinge, with stops; see AngularSpring."""
-        refuse_others("an AngularSpring", options, HingeSpringOptions)
-        return self._append(s.AngularSpring, name=name, hinge=hinge, **options)
-
-    def linear_spring(self, name: str, hinge: str, **options: Unpack[HingeSpringOptions]) -> Self:
-        """A nonlinear spring (N/m) along a displacement of a hinge or point mass, with stops; see LinearSpring."""
-        refuse_others("a LinearSpring", options, HingeSpringOptions)
-        return self._append(s.LinearSpring, name=name, hinge=hinge, **options)
-
-    def angular_friction(
-        self, name: str, hinge: str, *, sliding: float, smoothing: float, **options: Unpack[FrictionOptions]
-    ) -> Self:
-        """Dry friction (N m) along an angle of a hinge or in a wheel's bearing, smooth below the rate `smoothing`."""
-        return self._append(s.AngularFriction, name=name, hinge=hinge, sliding=sliding, smoothing=smoothing, **options)
-
-    def linear_friction(
-        self, name: str, hinge: str, *, sliding: float, smoothing: float, **options: Unpack[FrictionOptions]
-    ) -> Self:
-        """Dry friction (N) along a displacement of a hinge or point mass, smooth below the speed `smoothing`."""
-        return self._append(s.LinearFriction, name=name, hinge=hinge, sliding=sliding, smoothing=smoothing, **options)
-
-    # Feedback: what controllers put out acts through a ControlSignal in place of a function of time
-
-    def sense_coordinate(self, name: str, of: str, *, quantity: Literal["value", "rate"] = "value") -> Self:
-        """Coordinates or speeds of a hinge, wheel, point mass or "<body>.modes" as a signal."""
-        return self._append(s.CoordinateSensor, name=name, of=of, quantity=quantity)
-
-    def sense_marker(
-        self, name: str, marker: str, quantity: str, *, frame: Literal["world", "marker"] = "world"
-    ) -> Self:
-        """A marker's "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
-        or "specific_force", in World axes or its own."""
-        return self._append(s.MarkerSensor, name=name, marker=marker, quantity=quantity, frame=frame)
-
-    def sense_load(self, name: str, hinge: str) -> Self:
-        """The load across a hinge, [torque; force] on the outboard body, World axes."""
-        return self._append(s.LoadSensor, name=name, hinge=hinge)
-
-    def sense_time(self, name: str) -> Self:
-        """Time (s) as a signal."""
-        return self._append(s.TimeSensor, name=name)
-
-    def sense_profile(self, name: str, function: s.Function) -> Self:
-        """A function of time and its rate as signals."""
-        return self._append(s.ProfileSensor, name=name, function=function)
-
-    def state_space(self, name: str, inputs: str | Sequence[str], **law: Unpack[LinearLaw]) -> Self:
-        """A linear controller: `A`, `B`, `C`, `D`, `initial`; `period`, `offset`, `delay` (s) where it is sampled."""
-        refuse_others("a StateSpace", law, LinearLaw)
-        return self._append(s.StateSpace, name=name, inputs=_several(inputs), **law)
-
-    def pid(self, name: str, inputs: str | Sequence[str], **law: Unpack[PidLaw]) -> Self:
-        """kp e + integral of ki e + kd e', e = setpoint - input: gains, `setpoint`, `filter` (s), `lower`, `upper`,
-        `tracking` (s); `period`, `offset`, `delay` (s) where it is sampled."""
-        refuse_others("a Pid", law, PidLaw)
-        return self._append(s.Pid, name=name, inputs=_several(inputs), **law)
-
-    def saturation(
-        self, name: str, inputs: str | Sequence[str], *, lower: float, upper: float, **sampling: Unpack[Sampling]
-    ) -> Self:
-        """Inputs between limits."""
-        refuse_others("a Saturation", sampling, Sampling)
-        return self._append(s.Saturation, name=name, inputs=_several(inputs), lower=lower, upper=upper, **sampling)
-
-    def gain_table(
-        self, name: str, inputs: str | Sequence[str], *, points: ArrayLike, values: ArrayLike,
-        **sampling: Unpack[Sampling],
-    ) -> Self:  # fmt: skip
-        """A gain by the first input, linear between `values` at `points`, times all others."""
-        refuse_others("a GainTable", sampling, Sampling)
-        return self._append(
-            s.GainTable, name=name, inputs=_several(inputs), points=points, values=values, **sampling
-        )
-
-    def user_law(
-        self, name: str, inputs: str | Sequence[str], function: str | Callable[..., Any], **law: Unpack[OwnLaw]
-    ) -> Self:
-        """A function of one's own, which a module has at its top level, or its name "module:function".
-
-        `outputs`: how many; `initial` state; `parameters`; `period`, `offset`, `delay` (s) where it is sampled.
-        """
-        refuse_others("a UserLaw", law, OwnLaw)
-        address = function if isinstance(function, str) else _address(function)
-        return self._append(s.UserLaw, name=name, inputs=_several(inputs), function=address, **law)
-
-
-def _several(inputs: str | Sequence[str]) -> Sequence[str]:
-    return (inputs,) if isinstance(inputs, str) else inputs
-
-
-def _address(function: Callable[..., Any]) -> str:
-    """ "module:function", by which a scene finds it again; ValueError for one that no module has at its top level."""
-    plain = getattr(function, "py_func", function)
-    name = getattr(plain, "__qualname__", repr(plain))
-    if "<" in name:
-        raise ValueError(
-            f"{name} exists inside of another function only, where no file finds it: define it by def at the top level "
-            "of a module"
-        )
-    return f"{plain.__module__}:{name}"

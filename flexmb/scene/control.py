@@ -46,11 +46,30 @@ class MarkerSensor(SceneStruct, frozen=True, kw_only=True, tag="marker", tag_fie
     frame: Literal["world", "marker"] = "world"
 
 
+class DistanceSensor(SceneStruct, frozen=True, kw_only=True, tag="distance", tag_field="kind"):
+    """Distance of two markers (m) and its rate (m/s), two numbers: how far bodies are apart, how long a spring is."""
+
+    name: str
+    marker_a: str
+    marker_b: str
+
+
 class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="kind"):
     """Total load across a hinge, six numbers [torque; force] on the outboard body about the hinge point, World axes."""
 
     name: str
     hinge: str
+
+
+class DriveSensor(SceneStruct, frozen=True, kw_only=True, tag="drive", tag_field="kind"):
+    """Load of the drive that moves or holds a coordinate, prescribed or latched (N or N m); of a free one 0.
+
+    What is beyond its spring, damper and motor, as in `drives` of a run. `coordinate`: "<hinge>.<key>" of a scalar
+    coordinate, such as "root.rotation", or "<wheel>.angle".
+    """
+
+    name: str
+    coordinate: str
 
 
 class TimeSensor(SceneStruct, frozen=True, kw_only=True, tag="time", tag_field="kind"):
@@ -66,7 +85,7 @@ class ProfileSensor(SceneStruct, frozen=True, kw_only=True, tag="profile", tag_f
     function: Function
 
 
-Sensor = CoordinateSensor | MarkerSensor | LoadSensor | TimeSensor | ProfileSensor
+Sensor = CoordinateSensor | MarkerSensor | DistanceSensor | LoadSensor | DriveSensor | TimeSensor | ProfileSensor
 
 
 class _Controller(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):

@@ -25,10 +25,15 @@ class Release(SceneStruct, frozen=True, kw_only=True, tag="release", tag_field="
 
 
 class Impact(SceneStruct, frozen=True, kw_only=True, tag="impact", tag_field="kind"):
-    """An impulse along the coordinate turns its speed over, to `restitution` times as much: contact with a stop."""
+    """An impulse along the coordinate turns its speed over, to `restitution` times as much: contact with a stop.
+
+    With `rests`, a body that is pressed against the stop comes to rest on it where its rebound is below the error that
+    the run allows: it is held there, until the stop would have to pull.
+    """
 
     coordinate: str
     restitution: float = 1.0
+    rests: bool = False
 
 
 class Change(SceneStruct, frozen=True, kw_only=True, tag="change", tag_field="kind"):
@@ -52,8 +57,9 @@ class SceneEvent(SceneStruct, frozen=True, kw_only=True):
     """What happens, whenever `watch` comes to `level` from below (rising), from above (falling) or either way.
 
     `watch`: "time" (s); a scalar coordinate, "<hinge>.<key>" or "<wheel>.angle" (m or rad); its rate,
-    "<hinge>.<key>.rate" or "<wheel>.speed"; or the name of a sensor that measures one of these alone. What is at its
-    level when the run begins has been there before. Actions are done in their order, at the same time.
+    "<hinge>.<key>.rate" or "<wheel>.speed"; or a signal: one number of a sensor or controller, "height[2]", whose
+    number may be left out where there is only one. What is at its level when the run begins has been there before.
+    Actions are done in their order, at the same time.
     """
 
     name: str

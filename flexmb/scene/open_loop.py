@@ -8,12 +8,31 @@ import msgspec
 
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.functions import Constant, ControlSignal
-from flexmb.scene.schema import Scene
+from flexmb.scene.schema import Change, Scene, SceneEvent
+from flexmb.scene.tree import watchable
+from flexmb.scene.values import PathError, with_values
 
 
 def open_loop(scene: Scene) -> Scene:
-    """The scene without sensors and controllers; what they drove stays where it was, with value 0."""
-    return _silent(msgspec.structs.replace(scene, sensors=(), controllers=()))
+    """The scene without sensors and controllers; what they drove stays where it was, with value 0.
+
+    Nor are there events that watch their signals or change controllers.
+    """
+    left = msgspec.structs.replace(scene, sensors=(), controllers=())
+    if scene.events:
+        known = watchable(left)
+        events = tuple(event for event in scene.events if event.watch in known and _can_happen(left, event))
+        left = msgspec.structs.replace(left, events=events)
+    return _silent(left)
+
+
+def _can_happen(scene: Scene, event: SceneEvent) -> bool:
+    """Whether what it changes is in the scene."""
+    try:
+        with_values(scene, {action.path: action.value for action in event.actions if isinstance(action, Change)})
+    except PathError:
+        return False
+    return True
 
 
 def _silent(item: Any) -> Any:

@@ -41,6 +41,8 @@ from flexmb.scene.connectors import (
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
+    DriveSensor,
     GainTable,
     LoadSensor,
     MarkerSensor,
@@ -186,13 +188,13 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
 
 
 __all__ = [
-    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation",
-    "Body", "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller",
-    "CoordinateSensor", "Cylindrical", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge", "Impact",
-    "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load", "LoadSensor",
-    "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid", "Planar",
-    "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute", "RigidBody",
-    "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical", "SpinUp",
-    "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector", "Waiver",
-    "Weld", "Wheel",
+    "Action", "AngularCoordinate", "AngularFriction", "AngularSpring", "BeamBody", "BeamNode", "BeamStation", "Body",
+    "Bushing", "Change", "Closure", "Connector", "Constant", "ControlSignal", "Controller", "CoordinateSensor",
+    "Cylindrical", "DistanceSensor", "DriveSensor", "EndRun", "Free", "Function", "GainTable", "Gimbal", "Hinge",
+    "Impact", "InertiaPoint", "Latch", "Level", "LinearCoordinate", "LinearFriction", "LinearSpring", "Load",
+    "LoadSensor", "Marker", "MarkerSensor", "Matrix3", "ModalBody", "ModalNode", "ModalState", "Modes", "Node", "Pid",
+    "Planar", "PointMass", "Prismatic", "ProfileSensor", "Pulse", "Quaternion", "Ramp", "Release", "Revolute",
+    "RigidBody", "Saturation", "Scene", "SceneEvent", "Sensor", "SidBody", "Sine", "SmoothStep", "Spherical",
+    "SpinUp", "SpringDamper", "StateSpace", "Table", "TimeSensor", "TipMass", "Universal", "UserLaw", "Vector",
+    "Waiver", "Weld", "Wheel",
 ]  # fmt: skip

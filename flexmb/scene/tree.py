@@ -8,6 +8,7 @@ from flexmb.scene.bodies import IDENTITY, ZERO, BeamBody, Body, ModalBody, Quate
 from flexmb.scene.columns import struct_keys
 from flexmb.scene.connectors import AlongHinge, AngularFriction, AngularSpring
 from flexmb.scene.control import CoordinateSensor, TimeSensor
+from flexmb.scene.events import Impact
 from flexmb.scene.hinges import AngularCoordinate, Hinge, LinearCoordinate
 from flexmb.scene.schema import PointMass, Scene, Wheel
 
@@ -151,8 +152,16 @@ def coordinate_of(scene: Scene, connector: AlongHinge) -> tuple[Hinge | PointMas
     raise ValueError(f'"{item.name}" has no {sort} "{connector.coordinate}"'.replace(' ""', ""))
 
 
+def watches_signals(scene: Scene) -> bool:
+    """Whether an event watches what only sensors and controllers say, or will: the load of a stop."""
+    if not scene.events:
+        return False
+    rests = any(isinstance(action, Impact) and action.rests for event in scene.events for action in event.actions)
+    return rests or not {event.watch for event in scene.events} <= set(watchable(scene))
+
+
 def watchable(scene: Scene) -> dict[str, str]:
-    """What an event may watch, by the name it gives: "time", a scalar coordinate or its rate.
+    """What an event may watch without a look at sensors, by the name it gives: "time", a scalar coordinate, its rate.
 
     A sensor of time or of the only coordinate of a hinge, wheel or point mass stands for what it measures.
     """

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal, NamedTuple
 
 from flexmb.frisch.errata import Erratum
-from flexmb.integrate.problem import Leaping
+from flexmb.integrate.problem import Leaping, Linear
 from flexmb.system.mechanics import Mechanics
 from flexmb.typing import Real
 
@@ -21,13 +21,14 @@ Algorithm = Literal["articulated", "unsplit", "composite", "frisch", "frisch_as_
 class Route(NamedTuple):
     """An algorithm as runs see it: a maker of constants and workspace, kernels of the motion and of its manifold.
 
-    leaping: how runs go on where a step fails, if they can.
+    leaping: how runs go on where a step fails, if they can. linear: for these tables, what methods need that linearise.
     """
 
     tables: Callable[[], tuple[Any, Any]]
     rhs: Any
     project: Any
     leaping: Leaping | None = None
+    linear: Callable[[Any, Any], Linear] | None = None
 
 
 @dataclass(frozen=True)
@@ -57,7 +58,7 @@ class DynamicsAlgorithm:
     closed_motion: Callable[[Closures, float, Real], ClosedMotion] | None = None
     """For closed chains; None where it knows trees only."""
     jacobian: bool = False
-    """It has the Jacobians that stiff integrators need, of trees."""
+    """It has the Jacobians that stiff integrators need."""
     errata: Set[Erratum] | None = None
     """Defects of Frisch's print that it keeps; None where its equations are not his."""
 

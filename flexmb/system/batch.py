@@ -100,6 +100,10 @@ class Batch:
             ]
             broaden(self._constants)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copied and pickled as its systems are, which is as their scenes."""
+        return Batch, (self.systems,)
+
     def system(self, copy: int) -> System:
         """That of a copy; ValueError or TypeError for the number of a copy that there is not."""
         place = arguments.index("copy", copy, sys.maxsize if self.shares_constants else len(self.systems))

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flexmb.entry import articulated
+from flexmb.entry import articulated, tangent
 from flexmb.entry.observation import observe
-from flexmb.motion import coordinates
+from flexmb.integrate.problem import Linear
+from flexmb.motion import coordinates, retraction
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.mechanics import Mechanics
 from flexmb.tables.status import OK
@@ -35,6 +36,17 @@ def _observe(system: Mechanics, t: float, y: Real) -> None:
     system._trust(t, y, w)
 
 
+def _linear(system: Mechanics) -> Linear:
+    exact = system.constants  # with every body eliminated explicitly, for Jacobians
+    return Linear(tangent.jacobian, retraction.move, exact, tangent.tangent_workspace(exact, system.nq, system.nu))
+
+
+def _route(system: Mechanics) -> Route:
+    return Route(
+        lambda: _fresh(system), articulated.rhs, coordinates.project, linear=lambda *_: _linear(system)
+    )
+
+
 def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:
     return closures.motion(t, y)
 
@@ -46,7 +58,7 @@ ALGORITHM = DynamicsAlgorithm(
     _own,
     _fresh,
     _observe,
-    route=lambda system: Route(lambda: _fresh(system), articulated.rhs, coordinates.project),
+    route=_route,
     observing=observe,
     closed_motion=_closed_motion,
     jacobian=True,

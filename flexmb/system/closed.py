@@ -4,19 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
+from flexmb.closure import jacobian as closed_jacobian
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
+from flexmb.closure.jacobian import chain_tangent
 from flexmb.closure.leap import back, leap
 from flexmb.closure.tables import Closed
 from flexmb.entry import articulated
-from flexmb.integrate.problem import Leaping
+from flexmb.integrate.problem import Leaping, Linear
 from flexmb.scene import schema as s
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
@@ -48,6 +51,10 @@ class ClosedSystem(System):
         """The same scene turned into other arrays."""
         return ClosedSystem(self.scene)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """As of a tree."""
+        return ClosedSystem, (self.scene,)
+
     @property
     def initial_state(self) -> State:
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
@@ -65,6 +72,21 @@ class ClosedSystem(System):
         """Independent motions that the closures suppress, at the initial state."""
         self.initial_state  # noqa: B018 - counts them
         return self.closures.rank
+
+    def begin_at(self, t: float, y: Real, before: ClosedSystem | None = None) -> None:
+        """Go on at y = [q, u, work], which closes all closures, where the scene's own values may not.
+
+        The independent rows are those of the scene before, of as many prescribed speeds, or are counted there.
+        """
+        if before is not None and np.array_equal(self._is_prescribed, before._is_prescribed):
+            self.closures.count_as(before.closures)
+        else:
+            self.closures.linearise(t, y)
+            self.closures.count_rows()
+
+    @property
+    def _is_prescribed(self) -> NDArray[np.bool_]:
+        return self.constants.speed["prescribed"] >= 0
 
     def _admissible(self, t: float, y: Real) -> State:
         """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
@@ -181,7 +203,12 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap, watch_steps))
+        leaping = Leaping(back, leap, watch_steps)
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear)
+
+    def _linear(self, chain: Closed, _: Closed) -> Linear:
+        tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)
+        return Linear(closed_jacobian.jacobian, closed_jacobian.move, chain, tangent, settles=True)
 
     def _on_chains(self, algorithm: Algorithm) -> Callable[[Closures, float, Real], ClosedMotion]:
         """How the algorithm finds the motion of closed chains; NotImplementedError where it does not."""
@@ -195,12 +222,13 @@ class ClosedSystem(System):
         return motion
 
     def _refuse_locked(self) -> None:
-        start = self.initial_state  # counts the independent rows
+        if self.closures.rank < 0:
+            self.initial_state  # noqa: B018 - counts the independent rows
         locked = self.closures.mobility == 0 < self.closures.rank  # a tree of welds is not locked by its closures
-        if locked and not np.any(self.constants.speed["prescribed"] >= 0):
+        if locked and not np.any(self._is_prescribed):
             names = ", ".join(f'"{closure.name}"' for closure in self.scene.closures)
             raise ClosureError(
-                f"closures {names} leave none of the {len(start.u)} free speeds: the mechanism is locked. Free a "
+                f"closures {names} leave none of the {self.nu} free speeds: the mechanism is locked. Free a "
                 "hinge, or let bodies deform"
             )
 

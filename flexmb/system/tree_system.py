@@ -24,7 +24,6 @@ from flexmb.building.numbering import Numbering, wheels_by_body
 from flexmb.entry import articulated
 from flexmb.entry.observation import Outputs
 from flexmb.jain.elimination import ELIMINATIONS, Elimination, with_elimination
-from flexmb.jit.direct import Direct
 from flexmb.motion import coordinates
 from flexmb.scene import schema as s
 from flexmb.scene.connectors import HingeFriction, HingeSpring
@@ -97,10 +96,9 @@ class System(Mechanics):
     def _out(self) -> Outputs:  # type: ignore[override]
         return self._observation.out
 
-    def __getstate__(self) -> dict[str, Any]:
-        """Without what holds addresses: a copy finds its own."""
-        kept = {name: value for name, value in self.__dict__.items() if not isinstance(value, Direct)}
-        return kept | {"_evaluators": {}, "kept": {}}
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Copied and pickled as its scene: addresses are of one process, and arrays are parts of each other."""
+        return System, (self.scene, self._asked)
 
     @property
     def body_names(self) -> tuple[str, ...]:

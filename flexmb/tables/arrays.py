@@ -303,7 +303,7 @@ class Workspace:
     inverse_pivot: Real  # (N,m)
     port: Record  # (P,) PORT_STATE
     port_mode: Real  # (P,6,m) [angular; linear] velocity per modal speed
-    point_mode: Real  # (6,m) likewise of one summed point; scratch
+    point_mode: Real  # (6,m or 8) likewise of one summed point; scratch, as long as a strip without modes too
     speed: Record  # (nu,) SPEED_STATE
     connector: Record  # (C,) CONNECTOR_STATE
     hinge_spring: Record  # ALONG_HINGE_STATE

@@ -32,7 +32,7 @@ def workspace(c: a.Constants, nq: int, nu: int) -> a.Workspace:
         "pfr": strip_zeros((n, m, ROW)),
         "port": ports_at_rest(c),
         "port_mode": strip_zeros((len(c.port), 6, m)),
-        "point_mode": strip_zeros((6, m)),
+        "point_mode": strip_zeros((6, max(m, ROW))),  # a strip at least: eliminations put their sums there
         "speed": np.zeros(nu, a.SPEED_STATE),
         **connector_states(c),
         "function": np.zeros((len(c.function), 3)),

@@ -13,6 +13,7 @@ from crosscheck.biting.invariances.counterpart import (
     total_mass,
     vector,
     with_energy,
+    without_feedback,
 )
 from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Free, Hinge
@@ -27,6 +28,7 @@ BOOST_M_S = np.array([0.25, -0.125, 0.5])
 def _boosted(scene: Scene) -> Counterpart:
     """The angular momentum about the World's origin, which the bodies fly away from, is left out; so is the work of
     forces, which depends on how fast their points move."""
+    without_feedback(scene)
     held = [hinge.name for hinge in scene.hinges if hinge.parent == GROUND and not isinstance(hinge, Free)]
     pairs = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
     held += [each.name for each in pairs if GROUND in (each.body_a, each.body_b)]

@@ -1,7 +1,7 @@
 """The zero of the clock that functions of time are written on.
 
-Runs begin at t = 0: the contract of engines has no start time. So only what can be written on another clock without one
-is: a sine by whole turns of its phase, a ramp by its start.
+For any engine, as runs begin at t = 0 here: only what can be written on another clock all the same, a sine by whole
+turns of its phase, a ramp by its start. Runs that begin at another time are `later`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,13 @@ import math
 
 import msgspec
 
-from crosscheck.biting.invariances.counterpart import Counterpart, Invariance, NotApplicable, without_events
+from crosscheck.biting.invariances.counterpart import (
+    Counterpart,
+    Invariance,
+    NotApplicable,
+    without_events,
+    without_feedback,
+)
 from crosscheck.library.time_functions import in_functions
 from flexmb.scene.functions import Constant, Function, Ramp, Sine
 from flexmb.scene.schema import Scene
@@ -20,6 +26,7 @@ TURNS = 1
 
 
 def _rewritten(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     without_events(scene)
     found: list[Function] = []
 
@@ -34,7 +41,7 @@ def _rewritten(scene: Scene) -> Counterpart:
             case Constant():
                 return function
         kind = function.__struct_config__.tag
-        raise NotApplicable(f'a "{kind}" cannot be shifted without a start time of the run, which engines do not have')
+        raise NotApplicable(f'a "{kind}" cannot be shifted without a start time of the run')
 
     other = in_functions(scene, on_another_clock)
     if other == scene:

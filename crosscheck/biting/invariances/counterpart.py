@@ -25,11 +25,13 @@ class NotApplicable(ValueError):
 @dataclass(frozen=True)
 class Counterpart:
     """A scene that moves like another. `back(times, channels)` tells its channels (T, k) as those of the other at the
-    other's `times` (T,); what it leaves out is not compared. Its clock shows `clock` times as much."""
+    other's `times` (T,); what it leaves out is not compared. Its clock shows `clock` times as much, and `starts_s` (s)
+    where the other's shows 0."""
 
     scene: Scene
     back: Callable[[Real, Channels], Channels]
     clock: float = 1.0
+    starts_s: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,6 +41,12 @@ class Invariance:
     name: str
     what: str
     of: Callable[[Scene], Counterpart]
+
+
+def without_feedback(scene: Scene) -> None:
+    """`NotApplicable` for a scene with controllers, which the invariance would have to tell in its own terms."""
+    if scene.controllers:
+        raise NotApplicable("the scene has controllers, which would have to be told in the other frame too")
 
 
 def without_events(scene: Scene) -> None:

@@ -19,6 +19,7 @@ from crosscheck.biting.invariances.counterpart import (
     by_kind,
     is_prescribed,
     without_events,
+    without_feedback,
 )
 from crosscheck.library.time_functions import scaled
 from flexmb.scene.bodies import ModalBody, ModalNode, SidBody
@@ -54,6 +55,7 @@ QUATERNION_KEYS = ("quaternion", "parent_quaternion", "child_quaternion", "quate
 
 
 def _mirrored(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):

@@ -18,6 +18,7 @@ from crosscheck.biting.invariances.counterpart import (
     total_mass,
     vector,
     with_energy,
+    without_feedback,
 )
 from flexmb.scene.bodies import IDENTITY, Quaternion, Vector
 from flexmb.scene.connectors import Connector
@@ -34,6 +35,7 @@ Placed = Callable[[Vector, Quaternion], tuple[Vector, Quaternion]]
 
 
 def _turned(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     R = rotation_matrix(TURN)
 
     def placed(position: Vector, orientation: Quaternion) -> tuple[Vector, Quaternion]:
@@ -57,6 +59,7 @@ def _turned(scene: Scene) -> Counterpart:
 
 
 def _moved(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     gravity = np.asarray(scene.gravity_m_s2)
     potential = total_mass(scene) * float(gravity @ STEP_M) if np.any(gravity) else 0.0
 

@@ -13,16 +13,19 @@ from crosscheck.biting.invariances.counterpart import (
     NotApplicable,
     is_prescribed,
     without_events,
+    without_feedback,
 )
 from crosscheck.library.time_functions import scaled, slowed
+from flexmb.run.warm_up import general_kernels
 from flexmb.scene.bodies import ModalBody, SidBody
-from flexmb.scene.connectors import Bushing, LinearFriction, LinearSpring, by_stem
+from flexmb.scene.connectors import AngularSpring, Bushing, LinearFriction, LinearSpring, SpringDamper
 from flexmb.scene.functions import Function
 from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
+from flexmb.system.compile import compile
 from flexmb.typing import Real
 
 # Speeds, accelerations, forces, energies and all else have another factor than 1.
@@ -43,6 +46,16 @@ class Dimension(NamedTuple):
         return LENGTH**self.length * MASS**self.mass * TIME**self.time
 
 
+Each = tuple[Any, ...]
+"""The dimension of each number of a tuple, or of tuples within it."""
+
+
+def _blocks(turning: Dimension, mixed: Dimension, moving: Dimension) -> Each:
+    """Of a (6,6) matrix by [rotation; translation]."""
+    above, below = (turning,) * 3 + (mixed,) * 3, (mixed,) * 3 + (moving,) * 3
+    return (above,) * 3 + (below,) * 3
+
+
 NUMBER = Dimension()
 FORCE, ENERGY = Dimension(1, 1, -2), Dimension(2, 1, -2)
 OF_UNIT = {
@@ -52,6 +65,11 @@ OF_UNIT = {
     "kg m²": Dimension(2, 1), "N/m": Dimension(0, 1, -2), "N s/m": Dimension(0, 1, -1), "N m/rad": ENERGY,
     "N m s/rad": Dimension(2, 1, -1), "s/rad": Dimension(time=1), "s/m": Dimension(-1, 0, 1),
 }  # fmt: skip
+# Of bushings: the first three rows and columns are of turns, the others of displacements.
+OF_BUSHING = {
+    "stiffness": _blocks(ENERGY, FORCE, Dimension(0, 1, -2)),
+    "damping": _blocks(Dimension(2, 1, -1), Dimension(1, 1, -1), Dimension(0, 1, -1)),
+}
 # Of raw modal bodies, whose modal coordinates are numbers without unit.
 OF_MODES = {
     "translation_modes": Dimension(1), "second_translation": Dimension(1), "stiffness": ENERGY,
@@ -65,21 +83,31 @@ OF_CHANNEL = {
 
 
 def _rescaled(scene: Scene) -> Counterpart:
+    without_feedback(scene)
     without_events(scene)
     for body in scene.bodies:
         if isinstance(body, SidBody) or (isinstance(body, ModalBody) and body.file is not None):
             raise NotApplicable(f'body "{body.name}" keeps its numbers in a file')
-    for connector in scene.connectors:
-        if isinstance(connector, Bushing) or by_stem(connector).get("stiffening"):
-            raise NotApplicable(f'connector "{connector.name}" has numbers whose keys do not tell their units')
     if scene.modal_states:  # the unit of a beam's modal coordinates is its modes', which are made with the model
         scene = modal_points(scene)
-    drives = _drives(scene)
+    drives, left_out = _drives(scene), _undetermined(scene)
 
     def back(times: Real, channels: Channels) -> Channels:
-        return {name: rows / _factor(name, drives) for name, rows in channels.items()}
+        return {name: rows / _factor(name, drives) for name, rows in channels.items() if name not in left_out}
 
     return Counterpart(msgspec.structs.replace(_in_units(scene), allow=UNUSUAL), back, clock=TIME)
+
+
+def _undetermined(scene: Scene) -> set[str]:
+    """Channels of loads that the motion leaves open, in overconstrained mechanisms: the least ones, which an engine may
+    take, are others in other units."""
+    if not scene.closures:
+        return set()
+    with general_kernels():
+        system = compile(scene)
+        determined = system.determined_loads(system.initial_state)
+    parts = ("torque", slice(0, 3)), ("force", slice(3, 6))
+    return {f"load:{name}.{part}" for name, known in determined.items() for part, at in parts if not known[at].all()}
 
 
 def _factor(channel: str, drives: dict[str, float]) -> float:
@@ -112,16 +140,30 @@ def _in_units(item: Any) -> Any:
     )
 
 
-def _dimension(item: msgspec.Struct, key: str) -> Dimension:
+def _dimension(item: msgspec.Struct, key: str) -> Dimension | Each:
     match item:
         case Load() if key == "function":
             return FORCE if item.type == "force" else ENERGY
         case ModalState() if key == "rates":
             return Dimension(time=-1)
+        case Bushing() if key in OF_BUSHING:
+            return OF_BUSHING[key]
+        case SpringDamper() | AngularSpring() | LinearSpring() if key == "stiffening":
+            return _stiffening(item)
     return OF_MODES[key] if key in OF_MODES else OF_UNIT[split_unit(key)[1]]
 
 
-def _converted(value: Any, dimension: Dimension) -> Any:
+def _stiffening(spring: SpringDamper | AngularSpring | LinearSpring) -> Each:
+    """Of what is multiplied with the second and higher powers of an angle or a displacement."""
+    count = len(spring.stiffening)
+    if isinstance(spring, AngularSpring):
+        return (ENERGY,) * count
+    return tuple(Dimension(-1 - n, 1, -2) for n in range(count))
+
+
+def _converted(value: Any, dimension: Dimension | Each) -> Any:
+    if not isinstance(dimension, Dimension):
+        return tuple(_converted(each, own) for each, own in zip(value, dimension, strict=True))
     if isinstance(value, Function):
         return slowed(scaled(value, dimension.factor), TIME)
     match value:

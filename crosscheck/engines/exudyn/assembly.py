@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from crosscheck.engines.connections import tension_of
+from crosscheck.engines.connections import along_hinges
 from crosscheck.engines.conventions import Frame, frame, rotation_matrix
-from crosscheck.engines.exudyn import joints
+from crosscheck.engines.exudyn import joints, springs
 from crosscheck.engines.exudyn.carriers import Carrier, Workshop
 from crosscheck.engines.exudyn.joints import ExudynLink, HingePort
 from crosscheck.engines.exudyn.modal import NodeShape, integrals, node_shape
@@ -17,7 +17,7 @@ from crosscheck.engines.exudyn.motion import AT_REST, FrameMotion, across_quater
 from crosscheck.engines.functions_of_time import Profile, profile
 from crosscheck.engines.links import axes
 from flexmb.scene.bodies import IDENTITY
-from flexmb.scene.connectors import Connector, SpringDamper
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import AngularCoordinate, Free, Hinge, Spherical, Weld
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import Body, Closure, Load, ModalBody, PointMass, Scene, Wheel
@@ -124,7 +124,9 @@ def assemble(scene: Scene) -> Assembly:
         carriers.append(carrier)
     closures = {closure.name: _closure(shop, placed, closure) for closure in scene.closures}
     for connector in scene.connectors:
-        _spring(shop, placed, connector)
+        if isinstance(connector, BetweenNodes):
+            _connect(shop, placed, connector)
+    _connect_along(shop, scene, (hinges, wheels, guides))
     for load in scene.loads:
         _load(shop, placed[load.body], load)
     sampler = shop.mbs.AddSensor(shop.items.SensorUserFunction(sensorUserFunction=_nothing, storeInternal=True))
@@ -145,9 +147,6 @@ def _held_nodes(scene: Scene) -> dict[str, set[str]]:
     users += [(item.body, item.node) for item in (*scene.wheels, *scene.point_masses)]
     ends = [(each.body_a, each.node_a) for each in scene.closures]
     ends += [(each.body_b, each.node_b) for each in scene.closures]
-    for each in scene.connectors:
-        if isinstance(each, SpringDamper):
-            ends += [(each.body_a, each.node_a), (each.body_b, each.node_b)]
     users += [(body, node) for body, node in ends if body != GROUND]
     for name, node in users:
         if deforming(bodies[name], node):
@@ -163,10 +162,7 @@ def _attach(
 ) -> tuple[ExudynLink, Placed]:
     """A body and the hinge that joins it to its parent."""
     own = frame(hinge.parent_position_m, hinge.parent_quaternion)
-    if hinge.parent == GROUND:
-        port = HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
-    else:
-        port = _port(shop, placed[hinge.parent], hinge.parent_node, own)
+    port = _end(shop, placed, hinge.parent, hinge.parent_node, own)
     outboard = frame(*node_frame(body, hinge.child_node)) @ frame(hinge.child_position_m, hinge.child_quaternion)
     zero = port.zero @ outboard.rotation.T
     found: list[Placed] = []
@@ -273,30 +269,39 @@ def _closure(shop: Workshop, placed: dict[str, Placed], closure: Closure) -> Exu
     b = frame(closure.position_b_m, closure.quaternion_b)
     ports = []
     for body, node, own in ((closure.body_a, closure.node_a, a), (closure.body_b, closure.node_b, b)):
-        if body == GROUND:
-            ports.append(HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation)))
-        else:
-            ports.append(_port(shop, placed[body], node, own))
+        ports.append(_end(shop, placed, body, node, own))
     return joints.closure(shop, closure.name, closure.type, ports, _unit(closure.axis))
 
 
-def _spring(shop: Workshop, placed: dict[str, Placed], connector: Connector) -> None:
-    """A spring-damper between two points that exist already, with the scene's law as a user function."""
-    assert isinstance(connector, SpringDamper)
-    markers, tension = [], tension_of(connector)
+def _end(shop: Workshop, placed: dict[str, Placed], body: str, node: str, own: Frame) -> HingePort:
+    """A frame `own` on the ground or at a node of a body."""
+    if body == GROUND:
+        return HingePort(shop.ground, own.position, own.rotation, AT_REST.offset(own.position, own.rotation))
+    return _port(shop, placed[body], node, own)
+
+
+def _connect(shop: Workshop, placed: dict[str, Placed], connector: BetweenNodes) -> None:
+    """A connector between two frames that exist already."""
+    still = NodeShape(np.zeros(3), np.eye(3), *np.zeros((2, 3, 0)))
+    ends = []
     for side in "ab":
-        body, own = getattr(connector, f"body_{side}"), frame(getattr(connector, f"position_{side}_m"), IDENTITY)
+        own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
+        body, node = getattr(connector, f"body_{side}"), getattr(connector, f"node_{side}")
         if body == GROUND:
-            markers.append(shop.marker(shop.ground, own.position))
+            ends.append(springs.ConnectorEnd(shop.ground, still, own))
         else:
-            port = _port(shop, placed[body], getattr(connector, f"node_{side}"), own)
-            markers.append(shop.marker(port.carrier, port.position))
-    shop.mbs.AddObject(
-        shop.items.SpringDamper(
-            markerNumbers=markers, referenceLength=connector.free_length_m, stiffness=0.0, damping=0.0,
-            springForceUserFunction=lambda mbs, t, item, x, rate, k, d, f: tension(t, x, rate).load,
-        )
-    )  # fmt: skip
+            ends.append(springs.ConnectorEnd(placed[body].carrier, placed[body].shape(node), own))
+    springs.between(shop, connector, ends)
+
+
+def _connect_along(shop: Workshop, scene: Scene, kinds: Sequence[dict[str, ExudynLink]]) -> None:
+    """Connectors along hinges; those on a link's last coordinate are among what acts on its outboard body."""
+    for _, item, number, load in along_hinges(scene):
+        links = next(each for each in kinds if item in each)
+        link = links[item]
+        spring = springs.along(shop, link.stages[number], load)
+        if number == len(link.stages) - 1:
+            links[item] = replace(link, connectors=(*link.connectors, (spring, False)))
 
 
 def _wheel(shop: Workshop, parent: Placed, wheel: Wheel) -> tuple[ExudynLink, Carrier]:

@@ -53,6 +53,18 @@ def coordinate(stage: Stage, paths: Paths) -> Real:
     return np.unwrap(np.concatenate([[initial(stage.coordinate)[0]], vector]))[1:]
 
 
+def coordinate_rate(stage: Stage, paths: Paths) -> Real:
+    """(T,) rate of a scalar joint coordinate."""
+    a, b = paths[stage.inboard.key], paths[stage.outboard.key]
+    axis = a.rotation @ stage.axis
+    if stage.angular:
+        return np.einsum("ti,ti->t", b.omega - a.omega, axis)
+    arm_a, arm_b = a.rotation @ stage.inboard_point, b.rotation @ stage.outboard_point
+    gap = b.position + arm_b - a.position - arm_a
+    rate = b.velocity + np.cross(b.omega, arm_b) - a.velocity - np.cross(a.omega, arm_a)
+    return np.einsum("ti,ti->t", rate - np.cross(a.omega, gap), axis)
+
+
 def _relative(a: CarrierPath, b: CarrierPath) -> Real:
     return np.einsum("tji,tjk->tik", a.rotation, b.rotation)
 

@@ -1,40 +1,77 @@
-"""What springs between nodes do in an Exudyn run, from the recorded motion of their ends."""
+"""What connectors do in an Exudyn run, from the recorded motion of their ends and of the joints that they act along."""
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from crosscheck.engines.connections import Exerted, Moving, exerts
+from crosscheck.engines.connections import Along, Exerted, Moving, along_hinges, exerts
+from crosscheck.engines.conventions import frame
 from crosscheck.engines.exudyn.assembly import Assembly
+from crosscheck.engines.exudyn.balance import coordinate, coordinate_rate
 from crosscheck.engines.exudyn.markers import marker_path
 from crosscheck.engines.exudyn.state import CarrierPath, States
-from flexmb.scene.connectors import SpringDamper
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.tree import GROUND
 from flexmb.typing import Real
 
 Paths = dict[int, CarrierPath]
 
 
-def exerted(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[Exerted]]:
-    """What each connector does at every sample."""
+class Connected(NamedTuple):
+    """By name, of T samples: wrenches (T,6) of connectors between nodes on B about B, loads (T,1) of those along
+    hinges; energy (T,) stored in all."""
+
+    between: dict[str, Real]
+    along: dict[str, Real]
+    energy: Real
+
+
+def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
+    """What all connectors do at every sample."""
+    between, along = _between(assembly, states, paths), _along(assembly, paths)
+    energy = np.zeros(len(states.times))
+    for each in between.values():
+        energy += [at.energy for at in each]
+    for held in along.values():
+        energy += [at.energy for at in held]
+    return Connected(
+        {name: np.array([at.on_b for at in each]) for name, each in between.items()},
+        {name: np.array([[at.load] for at in held]) for name, held in along.items()},
+        energy,
+    )
+
+
+def _between(assembly: Assembly, states: States, paths: Paths) -> dict[str, list[Exerted]]:
     found = {}
     for connector in assembly.scene.connectors:
-        assert isinstance(connector, SpringDamper)
-        a, b = (_moving(assembly, connector, side, paths, len(states.times)) for side in "ab")
-        law = exerts(connector)
-        found[connector.name] = [law(t, *ends) for t, *ends in zip(states.times.tolist(), a, b, strict=True)]
+        if isinstance(connector, BetweenNodes):
+            a, b = (_moving(assembly, connector, side, paths, len(states.times)) for side in "ab")
+            law = exerts(connector)
+            found[connector.name] = [law(t, *ends) for t, *ends in zip(states.times.tolist(), a, b, strict=True)]
     return found
 
 
-def _moving(assembly: Assembly, connector: SpringDamper, side: str, paths: Paths, count: int) -> list[Moving]:
+def _along(assembly: Assembly, paths: Paths) -> dict[str, list[Along]]:
+    found = {}
+    for name, item, number, load in along_hinges(assembly.scene):
+        stage = assembly.links[item].stages[number]
+        motion = zip(coordinate(stage, paths).tolist(), coordinate_rate(stage, paths).tolist(), strict=True)
+        found[name] = [load(q, v) for q, v in motion]
+    return found
+
+
+def _moving(assembly: Assembly, connector: BetweenNodes, side: str, paths: Paths, count: int) -> list[Moving]:
     """Motion of an end over all samples."""
-    body, offset = getattr(connector, f"body_{side}"), np.array(getattr(connector, f"position_{side}_m"))
+    body = getattr(connector, f"body_{side}")
+    own = frame(getattr(connector, f"position_{side}_m"), getattr(connector, f"quaternion_{side}", IDENTITY))
     if body == GROUND:
-        return [Moving(offset, np.eye(3), np.zeros(3), np.zeros(3))] * count
+        return [Moving(own.position, own.rotation, np.zeros(3), np.zeros(3))] * count
     placed = assembly.bodies[body]
-    path = marker_path(paths[placed.carrier.key], placed.shape(getattr(connector, f"node_{side}")), offset)
-    turns: Real = Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix()
+    path = marker_path(paths[placed.carrier.key], placed.shape(getattr(connector, f"node_{side}")), own.position)
+    turns: Real = Rotation.from_quat(path.quaternion, scalar_first=True).as_matrix() @ own.rotation
     motion = zip(path.position, turns, path.velocity[:, :3], path.velocity[:, 3:], strict=True)
     return [Moving(*each) for each in motion]
-

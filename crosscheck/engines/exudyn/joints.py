@@ -36,7 +36,8 @@ class HingePort:
 class Stage:
     """One scalar coordinate: `axis` (3,) in Exudyn axes (the same on both sides), the carriers and points it joins.
 
-    `constraint` is the Exudyn object that prescribes it, along `prescribed`; `motor` the load between both sides.
+    `constraint` is the Exudyn object that prescribes it, along `prescribed`; `motor` the load between both sides;
+    `markers` are those of its joint, inboard and outboard.
     """
 
     angular: bool
@@ -49,6 +50,7 @@ class Stage:
     motor: Callable[[float], Profile] | None
     prescribed: Callable[[float], Profile] | None
     constraint: int | None
+    markers: tuple[int, int]
 
     @property
     def stiffness(self) -> float:
@@ -150,7 +152,7 @@ def chain(
         stages.append(
             Stage(
                 isinstance(coordinate, AngularCoordinate), port.zero @ axis, inboard, position, outboard, arrival,
-                coordinate, motor, prescribed, constraint,
+                coordinate, motor, prescribed, constraint, (markers[0], markers[1]),
             )
         )  # fmt: skip
         inboard, position = outboard, arrival

@@ -7,7 +7,7 @@ import numpy as np
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.exudyn.assembly import assemble
 from crosscheck.engines.exudyn.balance import energy_and_momentum
-from crosscheck.engines.exudyn.connections import exerted
+from crosscheck.engines.exudyn.connections import Connected, connected
 from crosscheck.engines.exudyn.kkt import body_mass_matrix, initial_state
 from crosscheck.engines.exudyn.markers import marker_path, marker_snapshot
 from crosscheck.engines.exudyn.modal import NodeShape
@@ -31,8 +31,7 @@ class ExudynModel:
     def evaluate(self) -> Snapshot:
         states = initial_state(self.assembly)
         paths = self._paths(states)
-        loads, energy, momentum = self._loads_and_balance(states, paths)
-        held = self._connected(states, paths)
+        loads, energy, momentum, held = self._loads_and_balance(states, paths)
         markers = {
             marker.name: marker_snapshot(*self._located(marker, paths), np.array(marker.offset_m))
             for marker in self.scene.markers
@@ -45,7 +44,8 @@ class ExudynModel:
             drives={name: values[0] for name, values in drives(self.assembly, states).items()},
             energy={kind: float(values[0]) for kind, values in energy.items()},
             momentum=momentum[0],
-            connectors={name: each[0] for name, each in held.items()},
+            connectors={name: each[0] for name, each in held.between.items()},
+            hinge_forces={name: each[0] for name, each in held.along.items()},
         )
 
     def simulate(self, run: Run, effort: Effort) -> Trajectory:
@@ -54,7 +54,7 @@ class ExudynModel:
         # the solvers' own first multipliers are good to 1e-7 only
         states.multipliers[:1] = initial_state(self.assembly).multipliers
         paths = self._paths(states)
-        loads, energy, momentum = self._loads_and_balance(states, paths)
+        loads, energy, momentum, held = self._loads_and_balance(states, paths)
         return Trajectory(
             status=solution.status, message=solution.message, times=run.times[: len(states.times)],
             markers={
@@ -64,7 +64,7 @@ class ExudynModel:
             loads={name: loads[name] for name in self._loaded},
             wheel_loads={name: loads[name] for name in self.assembly.wheels},
             drives=drives(self.assembly, states), energy=energy, momentum=momentum,
-            connectors=self._connected(states, paths),
+            connectors=held.between, hinge_forces=held.along,
             wall_s=solution.wall_s, evaluations=solution.evaluations,
         )  # fmt: skip
 
@@ -92,14 +92,9 @@ class ExudynModel:
 
     def _loads_and_balance(
         self, states: States, paths: dict[int, CarrierPath]
-    ) -> tuple[dict[str, Real], dict[str, Real], Real]:
+    ) -> tuple[dict[str, Real], dict[str, Real], Real, Connected]:
         loads = link_wrenches(self.assembly, states, paths)
         energy, momentum = energy_and_momentum(self.assembly, states, paths)
-        for each in exerted(self.assembly, states, paths).values():
-            energy["spring"] = energy["spring"] + np.array([at.energy for at in each])
-        return loads, energy, momentum
-
-    def _connected(self, states: States, paths: dict[int, CarrierPath]) -> dict[str, Real]:
-        """(T,6) of connectors on B about B."""
-        found = exerted(self.assembly, states, paths)
-        return {name: np.array([at.on_b for at in each]) for name, each in found.items()}
+        held = connected(self.assembly, states, paths)
+        energy["spring"] = energy["spring"] + held.energy
+        return loads, energy, momentum, held

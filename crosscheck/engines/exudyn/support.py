@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from crosscheck.engines.contract import Support
 from crosscheck.engines.exudyn.assembly import deforming, flexible
-from flexmb.scene.connectors import SpringDamper
 from flexmb.scene.hinges import Free
 from flexmb.scene.modal_data import modal_arrays
 from flexmb.scene.schema import BeamBody, Body, ModalBody, Scene, SidBody
@@ -30,9 +29,6 @@ def _refusals(scene: Scene) -> Iterator[str]:
     for closure in scene.closures:
         if closure.body_b == GROUND:
             yield f'closure "{closure.name}": its load is read on body_b, which is the ground here: exchange a and b'
-    for connector in scene.connectors:
-        if not isinstance(connector, SpringDamper):
-            yield f'connector "{connector.name}": the adapter of Exudyn has springs between nodes only'
     bodies = {body.name: body for body in scene.bodies}
     for body in scene.bodies:
         yield from _body_refusals(body)
@@ -76,11 +72,6 @@ def _approximations(scene: Scene) -> Iterator[str]:
         ends = ((closure.body_a, closure.node_a), (closure.body_b, closure.node_b))
         if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
             yield f'closure "{closure.name}": {NOT_WORKLESS}'
-    for each in scene.connectors:
-        if isinstance(each, SpringDamper):
-            ends = ((each.body_a, each.node_a), (each.body_b, each.node_b))
-            if any(body != GROUND and deforming(bodies[body], node) for body, node in ends):
-                yield f'connector "{each.name}": {NOT_WORKLESS}'
     for load in scene.loads:
         turning = load.type == "torque" or load.frame == "node"
         if turning and flexible(bodies[load.body]) and deforming(bodies[load.body], load.node):

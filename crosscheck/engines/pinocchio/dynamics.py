@@ -83,25 +83,19 @@ class Dynamics:
         """Articulated-body accelerations, or constrained ones where loops are closed, and drive loads.
 
         With driven coordinates, their rows of the inverse dynamics are the drives.
-
-        Hybrid dynamics as a limit: a driven joint has the armature `BALLAST` and the effort BALLAST * acceleration, so
-        nothing else moves it. Its acceleration is off by the drive load / BALLAST, which is below round-off.
         """
         lost = self.forces.dampers_and_motors(t, state.v)
         tau = self.forces.springs(state.q) + lost
         held = self.connections.along(state.q, state.v).values()
         for speed, each in held:
             tau[speed] += each.load
-        if self.closures:
-            a = self.closures.solve(state.q, state.v, tau)
-            return PinocchioSolution(a, np.zeros(0), float(lost @ state.v))
         wrenches = self._wrenches(t, state)
-        extra = () if wrenches is None else (wrenches,)
         D = self._driven_v
-        effort = tau.copy()
-        effort[D] = BALLAST * state.driven
-        a = pin.aba(self._ballasted, self._ballasted_data, state.q, state.v, effort, *extra)
-        drive = self.inverse(state, a, wrenches)[D] - tau[D] if len(D) else np.zeros(0)
+        if self.closures:  # nothing is driven beside them
+            a, drive = self.closures.solve(state.q, state.v, tau + self._generalised(state, wrenches)), np.zeros(0)
+        else:
+            a = self._hybrid(state, tau, wrenches)
+            drive = self.inverse(state, a, wrenches)[D] - tau[D] if len(D) else np.zeros(0)
         power = lost @ state.v + drive @ state.v[D]
         if self.loads:
             power += self.loads.power(t, self.data)
@@ -110,6 +104,25 @@ class Dynamics:
             power += self.connections.power(t, self.data)
         return PinocchioSolution(a, drive, float(power))
 
+    def _hybrid(self, state: PinocchioState, tau: Real, wrenches: pin.StdVec_Force | None) -> Real:
+        """Accelerations (nv,) of a tree with driven coordinates.
+
+        Hybrid dynamics as a limit: a driven joint has the armature `BALLAST` and the effort BALLAST * acceleration, so
+        nothing else moves it. Its acceleration is off by the drive load / BALLAST, which is below round-off.
+        """
+        effort = tau.copy()
+        effort[self._driven_v] = BALLAST * state.driven
+        extra = () if wrenches is None else (wrenches,)
+        return np.asarray(pin.aba(self._ballasted, self._ballasted_data, state.q, state.v, effort, *extra))
+
+    def _generalised(self, state: PinocchioState, wrenches: pin.StdVec_Force | None) -> Real:
+        """(nv,) of wrenches on joints: constrained dynamics takes none, so they become efforts."""
+        if wrenches is None:
+            return np.zeros(self.tree.model.nv)
+        still, data = np.zeros(self.tree.model.nv), self._ballasted_data
+        without = pin.rnea(self.tree.model, data, state.q, still, still).copy()
+        return without - pin.rnea(self.tree.model, data, state.q, still, still, wrenches)
+
     def inverse(self, state: PinocchioState, acceleration: Real, wrenches: pin.StdVec_Force | None) -> Real:
         """Generalised forces of the whole motion; leaves the joint wrenches in `data.f`."""
         extra = () if wrenches is None else (wrenches,)
@@ -117,7 +130,12 @@ class Dynamics:
 
     def resolve_loads(self, t: float, state: PinocchioState, acceleration: Real) -> None:
         """Fill `data.f` with the wrench of parent on child of every joint, in joint axes about the joint origin."""
-        wrenches = self.closures.on_joints() if self.closures else self._wrenches(t, state)
+        wrenches = self._wrenches(t, state)
+        if self.closures:
+            closing = self.closures.on_joints()
+            for joint, applied in enumerate(wrenches or ()):
+                closing[joint] = closing[joint] + applied
+            wrenches = closing
         self.inverse(state, acceleration, wrenches)
 
     def rate(self, t: float, y: Real) -> Real:

@@ -19,7 +19,7 @@ class PinocchioEngine:
     """Rigid trees, exact: articulated-body accelerations, hybrid dynamics where coordinates are prescribed."""
 
     name = "pinocchio"
-    takes = ("connectors",)
+    takes = ("connectors", "t_start")
     summary = "rigid trees in minimal coordinates"
     algorithm = "articulated bodies, O(N)"
     settings = (
@@ -57,10 +57,6 @@ class PinocchioEngine:
 
 def _beside_closures(scene: Scene) -> str:
     """What this adapter does not combine with closed loops, "" if there is nothing."""
-    if scene.connectors:
-        return f'connector "{scene.connectors[0].name}": Pinocchio\'s constrained dynamics takes none'
-    if scene.loads:
-        return f'load "{scene.loads[0].name}": Pinocchio\'s constrained dynamics takes none'
     for link in links(scene):
         if not link.freedoms:
             return f'hinge "{link.joint}" is a weld, which takes a prescribed joint here: not beside closures'

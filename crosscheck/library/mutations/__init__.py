@@ -9,6 +9,8 @@ from __future__ import annotations
 from crosscheck.library.case import CaseError, MutationKind
 from crosscheck.library.mutations import (
     connectors,
+    events,
+    feedback,
     frames,
     gravity,
     hinges,
@@ -23,7 +25,7 @@ from flexmb.scene.schema import Scene
 
 CATALOGUE: dict[MutationKind, Mutation] = {
     each.name: each
-    for room in (inertia, frames, hinges, connectors, wheels, gravity, loads, modes, time_courses)
+    for room in (inertia, frames, hinges, connectors, wheels, gravity, loads, modes, time_courses, feedback, events)
     for each in room.MUTATIONS
 }
 

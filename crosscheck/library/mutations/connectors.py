@@ -1,4 +1,4 @@
-"""Mutations of connectors: their stiffness, where they are at rest, and what they lose."""
+"""Mutations of connectors: of what springs, dampers and friction exert, and of where they are fixed."""
 
 from __future__ import annotations
 
@@ -7,36 +7,84 @@ from typing import Any
 
 import msgspec
 
-from crosscheck.library.mutations.edits import replaced, scaled
-from crosscheck.library.mutations.mutation import FACTOR, Mutation, MutationTarget
-from flexmb.scene.connectors import Connector
+from crosscheck.library.case import CaseError
+from crosscheck.library.mutations.edits import conjugate, multiplied, on_connector
+from crosscheck.library.mutations.mutation import DROPPED, FACTOR, Mutation, MutationTarget
+from flexmb.scene.connectors import Bushing, Connector, Matrix6, SpringDamper, by_stem
 from flexmb.scene.schema import Scene
 from flexmb.scene.units import split_unit
 
 STIFF, LOSING = ("stiffness", "stiffening", "loads"), ("damping", "sliding", "static", "stop_dissipation")
-REST = ("free_length", "rest")
+DAMPING, REST, PRELOAD = ("damping", "stop_dissipation"), ("free_length", "rest"), ("preload",)
+STOPS, STOP_STIFFNESS = ("lower", "upper"), ("stop_stiffness",)
+FRICTION, CREEP = ("sliding", "static"), ("smoothing", "stribeck")
+PLACES = ("position_a", "position_b")
 
 
 def connectors(scene: Scene) -> Iterator[MutationTarget]:
-    """All of them."""
-    yield from (MutationTarget(each.name, str(each.__struct_config__.tag)) for each in scene.connectors)
+    """All of them; those that only pull or only push are kinds of their own."""
+    for each in scene.connectors:
+        acts = getattr(each, "acts", "both")
+        kind = str(each.__struct_config__.tag)
+        yield MutationTarget(each.name, kind if acts == "both" else f"{kind} in {acts}")
 
 
 def _scaled(stems: tuple[str, ...], factor: float) -> Callable[[Scene, str], Scene]:
     """The numbers of a connector under keys that begin so, times a factor."""
 
-    def times(value: Any) -> Any:
-        if value is None:
-            return None
-        return scaled(value, factor) if isinstance(value, tuple) else factor * value
-
     def changed(connector: Connector) -> Connector:
         keys = [key for key in connector.__struct_fields__ if split_unit(key)[0] in stems]
-        return msgspec.structs.replace(connector, **{key: times(getattr(connector, key)) for key in keys})
+        return multiplied(connector, keys, factor)
 
-    return lambda scene, target: msgspec.structs.replace(
-        scene, connectors=replaced(scene.connectors, target, changed)
+    return lambda scene, target: on_connector(scene, target, changed)
+
+
+def _both_ways(scene: Scene, target: str) -> Scene:
+    def changed(connector: Connector) -> Connector:
+        if not isinstance(connector, SpringDamper):
+            raise CaseError(f'connector "{connector.name}" acts both ways')
+        return msgspec.structs.replace(connector, acts="both")
+
+    return on_connector(scene, target, changed)
+
+
+def _of_bushing(change: Callable[[Bushing], Bushing]) -> Callable[[Scene, str], Scene]:
+    def changed(connector: Connector) -> Connector:
+        if not isinstance(connector, Bushing):
+            raise CaseError(f'connector "{connector.name}" has no frames: a bushing has')
+        return change(connector)
+
+    return lambda scene, target: on_connector(scene, target, changed)
+
+
+def _transposed(bushing: Bushing) -> Bushing:
+    return msgspec.structs.replace(
+        bushing, quaternion_a=conjugate(bushing.quaternion_a), quaternion_b=conjugate(bushing.quaternion_b)
     )
+
+
+def _ends_exchanged(bushing: Bushing) -> Bushing:
+    """A is where B was. The rotation vector is the opposite one, and so is the displacement, in axes of the other."""
+    at = {key: getattr(bushing, key) for key in bushing.__struct_fields__}
+    other = {"a": "b", "b": "a"}
+    keys = ("body_{}", "node_{}", "position_{}_m", "quaternion_{}")
+    return msgspec.structs.replace(
+        bushing, **{key.format(end): at[key.format(other[end])] for key in keys for end in other}
+    )
+
+
+def _linear_first(bushing: Bushing) -> Bushing:
+    def exchanged(matrix: Matrix6) -> Any:
+        order = (3, 4, 5, 0, 1, 2)
+        return tuple(tuple(matrix[i][j] for j in order) for i in order)
+
+    return msgspec.structs.replace(bushing, stiffness=exchanged(bushing.stiffness), damping=exchanged(bushing.damping))
+
+
+def _never_pressed(scene: Scene, target: str) -> str:
+    """A stop without stiffness stops nothing."""
+    connector = next(each for each in scene.connectors if each.name == target)
+    return "" if by_stem(connector).get("stop_stiffness") else "its stops have no stiffness"
 
 
 MUTATIONS = (
@@ -44,17 +92,70 @@ MUTATIONS = (
         "connector_stiffness", "+1 % stiffness of a connector", "a wrong figure", connectors, _scaled(STIFF, FACTOR)
     ),
     Mutation(
+        "connector_damping", "+1 % damping of a connector", "a wrong figure", connectors, _scaled(DAMPING, FACTOR)
+    ),
+    Mutation(
         "connector_rest",
-        "+1 % free length of a spring, or place of rest",
+        "+1 % free length of a spring, or place of rest; of a buffer the gap",
         "a wrong figure",
         connectors,
         _scaled(REST, FACTOR),
     ),
+    Mutation("connector_preload", "no preload", "the load at rest left out", connectors, _scaled(PRELOAD, DROPPED)),
     Mutation(
         "connector_losses",
         "no damping or friction of a connector",
         "dissipation left out",
         connectors,
-        _scaled(LOSING, 0.0),
+        _scaled(LOSING, DROPPED),
+    ),
+    Mutation(
+        "connector_one_sided",
+        "a cable or buffer that pulls and pushes",
+        "a spring on both sides for one that goes slack",
+        connectors,
+        _both_ways,
+    ),
+    Mutation(
+        "connector_stop", "stops 1 % farther out", "a wrong figure", connectors, _scaled(STOPS, FACTOR), _never_pressed
+    ),
+    Mutation(
+        "stop_stiffness", "+1 % stiffness of stops", "a wrong figure", connectors, _scaled(STOP_STIFFNESS, FACTOR)
+    ),
+    Mutation("friction_torque", "+1 % dry friction", "a wrong figure", connectors, _scaled(FRICTION, FACTOR)),
+    Mutation(
+        "friction_speed",
+        "+1 % of the speeds at which dry friction is smoothed and falls",
+        "a wrong figure, or another law near rest",
+        connectors,
+        _scaled(CREEP, FACTOR),
+    ),
+    Mutation(
+        "connector_position",
+        "+1 % offsets of a connector from its nodes",
+        "a wrong figure, or another point of attachment",
+        connectors,
+        _scaled(PLACES, FACTOR),
+    ),
+    Mutation(
+        "bushing_rotation",
+        "transposed rotations between a bushing's frames and its nodes",
+        "a matrix from A to B taken for that from B to A",
+        connectors,
+        _of_bushing(_transposed),
+    ),
+    Mutation(
+        "bushing_ends",
+        "frames A and B of a bushing exchanged",
+        "displacement in axes of the one body for that in axes of the other",
+        connectors,
+        _of_bushing(_ends_exchanged),
+    ),
+    Mutation(
+        "bushing_order",
+        "translation before rotation in a bushing's matrices",
+        "another order of spatial vectors",
+        connectors,
+        _of_bushing(_linear_first),
     ),
 )

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import TypeVar
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any, TypeVar
 
 import msgspec
 
@@ -11,12 +11,17 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.mutation import FACTOR, MutationTarget
 from flexmb.scene.bodies import BeamNode, Body, ModalNode, Node, Quaternion, SidBody, Vector
 from flexmb.scene.connectors import Connector
+from flexmb.scene.control import Controller, Sensor
+from flexmb.scene.events import SceneEvent
 from flexmb.scene.hinges import AngularCoordinate, Closure, Hinge, LinearCoordinate
 from flexmb.scene.schema import Load, PointMass, Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
 AnyNode = Node | BeamNode | ModalNode
-Named = TypeVar("Named", Body, Hinge, Wheel, Load, Closure, Connector, PointMass)
+Struct = TypeVar("Struct", bound=msgspec.Struct)
+Named = TypeVar(
+    "Named", Body, Hinge, Wheel, Load, Closure, Connector, PointMass, Sensor, Controller, SceneEvent
+)
 
 
 def on_body(scene: Scene, target: str, change: Callable[[Body], Body]) -> Scene:
@@ -37,6 +42,22 @@ def on_load(scene: Scene, target: str, change: Callable[[Load], Load]) -> Scene:
 
 def on_closure(scene: Scene, target: str, change: Callable[[Closure], Closure]) -> Scene:
     return msgspec.structs.replace(scene, closures=replaced(scene.closures, target, change))
+
+
+def on_connector(scene: Scene, target: str, change: Callable[[Any], Any]) -> Scene:
+    return msgspec.structs.replace(scene, connectors=replaced(scene.connectors, target, change))
+
+
+def on_sensor(scene: Scene, target: str, change: Callable[[Any], Any]) -> Scene:
+    return msgspec.structs.replace(scene, sensors=replaced(scene.sensors, target, change))
+
+
+def on_controller(scene: Scene, target: str, change: Callable[[Controller], Controller]) -> Scene:
+    return msgspec.structs.replace(scene, controllers=replaced(scene.controllers, target, change))
+
+
+def on_event(scene: Scene, target: str, change: Callable[[SceneEvent], SceneEvent]) -> Scene:
+    return msgspec.structs.replace(scene, events=replaced(scene.events, target, change))
 
 
 def on_node(scene: Scene, target: str, change: Callable[[AnyNode], AnyNode]) -> Scene:
@@ -129,6 +150,17 @@ def nodes(scene: Scene) -> Iterator[MutationTarget]:
 def scaled(values: tuple, factor: float = FACTOR) -> tuple:
     """Numbers, in tuples however deep, multiplied."""
     return tuple(scaled(value, factor) if isinstance(value, tuple) else factor * value for value in values)
+
+
+def multiplied(item: Struct, keys: Iterable[str], factor: float) -> Struct:
+    """A struct with its numbers under some keys multiplied, alone or in tuples; None stays."""
+
+    def times(value: Any) -> Any:
+        if value is None:
+            return None
+        return scaled(value, factor) if isinstance(value, tuple) else factor * value
+
+    return msgspec.structs.replace(item, **{key: times(getattr(item, key)) for key in keys})
 
 
 def opposite(vector: Vector) -> Vector:

@@ -16,14 +16,14 @@ from crosscheck.library.mutations.edits import (
     on_node,
     scaled,
 )
-from crosscheck.library.mutations.mutation import FACTOR, Mutation
+from crosscheck.library.mutations.mutation import LESS, Mutation
 from flexmb.scene.bodies import BeamNode, Quaternion
+from flexmb.scene.connectors import BetweenNodes
 from flexmb.scene.hinges import Closure, Hinge
 from flexmb.scene.schema import Load, Marker, PointMass, Scene, Wheel
 
 Mounted = Wheel | PointMass | Load | Marker
 EPS = 1e-15
-LESS = 2.0 - FACTOR  # a station of a beam moves inwards, where there is beam
 
 
 def _hinge_rotation(scene: Scene, target: str) -> Scene:
@@ -75,19 +75,20 @@ def _node_rotation(scene: Scene, target: str) -> Scene:
 def _node_position(scene: Scene, target: str) -> Scene:
     def moved(node: AnyNode) -> AnyNode:
         if isinstance(node, BeamNode):
-            return msgspec.structs.replace(node, x_m=LESS * node.x_m)
+            return msgspec.structs.replace(node, x_m=LESS * node.x_m)  # inwards, where there is beam
         return msgspec.structs.replace(node, position_m=scaled(node.position_m))
 
     return on_node(scene, target, moved)
 
 
 def _node_idle(scene: Scene, target: str) -> str:
-    """Nothing is mounted at the node: neither a hinge, a closure, a wheel, a mass, a load nor a marker."""
+    """Nothing is mounted at the node: neither a hinge, a closure, a connector, a wheel, a mass, a load nor a marker."""
     body, _, node = target.rpartition(".")
     mounted: tuple[Mounted, ...] = (*scene.wheels, *scene.point_masses, *scene.loads, *scene.markers)
     used = [(item.body, item.node) for item in mounted]
     used += [end for each in scene.hinges for end in ((each.parent, each.parent_node), (each.child, each.child_node))]
-    used += [end for each in scene.closures for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
+    between = [*scene.closures, *(each for each in scene.connectors if isinstance(each, BetweenNodes))]
+    used += [end for each in between for end in ((each.body_a, each.node_a), (each.body_b, each.node_b))]
     return "" if (body, node) in used else "nothing is mounted at the node, and no marker shows it"
 
 

@@ -22,14 +22,13 @@ from crosscheck.library.mutations.edits import (
     scaled,
     with_coordinates,
 )
-from crosscheck.library.mutations.mutation import FACTOR, Mutation, MutationTarget
+from crosscheck.library.mutations.mutation import DROPPED, FACTOR, OPPOSITE, Mutation, MutationTarget
 from flexmb.scene.bodies import BeamBody, Body, ModalBody
 from flexmb.scene.hinges import AngularCoordinate, Free, Gimbal, Hinge, Spherical
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import Coordinate, coordinates
 
-OPPOSITE, DROPPED = -1.0, 0.0
 DEGREE = math.pi / 180.0
 ROUNDING = 1e-15
 

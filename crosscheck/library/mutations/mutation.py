@@ -10,6 +10,9 @@ from crosscheck.library.case import MutationKind
 from flexmb.scene.schema import Scene
 
 FACTOR = 1.01
+LESS = 2.0 - FACTOR  # where more is not possible
+HUNDREDTH = 0.01
+DROPPED, OPPOSITE = 0.0, -1.0
 
 
 class MutationTarget(NamedTuple):

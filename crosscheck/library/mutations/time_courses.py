@@ -1,4 +1,4 @@
-"""Mutations of functions of time: of motors, of prescribed motion and of loads."""
+"""Mutations of functions of time: of motors, actuators, prescribed motion, loads, and profiles to follow."""
 
 from __future__ import annotations
 
@@ -11,28 +11,32 @@ from crosscheck.library.case import CaseError
 from crosscheck.library.mutations.edits import (
     key_of,
     motor_key,
+    on_connector,
     on_hinge,
     on_load,
+    on_sensor,
     on_wheel,
     with_coordinates,
 )
-from crosscheck.library.mutations.mutation import FACTOR, Mutation, MutationTarget
+from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget
 from crosscheck.library.time_functions import delayed, scaled
+from flexmb.scene.connectors import SpringDamper
+from flexmb.scene.control import ProfileSensor
 from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene, Wheel
 from flexmb.scene.tree import Coordinate, coordinates
 
 Change = Callable[[Function], Function]
-HUNDREDTH = 0.01
 PHASE_RAD = 0.01
 
 
 def _motors(scene: Scene) -> Iterator[MutationTarget]:
-    """Hinges and wheels with a motor."""
+    """Hinges and wheels with a motor, and springs with an actuator."""
     for hinge in scene.hinges:
         if any(getattr(each, motor_key(each)) is not None for _, each in coordinates(hinge)):
             yield MutationTarget(hinge.name, "motor of a hinge")
     yield from (MutationTarget(wheel.name, "motor of a wheel") for wheel in scene.wheels if wheel.torque_Nm is not None)
+    yield from (MutationTarget(each.name, "actuator of a connector") for each, _ in _actuators(scene))
 
 
 def _driven(scene: Scene) -> Iterator[MutationTarget]:
@@ -48,10 +52,21 @@ def _driven(scene: Scene) -> Iterator[MutationTarget]:
             if function is not None:
                 yield MutationTarget(wheel.name, f"wheel, {_kind(function)}")
     yield from (MutationTarget(load.name, f"load, {_kind(load.function)}") for load in scene.loads)
+    yield from (MutationTarget(each.name, f"actuator, {_kind(force)}") for each, force in _actuators(scene))
+    for sensor in scene.sensors:
+        if isinstance(sensor, ProfileSensor):
+            yield MutationTarget(sensor.name, f"profile, {_kind(sensor.function)}")
+
+
+def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper, Function]]:
+    """Springs with a function of time, and that."""
+    for each in scene.connectors:
+        if isinstance(each, SpringDamper) and each.force_N is not None:
+            yield each, each.force_N
 
 
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
-    """The hinge, wheel or load called `target` with motors and loads by `change`, prescribed motions by `motion`."""
+    """What is called `target`, with its prescribed motions changed by `motion` and all other functions by `change`."""
 
     def of_coordinate(coordinate: Coordinate) -> Coordinate:
         motor, prescribed = motor_key(coordinate), key_of(coordinate, "prescribed")
@@ -74,7 +89,13 @@ def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = 
         return on_wheel(scene, target, of_wheel)
     if any(load.name == target for load in scene.loads):
         return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
-    raise CaseError(f'no hinge, wheel or load is called "{target}"')
+    if any(each.name == target for each, _ in _actuators(scene)):
+        return on_connector(
+            scene, target, lambda each: msgspec.structs.replace(each, force_N=_changed(each.force_N, change))
+        )
+    if any(isinstance(sensor, ProfileSensor) and sensor.name == target for sensor in scene.sensors):
+        return on_sensor(scene, target, lambda each: msgspec.structs.replace(each, function=change(each.function)))
+    raise CaseError(f'no hinge, wheel, load, actuator or profile is called "{target}"')
 
 
 def _changed(function: Function | None, change: Change | None) -> Function | None:
@@ -82,7 +103,7 @@ def _changed(function: Function | None, change: Change | None) -> Function | Non
 
 
 def _motor_sign(scene: Scene, target: str) -> Scene:
-    return _on_item(scene, target, lambda function: scaled(function, -1.0))
+    return _on_item(scene, target, lambda function: scaled(function, OPPOSITE))
 
 
 def _size(scene: Scene, target: str) -> Scene:
@@ -132,7 +153,7 @@ def _kind(function: Function) -> str:
 MUTATIONS = (
     Mutation(
         "motor_sign",
-        "opposite torque or force of a motor",
+        "opposite torque or force of a motor or actuator",
         "motor on the wrong one of two bodies",
         _motors,
         _motor_sign,

@@ -5,6 +5,8 @@ const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many b
 const VIEW_DEG = 32;
 const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
 const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
+const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#e07b00", "#ffa940"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges" };
+const TURNS = 7, PER_TURN = 8; // of the coil that a spring is drawn as
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 
 // One WebGL context draws for all views, whose canvases get copies: browsers allow few contexts on a page.
@@ -187,12 +189,14 @@ class SceneView {
     this.world = new THREE.Scene();
     this.world.add(new THREE.AmbientLight(0xffffff, 1.6));
     const sun = new THREE.DirectionalLight(0xffffff, 1.8); sun.position.set(0.4, -0.7, 1); this.world.add(sun);
-    const thin = 0.008 * this.reach, bodies = [...new Set(this.shown.lines.map(line => line.body))], colour = new Map(bodies.map((b, i) => [b, BODIES[i % BODIES.length]]));
+    const connectors = this.shown.lines.filter(line => CONNECTORS[line.kind]), thin = 0.008 * this.reach;
+    const bodies = [...new Set(this.shown.lines.filter(line => !CONNECTORS[line.kind]).map(line => line.body))], colour = new Map(bodies.map((b, i) => [b, BODIES[i % BODIES.length]]));
     this.carriers = new Map(); this.tubes = []; this.spinning = [];
     for (const line of this.shown.lines) {
-      const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body), side: THREE.DoubleSide });
+      const material = new THREE.MeshLambertMaterial({ color: colour.get(line.body) || connectorTone(line.kind), side: THREE.DoubleSide });
       if (line.kind === "solid") this.carrier(line.points[0][0]).add(...solid(line.points.map(p => p.slice(1, 4)), material));
-      else this.tubes.push(new Tube(this.world, line, line.kind === "beam" ? 1.8 * thin : thin, material));
+      else if (line.kind === "ball" || line.kind === "mount") for (const point of line.points) this.carrier(point[0]).add(dot(line.kind, point, 4.5 * thin, material));
+      else this.tubes.push(new Tube(this.world, line, { beam: 1.8, spring: 0.45 }[line.kind] * thin || thin, material));
     }
     for (const wheel of this.shown.wheels) {
       const disc = wheelMesh(wheel, thin); this.carrier(wheel.marker).add(disc);
@@ -208,7 +212,9 @@ class SceneView {
       this.world.add(line);
       return [m, geometry];
     });
-    const names = [...bodies.map(b => [b, colour.get(b)]), ...this.shown.wheels.map(w => [w.name, WHEEL])];
+    const kinds = Object.keys(CONNECTORS).map(kind => [kind, connectors.filter(line => line.kind === kind).map(line => line.body)]);
+    const names = [...bodies.map(b => [b, colour.get(b)]), ...this.shown.wheels.map(w => [w.name, WHEEL]),
+      ...kinds.filter(([, held]) => held.length).map(([kind, held]) => [`${NAMES_OF[kind]}: ${held.join(", ")}`, connectorTone(kind)])];
     this.names.replaceChildren(...names.map(([name, tone]) => {
       const item = document.createElement("li"), chip = document.createElement("i");
       chip.style.background = tone; item.append(chip, name);
@@ -280,6 +286,16 @@ function solid(corners, material) {
   return [new THREE.Mesh(faces, material), new THREE.LineSegments(new THREE.EdgesGeometry(faces), new THREE.LineBasicMaterial({ color: tone("soft") }))];
 }
 
+// A point mass or the mark of a connector, fixed to a marker.
+function dot(kind, [, x, y, z], size, material) {
+  const [around, down] = kind === "ball" ? [20, 14] : [4, 2]; // a mark is an octahedron
+  const mesh = new THREE.Mesh(new THREE.SphereGeometry(size, around, down), material);
+  mesh.position.set(x, y, z);
+  return mesh;
+}
+
+function connectorTone(kind) { return CONNECTORS[kind][dark.matches ? 1 : 0]; }
+
 // A disc about its axis with a spoke on either face, so that its turning is seen.
 function wheelMesh(wheel, thin) {
   const outer = new THREE.Group(), turning = new THREE.Group(), radius = Math.max(wheel.radius, 3 * thin), width = Math.max(wheel.width, thin);
@@ -294,8 +310,9 @@ function wheelMesh(wheel, thin) {
 // A tube through points whose tangents bend it (cubic Hermite; where a tangent is not known, as straight as may be).
 class Tube {
   constructor(world, line, radius, material) {
-    this.line = line; this.radius = radius; this.curved = line.kind === "beam";
-    this.rings = (line.points.length - 1) * (this.curved ? FINER : 1) + 1;
+    this.line = line; this.radius = radius;
+    this.spine = { beam: hermite, spring: placed => coil(placed, 7 * radius) }[line.kind] || (placed => placed.map(([p]) => p));
+    this.rings = { beam: (line.points.length - 1) * FINER + 1, spring: TURNS * PER_TURN + 3 }[line.kind] || line.points.length;
     this.geometry = new THREE.BufferGeometry();
     this.geometry.setAttribute("position", new THREE.BufferAttribute(new Float32Array(3 * RING * this.rings), 3));
     this.geometry.setAttribute("normal", new THREE.BufferAttribute(new Float32Array(3 * RING * this.rings), 3));
@@ -310,8 +327,8 @@ class Tube {
   }
 
   bend(placed) {
-    const spine = this.curved ? hermite(placed) : placed.map(([p]) => p);
-    const { position, normal } = this.geometry.attributes, side = new THREE.Vector3(0, 0, 0), way = new THREE.Vector3(), other = new THREE.Vector3();
+    const spine = this.spine(placed), { position, normal } = this.geometry.attributes;
+    const side = new THREE.Vector3(0, 0, 0), way = new THREE.Vector3(), other = new THREE.Vector3();
     spine.forEach((p, i) => {
       const from = spine[Math.max(0, i - 1)], to = spine[Math.min(spine.length - 1, i + 1)];
       way.set(...to.map((v, k) => v - from[k])).normalize();
@@ -326,6 +343,19 @@ class Tube {
     });
     position.needsUpdate = normal.needsUpdate = true;
   }
+}
+
+// A spring between two points: a helix of fixed width between straight ends.
+function coil([[p], [q]], width) {
+  const way = new THREE.Vector3(...q.map((v, k) => v - p[k])), side = new THREE.Vector3(Math.abs(way.x) < 0.8 * way.length() ? 1 : 0, 0, 0);
+  if (!side.x) side.y = 1;
+  side.addScaledVector(way, -side.dot(way) / (way.lengthSq() || 1)).normalize();
+  const other = way.clone().normalize().cross(side), spine = [p], count = TURNS * PER_TURN;
+  for (let i = 0; i <= count; i++) {
+    const along = 0.15 + 0.7 * i / count, c = width * Math.cos(2 * Math.PI * i / PER_TURN), d = width * Math.sin(2 * Math.PI * i / PER_TURN);
+    spine.push([..."xyz"].map((k, n) => p[n] + along * way[k] + c * side[k] + d * other[k]));
+  }
+  return [...spine, q];
 }
 
 function hermite(placed) {

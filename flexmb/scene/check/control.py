@@ -13,6 +13,8 @@ from flexmb.scene.columns import alike
 from flexmb.scene.control import (
     Controller,
     CoordinateSensor,
+    DistanceSensor,
+    DriveSensor,
     GainTable,
     LoadSensor,
     MarkerSensor,
@@ -27,7 +29,7 @@ from flexmb.scene.functions import ControlSignal
 from flexmb.scene.hinges import Free, Spherical
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene
-from flexmb.scene.tree import coordinates
+from flexmb.scene.tree import coordinates, scalar_paths
 
 REFERENCE = re.compile(r"(?P<name>[^\[\]]+)(?:\[(?P<number>\d+)\])?")
 AT_ONCE = ("acceleration", "angular_acceleration", "specific_force")
@@ -56,7 +58,7 @@ def sensor_width(scene: Scene, sensor: Sensor) -> int | None:
             return 4 if quantity == "orientation" else 3
         case LoadSensor():
             return 6
-        case ProfileSensor():
+        case ProfileSensor() | DistanceSensor():
             return 2
     return 1
 
@@ -77,7 +79,9 @@ def _coordinates(scene: Scene, of: str, rates: bool) -> int | None:
 
 def depends_at_once(sensor: Sensor) -> bool:
     """Whether forces change what it measures without delay: accelerations and loads."""
-    return isinstance(sensor, LoadSensor) or (isinstance(sensor, MarkerSensor) and sensor.quantity in AT_ONCE)
+    if isinstance(sensor, MarkerSensor):
+        return sensor.quantity in AT_ONCE
+    return isinstance(sensor, LoadSensor | DriveSensor)
 
 
 def output_width(controller: Controller, inputs: int | None) -> int | None:
@@ -92,6 +96,25 @@ def output_width(controller: Controller, inputs: int | None) -> int | None:
         case GainTable():
             return None if inputs is None else max(1, inputs - 1)
     return inputs
+
+
+def widths_of(scene: Scene) -> dict[str, int | None]:
+    """How many numbers every sensor and controller has; None where only compiled bodies know it."""
+    widths = {sensor.name: sensor_width(scene, sensor) for sensor in scene.sensors}
+    for controller in scene.controllers:
+        each = [_width(reference, widths) for reference in controller.inputs]
+        inputs = None if None in each else sum(width for width in each if width is not None)
+        widths[controller.name] = output_width(controller, inputs)
+    return widths
+
+
+def one_number(place: Place, reference: str, widths: dict[str, int | None]) -> Iterator[Defect]:
+    """A signal that is one number."""
+    yield from _reference(place, reference, widths, set())
+    found = named(reference)
+    width = None if found is None or found.number is not None else widths.get(found.name)
+    if found is not None and width is not None and width != 1:
+        yield Defect(str(place), f'"{found.name}" has {width} numbers', f'say which: "{found.name}[0]"')
 
 
 def control(scene: Scene) -> Iterator[Defect]:
@@ -117,17 +140,21 @@ def control(scene: Scene) -> Iterator[Defect]:
 def _sensors(scene: Scene) -> Iterator[Defect]:
     moving = [item.name for key in ("hinges", "wheels", "point_masses") for item in getattr(scene, key)]
     moving += [f"{body.name}.modes" for body in scene.bodies if isinstance(body, BeamBody | ModalBody)]
-    known: dict[Any, tuple[str, str, list[str]]] = {
-        CoordinateSensor: ("of", "hinge, wheel, point mass or modes", moving),
-        MarkerSensor: ("marker", "marker", [marker.name for marker in scene.markers]),
-        LoadSensor: ("hinge", "hinge", [hinge.name for hinge in scene.hinges]),
+    markers = [marker.name for marker in scene.markers]
+    known: dict[Any, tuple[tuple[str, ...], str, list[str]]] = {
+        CoordinateSensor: (("of",), "hinge, wheel, point mass or modes", moving),
+        MarkerSensor: (("marker",), "marker", markers),
+        DistanceSensor: (("marker_a", "marker_b"), "marker", markers),
+        LoadSensor: (("hinge",), "hinge", [hinge.name for hinge in scene.hinges]),
+        DriveSensor: (("coordinate",), "scalar coordinate", list(scalar_paths(scene))),
     }
     for place, sensor in entries(scene, "sensors"):
         if type(sensor) in known:
-            key, what, names = known[type(sensor)]
-            if getattr(sensor, key) not in names:
-                remedy = closest(getattr(sensor, key), names)
-                yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
+            keys, what, names = known[type(sensor)]
+            for key in keys:
+                if getattr(sensor, key) not in names:
+                    remedy = closest(getattr(sensor, key), names)
+                    yield Defect(str(place.key(key)), f'there is no {what} "{getattr(sensor, key)}"', remedy)
         if isinstance(sensor, ProfileSensor) and isinstance(sensor.function, ControlSignal):
             remedy = f'let the controller take "{sensor.function.source}" itself'
             yield Defect(str(place.key("function")), "a signal is no function of time", remedy)

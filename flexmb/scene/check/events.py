@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from flexmb.scene.check.control import named, one_number, widths_of
 from flexmb.scene.check.walk import sound
 from flexmb.scene.events import Change, Impact, Latch, Release
 from flexmb.scene.problems import Defect, Place, closest
@@ -17,15 +18,26 @@ def events(scene: Scene) -> Iterator[Defect]:
     if not scene.events:
         return
     paths = scalar_paths(scene)
-    watched = watchable(scene)
+    watched, signals = watchable(scene), widths_of(scene)
     for place, event in sound(scene, "events"):
         if event.watch not in watched:
-            yield Defect(str(place.key("watch")), f'there is no "{event.watch}"', closest(event.watch, watched))
+            yield from _signal(place.key("watch"), event.watch, signals, watched)
         if watched.get(event.watch) == "time" and event.crossing == "falling":
             yield Defect(str(place.key("crossing")), "time does not fall", "leave the crossing out")
         if not event.actions:
             yield Defect(str(place.key("actions")), "nothing happens", "give at least one action, or leave it out")
         yield from _actions(scene, place, event, paths)
+
+
+def _signal(
+    place: Place, reference: str, signals: dict[str, int | None], others: dict[str, str]
+) -> Iterator[Defect]:
+    """What is no time, coordinate or rate is one number of a sensor or controller."""
+    found = named(reference)
+    if found is None or found.name not in signals:
+        yield Defect(str(place), f'there is no "{reference}"', closest(reference, {**others, **signals}))
+    else:
+        yield from one_number(place, reference, signals)
 
 
 def _actions(scene: Scene, place: Place, event: SceneEvent, paths: dict[str, str]) -> Iterator[Defect]:

@@ -13,6 +13,7 @@ from flexmb.scene.check import inertia
 from flexmb.scene.check.profiles import MOTIONS, initial_motion
 from flexmb.scene.check.walk import UNIT_LENGTH, sound
 from flexmb.scene.columns import alike, column
+from flexmb.scene.events import Release
 from flexmb.scene.hinges import WITH_AXIS, Z_AXIS, AngularCoordinate, Gimbal
 from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene, Wheel
@@ -25,7 +26,7 @@ def hinges(scene: Scene) -> Iterator[Defect]:
     """Springs and dampers of the usual sign, motors that can act, gimbal sequences that exist."""
     for place, hinge in sound(scene, "hinges", _to_examine(scene)):
         yield from _springs(place, hinge)
-        yield from _coordinates(place, hinge)
+        yield from _coordinates(place, hinge, _let_go(scene))
         if isinstance(hinge, Gimbal):
             yield from _gimbal(place, hinge)
 
@@ -58,7 +59,8 @@ def wheels(scene: Scene) -> Iterator[Defect]:
         yield from inertia.mass(place.key("mass_kg"), wheel.mass_kg)
         yield from _wheel_inertia(place, wheel)
         yield from _springs(place, wheel)
-        yield from _drive(place, wheel, ("angle_rad", "speed_rad_s"), "torque_Nm", "prescribed_rad")
+        motor = None if f"{wheel.name}.angle" in _let_go(scene) else "torque_Nm"
+        yield from _drive(place, wheel, ("angle_rad", "speed_rad_s"), motor, "prescribed_rad")
 
 
 def point_masses(scene: Scene) -> Iterator[Defect]:
@@ -79,7 +81,7 @@ def point_masses(scene: Scene) -> Iterator[Defect]:
         if item.coordinates and len(item.coordinates) != count:
             what = f"{len(item.coordinates)} coordinates for {count} directions"
             yield Defect(str(place.key("coordinates")), what, "give one coordinate for each direction, or none")
-        yield from _coordinates(place, item)
+        yield from _coordinates(place, item, _let_go(scene))
 
 
 def _springs(place: Place, item: SceneStruct) -> Iterator[Doubt]:
@@ -91,11 +93,18 @@ def _springs(place: Place, item: SceneStruct) -> Iterator[Doubt]:
             yield Doubt(str(place.key(key)), f"negative {noun}: {value:g}", f"give a {noun} of at least zero", waiver)
 
 
-def _coordinates(place: Place, item: Any) -> Iterator[Defect]:
+def _let_go(scene: Scene) -> set[str]:
+    """Coordinates that an event releases: their motors move them from then on."""
+    actions = [action for event in scene.events for action in event.actions]
+    return {action.coordinate for action in actions if isinstance(action, Release)}
+
+
+def _coordinates(place: Place, item: Any, released: set[str]) -> Iterator[Defect]:
     for name, coordinate in coordinates(item):
         spot = Place(f"{place.path}.{name}", place.names)
         yield from _springs(spot, coordinate)
-        yield from _drive(spot, coordinate, *_keys(coordinate))
+        keys, motor, motion = _keys(coordinate)
+        yield from _drive(spot, coordinate, keys, None if f"{item.name}.{name}" in released else motor, motion)
 
 
 def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
@@ -104,11 +113,14 @@ def _keys(coordinate: Coordinate) -> tuple[tuple[str, str], str, str]:
     return ("position_m", "rate_m_s"), "force_N", "prescribed_m"
 
 
-def _drive(place: Place, item: SceneStruct, keys: tuple[str, str], motor: str, motion: str) -> Iterator[Defect]:
+def _drive(
+    place: Place, item: SceneStruct, keys: tuple[str, str], motor: str | None, motion: str
+) -> Iterator[Defect]:
+    """motor: the key of what may not be given beside a prescribed motion, if anything."""
     profile = getattr(item, motion)
     if profile is None:
         return
-    if getattr(item, motor) is not None:
+    if motor is not None and getattr(item, motor) is not None:
         what = f"{motor} on a prescribed coordinate cannot change the motion"
         yield Defect(str(place.key(motor)), what, f"leave out {motor} or {motion}; the drive load is an output")
     yield from initial_motion(place, item, keys, profile)

@@ -9,7 +9,7 @@ import pytest
 
 from crosscheck.biting.answers import FAULTS, AnswerFault, run_of
 from crosscheck.engines.answers import checked_run
-from crosscheck.engines.contract import MarkerPath, Trajectory
+from crosscheck.engines.contract import OUTPUTS, MarkerPath, Trajectory
 from crosscheck.judging.outcome import conclude
 from crosscheck.judging.results import collect
 from crosscheck.library.find import load_case
@@ -18,6 +18,7 @@ from crosscheck.running.execute import execute
 from crosscheck.running.plan import plan
 from flexmb.run.channels import channels_of
 from flexmb.scene.bodies import Node, RigidBody
+from flexmb.scene.connectors import AngularSpring, SpringDamper
 from flexmb.scene.hinges import AngularCoordinate, Revolute
 from flexmb.scene.schema import Marker, Scene, Wheel
 from tests.crosscheck.sessions import copy_case
@@ -37,6 +38,10 @@ SCENE = Scene(
             transverse_inertia_kg_m2=0.06, speed_rad_s=3.0,
         ),
     ),
+    connectors=(
+        SpringDamper(name="cable", body_a="ground", position_a_m=(0.0, 1.0, 0.0), body_b="arm", stiffness_N_m=1.0),
+        AngularSpring(name="coil", hinge="pivot", stiffness_Nm_rad=1.0),
+    ),
     markers=(Marker(name="tip", body="arm", node="tip"),),
 )  # fmt: skip
 
@@ -54,6 +59,8 @@ def answer() -> Trajectory:
         loads={"pivot": rng.normal(size=(5, 6))},
         wheel_loads={"wheel": rng.normal(size=(5, 6))},
         drives={"pivot": rng.normal(size=(5, 1))},
+        connectors={"cable": rng.normal(size=(5, 6))},
+        hinge_forces={"coil": rng.normal(size=(5, 1))},
         energy={kind: rng.normal(size=5) for kind in ("kinetic", "strain", "spring", "gravity")},
         momentum=rng.normal(size=(5, 6)),
         work=rng.normal(size=5),
@@ -70,6 +77,7 @@ def test_a_fault_changes_some_channels_and_keeps_to_the_contract(fault: AnswerFa
 
 
 def test_a_run_is_told_by_its_channels() -> None:
+    assert all(getattr(answer(), output) is not None and len(getattr(answer(), output)) for output in OUTPUTS)
     channels = channels_of(answer())
     again = channels_of(run_of(TIMES, channels))
     assert set(again) == set(channels)

@@ -135,3 +135,12 @@ def test_rounding_is_no_mutation_and_one_per_cent_is() -> None:
 def test_the_library_bites(tmp_path: Path) -> None:
     bites = run_campaign(shipped_cases(), tmp_path)
     assert print_bites(Console(), bites) == 0
+
+
+def test_where_closures_say_it_begins_the_scene_s_value_is_no_fault() -> None:
+    """The prescribed crank moves the slider; that of the rod's hinge is found beside the rod's modes, and counts."""
+    (case,) = resolve(("slider_crank_simeon",))
+    found = litter(subject(case, "native"))
+    alike = {each.target for each in found.passed_over if "the closures say" in each.reason}
+    assert alike == {"guide"}
+    assert "initial_rate of pin" in found.mutants

@@ -42,7 +42,12 @@ def test_an_engine_with_one_world_is_found_out(name: str, verdicts: dict[str, In
 
 @pytest.mark.parametrize(
     ("name", "reason"),
-    [("boosted", "stands on the ground by pivot"), ("clock", "nothing depends"), ("reordered", "one of each")],
+    [
+        ("boosted", "stands on the ground by pivot"),
+        ("clock", "nothing depends"),
+        ("later", "engine fine begins all runs at t = 0"),
+        ("reordered", "one of each"),
+    ],
 )
 def test_what_says_nothing_says_why(name: str, reason: str, verdicts: dict[str, InvarianceVerdict]) -> None:
     assert verdicts[name].status == "not applicable" and verdicts[name].ok

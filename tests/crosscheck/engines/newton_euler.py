@@ -11,7 +11,7 @@ import numpy as np
 from msgspec.structs import replace
 
 from crosscheck.engines.contract import MarkerSnapshot, Snapshot
-from flexmb.scene.build import make
+from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant
 from flexmb.scene.schema import (
     Cylindrical,

@@ -9,7 +9,8 @@ from numpy.random import Generator
 
 from crosscheck.engines.conventions import quaternion_of
 from crosscheck.engines.randomise import randomise
-from flexmb.scene.build import SceneBuilder, angular, linear, make
+from flexmb.scene.build import SceneBuilder, angular, linear
+from flexmb.scene.collecting import make
 from flexmb.scene.functions import Constant, Sine
 from flexmb.scene.hinges import WITH_AXIS
 from flexmb.scene.schema import AngularCoordinate, Gimbal, Hinge, LinearCoordinate, Node, Scene, Spherical

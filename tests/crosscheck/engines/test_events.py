@@ -23,11 +23,6 @@ def test_peers_refuse_scenes_with_events(name: str) -> None:
     assert support.kind == "no" and "caught" in support.reason and "knows no events" in support.reason
 
 
-@pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch"])
+@pytest.mark.parametrize("name", ["native", "native-composite", "native-frisch", "native-generalised-alpha"])
 def test_our_own_algorithms_run_them(name: str) -> None:
     assert support_of(engine(name), eventful()).kind == "exact"
-
-
-def test_a_method_that_finds_no_place_refuses() -> None:
-    support = support_of(engine("native-generalised-alpha"), eventful())
-    assert support.kind == "no" and "does not find where an event happens" in support.reason

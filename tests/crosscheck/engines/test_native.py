@@ -8,9 +8,11 @@ import numpy as np
 import pytest
 
 import flexmb
+from crosscheck.engines.answers import checked_run
 from crosscheck.engines.contract import Effort, Run, Snapshot, Trajectory
 from crosscheck.engines.registry import engine
 from flexmb.scene.build import SceneBuilder
+from flexmb.scene.events import EndRun, Impact, SceneEvent
 from flexmb.scene.schema import Scene
 from tests import trees
 from tests.bounds import algebra
@@ -129,3 +131,32 @@ def test_the_print_is_right_on_rigid_bodies_and_wrong_on_flexible_ones():
     assert support.kind == "surrogate" and "print" in support.reason
     found = gaps(engine(RECURSION).compile(flexible).evaluate(), engine(PRINT).compile(flexible).evaluate())
     assert found["motion"] > 1e-2
+
+
+def falling(*events: SceneEvent) -> Scene:
+    """A ball on a rail that falls through zero at 0.45 s."""
+    return (
+        SceneBuilder("falling", gravity=(0.0, 0.0, -9.81))
+        .rigid_body("ball", mass=1.0, inertia=(0.1, 0.1, 0.1))
+        .prismatic("rail", "ground", "ball", axis=(0.0, 0.0, 1.0), position=1.0)
+        .add(*events)
+        .marker("ball", "ball")
+        .scene()
+    )
+
+
+def test_a_run_whose_events_chatter_keeps_the_samples_that_it_was_asked_for():
+    """It ends at an event, between two samples, which is one more of its own: caught between a floor and a ceiling."""
+    bounce = (Impact(coordinate="rail.translation"),)
+    floor = SceneEvent(name="floor", watch="rail.translation", level=0.0, crossing="falling", actions=bounce)
+    ceiling = SceneEvent(name="ceiling", watch="rail.translation", level=1e-9, crossing="rising", actions=bounce)
+    times, scene = np.linspace(0.0, 1.0, 6), falling(floor, ceiling)
+    run = engine(RECURSION).compile(scene).simulate(Run(times), Effort("tolerance", 1e-8, "dop853"))
+    assert run.status == "diverged" and "events follow each other" in run.message
+    assert checked_run(run, times, scene).times.tolist() == [0.0, 0.2, 0.4]
+
+
+def test_a_scene_that_ends_its_own_run_is_refused():
+    end = SceneEvent(name="over", watch="rail.translation", level=0.0, actions=(EndRun(),))
+    support = engine(RECURSION).supports(falling(end))
+    assert support.kind == "no" and 'event "over" ends the run' in support.reason

@@ -126,8 +126,9 @@ def test_conserving_is_total() -> None:
     assert conserve(np.zeros(0), 1.0, 1e-6).status == "failed"
 
 
-def ladder(efforts: tuple[float, ...], levels: tuple[float, ...]) -> list[RungSignal]:
-    return [RungSignal(effort, np.full((2, 3), level)) for effort, level in zip(efforts, levels, strict=True)]
+def ladder(efforts: tuple[float, ...], levels: tuple[float, ...], evaluations: int = 0) -> list[RungSignal]:
+    pairs = zip(efforts, levels, strict=True)
+    return [RungSignal(effort, np.full((2, 3), level), evaluations) for effort, level in pairs]
 
 
 @pytest.mark.parametrize("kind", ["step", "tolerance", ""])
@@ -136,11 +137,22 @@ def test_estimating_is_total(kind: str, count: int) -> None:
     """U is a number above its round-off, or infinite with the reason; never a NaN, never an exception."""
     sound = (0.4, 0.2, 0.1)[-count:]
     for odd in itertools.product(ODD, repeat=count):
-        check(estimate(CHANNELS[0], kind, ladder(odd, (1.0, 1.1, 1.12)[-count:]), 10, 1.0), finite(*odd))
-        check(estimate(CHANNELS[0], kind, ladder(sound, odd), 10, 1.0), finite(*odd))
+        check(estimate(CHANNELS[0], kind, ladder(odd, (1.0, 1.1, 1.12)[-count:]), 1.0), finite(*odd))
+        check(estimate(CHANNELS[0], kind, ladder(sound, odd), 1.0), finite(*odd))
     for evaluations, size in itertools.product((-1, 0, 10, 10**18), ODD):
-        found = estimate(CHANNELS[0], kind, ladder(sound, (1.0, 1.1, 1.12)[-count:]), evaluations, size)
+        found = estimate(CHANNELS[0], kind, ladder(sound, (1.0, 1.1, 1.12)[-count:], evaluations), size)
         check(found, finite(size) and size >= 0.0 and evaluations >= 0)
+
+
+@pytest.mark.parametrize("efforts", [3, 4])
+def test_estimating_is_total_in_the_evaluations(efforts: int) -> None:
+    """Tolerances that took as many evaluations as there are, none, or one less than before."""
+    levels = (2.0, 1.0, 0.9, 0.899)[-efforts:]
+    for counts in itertools.product((0, 1, 10, 11, 10**18), repeat=efforts):
+        rungs = [RungSignal(0.1**n, np.full((2, 3), levels[n]), count) for n, count in enumerate(counts)]
+        found = estimate(CHANNELS[0], "tolerance", rungs, 1.0)
+        check(found, True)
+        assert found.value >= 0.1 * np.max(np.abs(rungs[-2].values - rungs[-1].values))
 
 
 def check(found: Uncertainty, sound: bool) -> None:
@@ -151,14 +163,14 @@ def check(found: Uncertainty, sound: bool) -> None:
 
 
 def test_rungs_that_are_no_ladder_leave_the_uncertainty_unknown() -> None:
-    assert estimate(CHANNELS[0], "step", [], 0, 1.0).value == math.inf
+    assert estimate(CHANNELS[0], "step", [], 1.0).value == math.inf
     shapes = [RungSignal(0.2, np.ones((3, 3))), RungSignal(0.1, np.ones((2, 3)))]
-    assert estimate(CHANNELS[0], "step", shapes, 0, 1.0).value == math.inf
+    assert estimate(CHANNELS[0], "step", shapes, 1.0).value == math.inf
     empty = [RungSignal(0.2, np.ones((0, 3))), RungSignal(0.1, np.ones((0, 3)))]
-    assert estimate(CHANNELS[0], "step", empty, 0, 1.0).value == math.inf
+    assert estimate(CHANNELS[0], "step", empty, 1.0).value == math.inf
     rising = ladder((0.1, 0.2, 0.4), (1.0, 1.1, 1.12))
-    assert estimate(CHANNELS[0], "step", rising, 0, 1.0).value == math.inf
-    assert estimate(CHANNELS[0], "step", ladder((0.1, 0.1), (1.0, 1.0)), 0, 1.0).value == math.inf
+    assert estimate(CHANNELS[0], "step", rising, 1.0).value == math.inf
+    assert estimate(CHANNELS[0], "step", ladder((0.1, 0.1), (1.0, 1.0)), 1.0).value == math.inf
 
 
 def test_an_observed_order_is_a_number_or_none() -> None:

@@ -13,9 +13,12 @@ from crosscheck.library.case import CaseError, MutationKind
 from crosscheck.library.mutations import CATALOGUE, applicable, mutate
 from flexmb.scene.bodies import BeamBody, BeamStation, Modes, Node, RigidBody
 from flexmb.scene.check import check_scene
+from flexmb.scene.connectors import AngularFriction, AngularSpring, Bushing
+from flexmb.scene.control import CoordinateSensor, MarkerSensor, Pid, ProfileSensor, StateSpace
+from flexmb.scene.events import Change, Impact, Latch, SceneEvent
 from flexmb.scene.functions import Ramp, Sine, SmoothStep
 from flexmb.scene.hinges import AngularCoordinate, Gimbal, Revolute, Spherical
-from flexmb.scene.schema import Closure, Free, Load, Planar, PointMass, Scene, SpringDamper, Wheel
+from flexmb.scene.schema import Closure, Free, Load, Marker, Planar, PointMass, Scene, SpringDamper, Wheel
 from flexmb.surrogate import modal_points
 
 INERTIA = ((0.1, 0.0, 0.0), (0.0, 0.2, 0.0), (0.0, 0.0, 0.25))
@@ -114,6 +117,7 @@ def test_a_control_that_would_change_nothing_is_refused(mutation: MutationKind, 
         mutate(SCENE, mutation, target)
 
 
+SIX = tuple(tuple(10.0 * (i + 1) if i == j else 0.0 for j in range(6)) for i in range(6))
 PUSH = Sine(amplitude=2.0, angular_frequency_rad_s=3.0)
 
 
@@ -166,9 +170,38 @@ def everything() -> Scene:
         point_masses=(PointMass(name="lump", body="hub", mass_kg=0.1),),
         connectors=(
             SpringDamper(
-                name="spring", body_a="hub", body_b="tip", free_length_m=0.5, stiffness_N_m=10.0, damping_Ns_m=0.1
+                name="spring", body_a="hub", body_b="tip", free_length_m=0.5, stiffness_N_m=10.0, damping_Ns_m=0.1,
+                preload_N=1.0, position_a_m=(0.1, 0.0, 0.0), acts="tension", force_N=PUSH,
+            ),
+            Bushing(name="mount", body_a="hub", body_b="tip", quaternion_a=TURNED, stiffness=SIX),
+            AngularSpring(
+                name="stops", hinge="end", lower_rad=-1.0, upper_rad=1.0, stop_stiffness_Nm_rad=100.0,
+                stop_dissipation_s_rad=0.1,
+            ),
+            AngularFriction(name="rubbing", hinge="end", sliding_Nm=1.0, smoothing_rad_s=0.1),
+        ),
+        sensors=(
+            MarkerSensor(name="gyro", marker="tip", quantity="angular_velocity"),
+            CoordinateSensor(name="elbow", of="end"),
+            ProfileSensor(name="course", function=PUSH),
+        ),
+        controllers=(
+            StateSpace(
+                name="law", inputs=("gyro", "course[0]"), A=((0.5,),), B=((1.0, 0.0, 0.0, 0.0),), C=((2.0,),),
+                period_s=0.1, delay_s=0.05,
+            ),
+            Pid(name="servo", inputs=("elbow",), kp=2.0, setpoint=0.5, lower=-1.0, upper=1.0),
+        ),
+        events=(
+            SceneEvent(
+                name="caught", watch="end.rotation", level=1.0,
+                actions=(
+                    Latch(coordinate="end.rotation"), Impact(coordinate="wheel.angle", restitution=0.5),
+                    Change(path="push.function", value=PUSH),
+                ),
             ),
         ),
+        markers=(Marker(name="tip", body="tip"),),
         loads=(Load(name="push", body="hub", node="port", type="force", direction=(1.0, 0.0, 0.0), function=PUSH),),
     )  # fmt: skip
 
@@ -183,6 +216,76 @@ def test_every_mutation_has_a_target_and_leaves_the_rest_as_it_was(mutation: Mut
         assert len(collections) == 1
         if mutation in ("damping", "damping_dropped", "stiffness", "mass"):
             check_scene(changed)
+
+
+@pytest.mark.parametrize(
+    ("mutation", "target", "places"),
+    [
+        ("connector_one_sided", "spring", {"connectors[0].acts"}),
+        ("connector_stop", "stops", {"connectors[2].lower_rad", "connectors[2].upper_rad"}),
+        ("friction_speed", "rubbing", {"connectors[3].smoothing_rad_s"}),
+        ("bushing_ends", "mount", {f"connectors[1].{key}" for key in ("body_a", "body_b")}
+            | {f"connectors[1].quaternion_{end}[{i}]" for end in "ab" for i in (0, 2)}),
+        ("bushing_order", "mount", {f"connectors[1].stiffness[{i}][{i}]" for i in range(6)}),
+        ("motor_sign", "spring", {"connectors[0].force_N.amplitude"}),
+        ("function_size", "course", {"sensors[2].function.amplitude"}),
+        ("controller_gain", "law", {"controllers[0].C[0][0]"}),
+        ("controller_offset", "law", {"controllers[0].offset_s"}),
+        ("controller_limit", "servo", {"controllers[1].lower", "controllers[1].upper"}),
+        ("sensor_frame", "gyro", {"sensors[0].frame"}),
+        ("event_level", "caught", {"events[0].level"}),
+        ("event_hold", "caught", {"events[0].actions[0]"}),
+        ("event_restitution", "caught", {"events[0].actions[1].restitution"}),
+        ("event_value", "caught", {"events[0].actions[2].value.amplitude"}),
+    ],
+)  # fmt: skip
+def test_a_mutation_of_the_new_elements_changes_just_its_place(
+    mutation: MutationKind, target: str, places: set[str]
+) -> None:
+    assert changes(everything(), mutate(everything(), mutation, target)) == {f"$.{place}" for place in places}
+
+
+def test_a_level_comes_later_on_the_way_from_the_start() -> None:
+    """From 0.3 rad to 1 rad by a hundredth of 0.7 rad; and whichever way it may be crossed, not the one it is."""
+    assert mutate(everything(), "event_level", "caught").events[0].level == pytest.approx(1.007)
+    assert mutate(everything(), "event_crossing", "caught").events[0].crossing == "falling"
+
+
+def test_a_sensor_is_reversed_by_what_stands_behind_it() -> None:
+    reverse, law, servo = mutate(everything(), "sensor_sign", "gyro").controllers
+    assert reverse.inputs == ("gyro",) and reverse.D == ((-1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, -1.0))
+    assert (reverse.period_s, reverse.offset_s, reverse.delay_s) == (0.1, 0.0, 0.0)
+    assert law.inputs == ("gyro reversed", "course[0]") and servo == everything().controllers[1]
+
+
+def test_components_are_exchanged_in_all_that_read_them() -> None:
+    law, _ = mutate(everything(), "sensor_component", "gyro").controllers
+    assert law.inputs == ("gyro[1]", "gyro[0]", "gyro[2]", "course[0]")
+    law, _ = mutate(everything(), "sensor_component", "course").controllers
+    assert law.inputs == ("gyro", "course[1]")
+
+
+@pytest.mark.parametrize(
+    ("mutation", "target", "message"),
+    [
+        ("connector_one_sided", "mount", "acts both ways"),
+        ("bushing_order", "spring", "a bushing has"),
+        ("controller_delay", "servo", "is continuous"),
+        ("sensor_sign", "nothing", "no sensor whose numbers"),
+        ("sensor_component", "elbow", "has one number"),
+        ("sensor_frame", "course", "in no axes"),
+        ("function_size", "gyro", "no hinge, wheel, load, actuator or profile"),
+    ],
+)
+def test_what_an_element_does_not_have_is_refused(mutation: MutationKind, target: str, message: str) -> None:
+    with pytest.raises(CaseError, match=message):
+        mutate(everything(), mutation, target)
+
+
+def test_a_node_that_a_connector_is_fixed_to_is_not_idle() -> None:
+    spring = SpringDamper(name="s", body_a="ground", body_b="hub", node_b="port", stiffness_N_m=1.0)
+    assert "nothing is mounted" in CATALOGUE["node_position"].idle(SCENE, "hub.port")
+    assert CATALOGUE["node_position"].idle(msgspec.structs.replace(SCENE, connectors=(spring,)), "hub.port") == ""
 
 
 def test_the_catalogue_is_the_list_of_names_that_a_run_file_may_use() -> None:

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from crosscheck.engines.native import NativeEngine
 from crosscheck.judging.results import CaseResults, Result, collect
 from crosscheck.library.find import Case, load_case, resolve, shipped_cases
 from crosscheck.records.archive import read
@@ -17,15 +18,19 @@ from crosscheck.records.packing import pack
 from crosscheck.report.animation import animations, wheel_angle
 from crosscheck.report.store import Store
 from crosscheck.running.execute import execute
+from crosscheck.running.film import film
 from crosscheck.running.plan import plan, variant_scene
 from crosscheck.running.sweep import PROVIDER
+from flexmb.interchange.sid import sid_of, write_sid
 from flexmb.scene.bodies import SidBody
+from flexmb.scene.connectors import HingeFriction
 from flexmb.typing import Real
 from tests.crosscheck.sessions import CASE
+from tests.flexmb.interchange.made_bodies import beam, swinging
 
 
 @pytest.mark.parametrize("case", shipped_cases(), ids=lambda case: case.name)
-def test_every_body_and_wheel_is_drawn(case: Case) -> None:
+def test_every_body_wheel_mass_and_connector_is_drawn(case: Case) -> None:
     record, _ = plan(case, (), PROVIDER, films=True)
     for variant in record.run.variants:
         info = record.variants[variant.name]
@@ -35,10 +40,9 @@ def test_every_body_and_wheel_is_drawn(case: Case) -> None:
         scene = case.scene(variant)
         if variant.transform != "modal_points":
             scene = variant_scene(scene, variant)
-        if any(isinstance(body, SidBody) for body in scene.bodies):
-            continue
         assert drawing is not None
-        assert {line.body for line in drawing.lines} == {body.name for body in scene.bodies}, variant.name
+        shown = (*scene.bodies, *scene.point_masses, *(x for x in scene.connectors if not isinstance(x, HingeFriction)))
+        assert {line.body for line in drawing.lines} == {each.name for each in shown}, variant.name
         assert {wheel.name for wheel in drawing.wheels} == {wheel.name for wheel in scene.wheels}, variant.name
 
 
@@ -151,3 +155,27 @@ def test_records_of_older_versions_are_drawn(tmp_path: Path) -> None:
     (record,) = read(tmp_path / "records.jsonl")
     drawing = record.variants["v"].drawing
     assert drawing.lines[0].points[1].tangent == (0.0, 0.0, 0.0) and drawing.wheels == ()
+
+
+def test_a_body_in_a_sid_file_is_drawn_by_the_nodes_of_the_file(tmp_path: Path) -> None:
+    write_sid(sid_of(beam()), tmp_path / "rod.sid")
+    scene = swinging(SidBody(name="rod", file=str(tmp_path / "rod.sid")), "root", "tip")
+    filmed = film(scene)
+    assert filmed is not None
+    assert {line.body for line in filmed[1].lines} == {"rod", "load"}
+    (rod,) = (line for line in filmed[1].lines if line.kind == "beam")
+    assert len(rod.points) >= 2
+    assert film(swinging(SidBody(name="rod", file=str(tmp_path / "none.sid")), "root", "tip")) is None
+
+
+def test_a_point_mass_that_moves_is_filmed_as_a_body_on_slides() -> None:
+    """And arrives where the native code has it: the carrier's motion stays what it was."""
+    (case,) = resolve(("spacecraft/slosh",))
+    scene = case.scene(case.run.variants[0])
+    filmed = film(scene)
+    assert filmed is not None
+    (ball,) = (line for line in filmed[1].lines if line.kind == "ball")
+    assert ball.body == "liquid" and ball.points[0].marker == "liquid origin drawn"
+    before, after = (NativeEngine().compile(each).evaluate() for each in (scene, filmed[0]))
+    for name, marker in before.markers.items():
+        np.testing.assert_allclose(after.markers[name].acceleration, marker.acceleration, rtol=1e-9, atol=1e-12)

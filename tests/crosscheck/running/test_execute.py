@@ -13,6 +13,7 @@ import pytest
 
 from crosscheck.engines.answers import LONGEST_TEXT, BrokenContract
 from crosscheck.engines.contract import Effort, EngineMissing, Run, Support, Trajectory
+from crosscheck.judging.uncertainty import RUNGS
 from crosscheck.library.find import load_case
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.packing import unpack
@@ -248,12 +249,13 @@ def test_only_the_finest_effort_where_no_more_is_asked() -> None:
     assert set(found.channels) > {TIP}
 
 
-def test_coarse_efforts_store_what_is_kept_and_the_last_three_everything() -> None:
+def test_coarse_efforts_store_what_is_kept_and_those_that_uncertainties_need_everything() -> None:
     found = records(Actor(), kept=(TIP, "no such channel"))
     full = set(found[-1].channels)
     assert len(full) > 5
-    assert [set(each.channels) for each in found] == [{TIP}, {TIP}, full, full, full]
-    assert [set(each.channels) for each in records(Actor())][:3] == [set(), set(), full]
+    assert [set(each.channels) for each in found] == [{TIP}, *4 * [full]]
+    assert [set(each.channels) for each in records(Actor())][:2] == [set(), full]
+    assert module.FULLY_STORED == RUNGS
     assert all(np.array_equal(unpack(each.times), TIMES) for each in found)
 
 
@@ -277,8 +279,7 @@ def test_the_key_holds_all_that_the_result_depends_on(
     assert key_of(Actor()) == first
     assert key_of(Actor(says={"version": "1.1"})) != first
     assert key_of(Actor(), kept=(TIP,)) != first
-    assert key_of(Actor(), kept=(TIP,), efforts=LADDER[:4]) != first
-    assert key_of(Actor(), kept=(TIP,), efforts=LADDER[:3]) == key_of(Actor(), efforts=LADDER[:3]) == first
+    assert key_of(Actor(), kept=(TIP,), efforts=LADDER[:4]) == key_of(Actor(), efforts=LADDER[:4]) == first
 
 
 def test_what_is_done_is_confirmed_and_not_run_again() -> None:

@@ -103,14 +103,17 @@ def test_a_nearly_equilateral_bennett_linkage(shorter, settings):
         assert np.max(np.abs(run.energy_drift)) < {"dop853": 1e-6}.get(settings, 0.1)
 
 
-@pytest.mark.parametrize("settings", SPATIAL)
+@pytest.mark.parametrize("settings", ["dop853", "looser"])
 @pytest.mark.parametrize("longer", [0.0, 1e-8, 1e-5, 1e-3])
 def test_flexible_bars_near_a_singular_position(longer, settings):
-    """Beams for bars: right as far as a run with tighter tolerances tells, or lost."""
+    """Beams for bars: right as far as a run with tighter tolerances tells, or lost.
+
+    Later their vibration decides how they turn at each near miss, and errors grow a thousandfold: nothing is compared.
+    """
     bars = m.FourBar(0.4, 1.0, 0.4, 1.0 + longer)
     system = flexmb.compile(m.four_bar(bars, crank=1.0, rate=6.0, gravity=0.0, modes=1))
-    run = flexmb.simulate(system, 0.5, samples=6, **SPATIAL[settings])
-    tight = flexmb.simulate(system, 0.5, samples=6, rtol=1e-12, atol=1e-14)
+    run = flexmb.simulate(system, 0.35, samples=6, **SPATIAL[settings])
+    tight = flexmb.simulate(system, 0.35, samples=6, rtol=1e-12, atol=1e-14)
     assert run.finished or run.status in LOST, run.message
     if run.finished and tight.finished:
         allowed = {"dop853": 1e-5}.get(settings, 0.1)

@@ -31,7 +31,8 @@ def bodies(*, grounded: bool, level: s.Level = "full", spin: float = 1.0) -> Sce
     builder.revolute("elbow", "hub", "boom", axis=(0.0, 0.6, 0.8), angle=0.4, rate=0.8, parent_node="corner")
     builder.prismatic("rail", "hub", "slider", axis=(0, 0, 1), position=0.25, rate=-0.4, parent_position=(-0.2, 0, 0.1))
     builder.wheel("wheel", "slider", axis=(0, 1, 0), mass=0.3, axial_inertia=2e-3, transverse_inertia=1.2e-3, speed=8.0)
-    builder.modal_state("boom", coordinates=(0.03, -0.02, 0.01), rates=(0.2, 0.1, -0.3))
+    if level != "rigid":
+        builder.modal_state("boom", coordinates=(0.03, -0.02, 0.01), rates=(0.2, 0.1, -0.3))
     return builder.marker("tip", "boom", node="tip").marker("hub", "hub", offset=(0.1, 0, 0))
 
 

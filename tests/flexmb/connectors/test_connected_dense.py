@@ -42,6 +42,13 @@ def test_of_first_order(algorithm):
     assert left_over(DenseSystem(scene), state, system.accelerations(state, algorithm)) <= gamma(64 * system.nu)
 
 
+@pytest.mark.parametrize("level", ["rigid", "stiffened"])
+def test_at_nodes_of_other_levels(level):
+    scene = everything(level=level)
+    system, state = started(scene)
+    assert left_over(DenseSystem(scene), state, system.accelerations(state)) <= gamma(64 * system.nu)
+
+
 def test_in_lanes(at_start):
     system, state, dense = at_start
     found = system.accelerations_batch(np.tile(state.q, (9, 1)), np.tile(state.u, (9, 1)))

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import flexmb as fm
+from flexmb.entry import articulated
+from flexmb.jit.counting import count
 from flexmb.scene import schema as s
 from tests.flexmb.connectors.connected_scenes import positive
 
@@ -100,6 +102,41 @@ def test_friction_brings_a_body_to_rest():
     pushed.force("push", "body", direction=(1, 0, 0), function=s.Constant(value=3.0))
     creep = fm.simulate(pushed.scene(), 0.2, method="radau5", samples=3, rtol=1e-9, atol=1e-12).u[-1, 0]
     assert abs(creep - 1e-3 * 3.0 / np.sqrt(16.0 - 9.0)) <= 1e-9
+
+
+def test_a_wheel_s_bearing_brings_wheel_and_body_to_one_rate():
+    """Momentum stays, the relative rate falls by F (1/J + 1/I), and what is lost is 1/2 JI/(J+I) s^2."""
+    J, I, F, s0 = 0.05, 0.4, 0.02, 3.0
+    builder = fm.SceneBuilder("wheel").rigid_body("body", mass=1.0, inertia=(1.0, 1.0, I))
+    builder.revolute("pivot", "ground", "body", axis=(0, 0, 1))
+    builder.wheel("wheel", "body", axis=(0, 0, 1), mass=0.1, axial_inertia=J, transverse_inertia=0.03, speed=s0)
+    builder.angular_friction("bearing", "wheel", sliding=F, smoothing=1e-4)
+    run = fm.simulate(builder.scene(), 8.0, samples=33, **EXACT)
+    stop = s0 / (F * (1.0 / J + 1.0 / I))
+    slipping = run.t < 0.98 * stop
+    assert 5.0 < stop < 7.5 and run.finished
+    falling = s0 - F * (1.0 / J + 1.0 / I) * run.t
+    assert np.max(np.abs(run.u[slipping, 1] - falling[slipping])) <= 1e-6
+    assert abs(run.u[-1, 1]) <= 1e-9 and abs(run.u[-1, 0] - J * s0 / (J + I)) <= 1e-9
+    assert np.max(np.abs(run.momentum[:, 2] - J * s0)) <= 1e-11
+    assert abs(run.work[-1] + 0.5 * J * I / (J + I) * s0**2) <= 1e-9
+    assert np.max(np.abs(run.energy_drift)) <= 1e-9 * run.energy_scale
+
+
+def test_each_connector_costs_what_the_one_before_it_does():
+    """Operations of the right-hand side, counted: of first order in the number of connectors."""
+
+    def operations(connectors: int) -> int:
+        builder = slider(position=0.3)
+        for i in range(connectors):
+            builder.spring_damper(f"s{i}", "ground", "body", position_a=(-1.0, 0.1 * i, 0.0), stiffness=2.0, damping=0.1)
+        system = fm.compile(builder.scene())
+        y = system.initial_state.y
+        counted = count(articulated.rhs, 0.0, y, np.empty_like(y), system.constants, system.workspace())
+        return counted.operations.total
+
+    none, one, two, twenty = map(operations, (0, 1, 2, 20))
+    assert one > none and twenty - one == 19 * (two - one)
 
 
 def test_static_friction_is_higher_near_rest():

@@ -212,6 +212,18 @@ def test_what_waits_is_put_out_before_who_acts_at_the_same_instant() -> None:
     assert table["kind"].tolist() == [SAMPLE, APPLY, SAMPLE, APPLY, SAMPLE, APPLY, SAMPLE]
 
 
+@pytest.mark.parametrize("t_end", [0.9, 1.0, 1.05])
+def test_samples_are_numbered_as_they_come_however_long_the_run_is(t_end: float) -> None:
+    """Rows of those before the end follow each other from 0: there is room for so many. A longer run has the same."""
+    controllers = law(0.1, 0.03), law(0.25, 0.1), law(0.2)
+    table, longer = (instants(controllers, 0.0, end, ()) for end in (t_end, 2.0))
+    due = table[table["time"] < t_end]
+    sampled = due["kind"] == SAMPLE
+    assert due["row"][sampled].tolist() == list(range(sampled.sum()))
+    assert set(due["row"][~sampled]) <= set(due["row"][sampled])
+    assert longer[: len(due)]["row"].tolist() == due["row"].tolist()
+
+
 def test_more_instants_than_memory_are_refused() -> None:
     with pytest.raises(ValueError, match=rf"act .* times in 100 s, and {MOST} are allowed"):
         fm.simulate(rotor(law(1e-6)), 100.0)

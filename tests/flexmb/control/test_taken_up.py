@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from msgspec.structs import replace
 
 import flexmb as fm
 from tests.flexmb.control.scenes import pendulum, rotor
@@ -45,6 +46,21 @@ def test_a_loop_that_is_taken_up_is_one_that_had_never_ended(method: Any, law: A
     joined = first.then(second)
     assert np.array_equal(joined.signals["law"], whole.signals["law"])
     assert np.array_equal(joined.power["law"], whole.power["law"])
+
+
+@pytest.mark.parametrize("cut", [0.56, 0.58])
+def test_two_sampled_controllers_are_taken_up_as_one_is(cut: float) -> None:
+    """What one of them has put out waits where it is looked for, however long the run is that goes on."""
+    aid = fm.StateSpace(name="aid", inputs=("rate",), D=((0.5,),), period_s=0.07, delay_s=0.06)
+    scene = pendulum(aid, replace(SAMPLED, inputs=("angle", "aid")), torque=fm.ControlSignal(source="law")).scene()
+    times = np.array([0.0, cut, 0.9, END])
+    system = fm.compile(scene)
+    whole = fm.simulate(system, END, samples=times)
+    first = fm.simulate(system, cut, samples=times[:2])
+    second = fm.simulate(system, END, samples=times[1:], state=first.restart)
+    for name in ("aid", "law"):
+        assert np.array_equal(first.then(second).signals[name], whole.signals[name])
+    assert second.q == pytest.approx(whole.q[1:], abs=1e-9)
 
 
 def test_a_loop_is_taken_up_from_a_file(tmp_path: Path) -> None:

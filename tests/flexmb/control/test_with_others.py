@@ -59,3 +59,29 @@ def test_a_run_that_an_event_ends_shows_its_signals_there(law: fm.StateSpace) ->
     assert run.signals["angle"][-1, 0] == run.q[-1, 0]
     assert run.loads["pivot"][-1, 2] == pytest.approx(run.signals["law"][-1, 0], abs=1e-12)
     assert run.signals["law"][-1, 0] != 0.0
+
+
+@pytest.mark.parametrize("period", [None, 0.1])
+def test_an_event_switches_a_controller_off(period: float | None) -> None:
+    """What it drove turns evenly from then on; at the gain that it has anyway nothing changes."""
+    law = fm.Pid(name="law", inputs=("rate",), kp=2.0, setpoint=1.0, period_s=period)
+    runs = [
+        fm.simulate(rotor(law, fm.SceneEvent(
+            name="switch", watch="time", level=0.55, actions=(fm.Change(path="law.kp", value=gain),)
+        )), 1.0, samples=101) for gain in (0.0, 2.0)
+    ]  # fmt: skip
+    alone = fm.simulate(rotor(law), 1.0, samples=101)
+    off, on = runs
+    later = off.t > (0.6 if period else 0.55)  # a sampled one is asked at its next instant
+    assert np.ptp(off.u[later, 0]) < 1e-12 and np.ptp(on.u[later, 0]) > 1e-2
+    assert np.abs(on.q - alone.q).max() < 1e-9 and np.abs(off.energy_drift).max() < 1e-9
+
+
+def test_the_open_loop_has_no_events_of_feedback() -> None:
+    law = fm.Pid(name="law", inputs=("rate",), kp=2.0, period_s=0.1)
+    end, change = fm.EndRun(), fm.Change(path="law.kp", value=0.0)
+    events = [
+        fm.SceneEvent(name=name, watch=watch, level=1.0, actions=(action,))
+        for name, watch, action in (("a", "law", end), ("b", "time", change), ("c", "pivot.rotation", end))
+    ]
+    assert [event.name for event in fm.open_loop(rotor(law, *events)).events] == ["c"]

@@ -12,7 +12,7 @@ import numpy as np
 
 from flexmb.integrate.control import COUNTS
 from flexmb.integrate.memory import memory
-from flexmb.integrate.problem import Accuracy, Clock, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, stiff_problem
 from flexmb.jit.bundle import bundle
 from flexmb.jit.kernel import kernel
 from flexmb.tables.status import NOT_POSITIVE_DEFINITE, OK
@@ -154,7 +154,7 @@ class Result(NamedTuple):
 def solve(integrator, problem, y, times, rtol, atol, controlled, *, ends=None, max_steps=100_000, **more) -> Result:
     """Integrate `problem` = (constants, workspace) from y with an integrator; `more`: fields of `Accuracy`."""
     constants, workspace = problem
-    equations = stiff_problem(rhs, project, constants, workspace, jacobian, move, constants, workspace)
+    equations = stiff_problem(rhs, project, constants, workspace, Linear(jacobian, move, constants, workspace))
     times, y = np.asarray(times, float), np.array(y, float)
     ends = np.array([times[-1]] if ends is None else ends, float)
     out, counts = np.full((len(times), len(y)), np.nan), np.zeros(COUNTS, np.int64)

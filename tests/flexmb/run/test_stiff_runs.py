@@ -125,15 +125,6 @@ def test_what_is_refused():
         fm.simulate(scene, 1.0, "euler")
     with pytest.raises(NotImplementedError, match='needs Jacobians, which algorithm "articulated" alone has'):
         fm.simulate(scene, 1.0, "radau5", algorithm="frisch")
-    closed = (
-        fm.SceneBuilder("loop")
-        .rigid_body("rod", mass=1.0, com=(0.5, 0, 0), inertia=(0.1, 0.1, 0.1), nodes={"far": (1.0, 0.0, 0.0)})
-        .spherical("ball", "ground", "rod")
-        .closure("ring", "spherical", "ground", "rod", position_a=(1.0, 0.0, 0.0), node_b="far")
-        .scene()
-    )
-    with pytest.raises(NotImplementedError, match='"exponential" runs trees, and the scene has closures'):
-        fm.simulate(closed, 1.0, "exponential")
 
 
 @pytest.mark.parametrize("method", ADAPTIVE)

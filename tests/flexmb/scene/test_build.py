@@ -9,7 +9,8 @@ import pytest
 
 from flexmb.scene import build
 from flexmb.scene import schema as s
-from flexmb.scene.build import COLLECTIONS, SceneBuilder, angular
+from flexmb.scene.build import SceneBuilder, angular
+from flexmb.scene.collecting import COLLECTIONS
 from flexmb.scene.problems import SceneError
 from flexmb.scene.shapes import beam_section, cuboid_inertia, cylinder_inertia, inertia_moments
 from flexmb.scene.units import split_unit
@@ -51,7 +52,8 @@ METHODS = {
     "angular_spring": s.AngularSpring, "linear_spring": s.LinearSpring, "angular_friction": s.AngularFriction,
     "linear_friction": s.LinearFriction, "event": s.SceneEvent,
     "sense_coordinate": s.CoordinateSensor, "sense_marker": s.MarkerSensor,
-    "sense_load": s.LoadSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
+    "sense_load": s.LoadSensor, "sense_drive": s.DriveSensor,
+    "sense_distance": s.DistanceSensor, "sense_time": s.TimeSensor, "sense_profile": s.ProfileSensor,
     "state_space": s.StateSpace, "pid": s.Pid, "saturation": s.Saturation, "gain_table": s.GainTable,
     "user_law": s.UserLaw,
 }  # fmt: skip

@@ -8,7 +8,8 @@ from hypothesis import strategies as st
 from msgspec import inspect
 
 from flexmb.scene import schema as s
-from flexmb.scene.build import COLLECTIONS, SceneBuilder
+from flexmb.scene.build import SceneBuilder
+from flexmb.scene.collecting import COLLECTIONS
 from flexmb.scene.files import dumps, load_scene, loads, save_scene
 from flexmb.scene.problems import SceneError
 

@@ -1,0 +1,122 @@
+"""Mutations of events: of where they happen, and of what happens there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import msgspec
+
+from crosscheck.library.mutations.edits import key_of, on_event, place_key
+from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, LESS, Mutation, MutationTarget
+from crosscheck.library.time_functions import scaled
+from flexmb.scene.events import Action, Change, Impact, Latch, SceneEvent
+from flexmb.scene.functions import Function
+from flexmb.scene.schema import Scene
+from flexmb.scene.tree import coordinates, watchable
+
+OTHER_WAY = {"rising": "falling", "falling": "rising"}
+
+
+def events(scene: Scene) -> Iterator[MutationTarget]:
+    """All of them; one kind for each list of actions."""
+    for each in scene.events:
+        yield MutationTarget(each.name, "event: " + ", ".join(str(act.__struct_config__.tag) for act in each.actions))
+
+
+def _of_actions(change: Callable[[Action], Action]) -> Callable[[Scene, str], Scene]:
+    def changed(event: SceneEvent) -> SceneEvent:
+        return msgspec.structs.replace(event, actions=tuple(map(change, event.actions)))
+
+    return lambda scene, target: on_event(scene, target, changed)
+
+
+def _begins(scene: Scene, event: SceneEvent) -> float:
+    """What the event watches, at the start (m, rad, or a rate of these; s)."""
+    name = watchable(scene)[event.watch]
+    for wheel in scene.wheels:
+        if name.removesuffix(".angle").removesuffix(".speed") == wheel.name:
+            return wheel.angle_rad if name.endswith(".angle") else wheel.speed_rad_s
+    for item in (*scene.hinges, *scene.point_masses):
+        for key, coordinate in coordinates(item):
+            if name.removesuffix(".rate") == f"{item.name}.{key}":
+                stem = key_of(coordinate, "rate") if name.endswith(".rate") else place_key(coordinate)
+                return float(getattr(coordinate, stem))
+    return 0.0  # of time
+
+
+def _level(scene: Scene, target: str) -> Scene:
+    def farther(event: SceneEvent) -> SceneEvent:
+        way = event.level - _begins(scene, event)
+        return msgspec.structs.replace(event, level=event.level + HUNDREDTH * way)
+
+    return on_event(scene, target, farther)
+
+
+def _crossing(scene: Scene, target: str) -> Scene:
+    """The other way; of an event that happens either way, never on the way from where it begins."""
+
+    def changed(event: SceneEvent) -> SceneEvent:
+        against = "falling" if _begins(scene, event) < event.level else "rising"
+        return msgspec.structs.replace(event, crossing=OTHER_WAY.get(event.crossing, against))
+
+    return on_event(scene, target, changed)
+
+
+def _dropped(scene: Scene, target: str) -> Scene:
+    return msgspec.structs.replace(scene, events=tuple(each for each in scene.events if each.name != target))
+
+
+def _not_held(action: Action) -> Action:
+    return Impact(coordinate=action.coordinate, restitution=0.0) if isinstance(action, Latch) else action
+
+
+def _softer(action: Action) -> Action:
+    if isinstance(action, Impact):
+        return msgspec.structs.replace(action, restitution=LESS * action.restitution)
+    return action
+
+
+def _larger(action: Action) -> Action:
+    if not isinstance(action, Change):
+        return action
+    value = action.value
+    larger = scaled(value, FACTOR) if isinstance(value, Function) else FACTOR * value
+    return msgspec.structs.replace(action, value=larger)
+
+
+def _backwards(scene: Scene, target: str) -> Scene:
+    def changed(event: SceneEvent) -> SceneEvent:
+        return msgspec.structs.replace(event, actions=event.actions[::-1])
+
+    return on_event(scene, target, changed)
+
+
+MUTATIONS = (
+    Mutation(
+        "event_level",
+        "a level farther by a hundredth of the way there",
+        "a wrong figure, or an event found at the end of a step",
+        events,
+        _level,
+    ),
+    Mutation(
+        "event_crossing",
+        "rising for falling, or the other way; neither way for either",
+        "a sign",
+        events,
+        _crossing,
+    ),
+    Mutation("event_dropped", "no event", "a latch or contact left out", events, _dropped),
+    Mutation(
+        "event_hold",
+        "a latch that takes the speed away and does not hold",
+        "an impulse without the constraint after it",
+        events,
+        _of_actions(_not_held),
+    ),
+    Mutation("event_restitution", "-1 % restitution", "a wrong figure", events, _of_actions(_softer)),
+    Mutation("event_value", "+1 % of what a value changes to", "a wrong figure", events, _of_actions(_larger)),
+    Mutation(
+        "event_order", "actions in the opposite order", "another order of what happens at once", events, _backwards
+    ),
+)

@@ -1,0 +1,65 @@
+"""Structs of a scene made from values named without units, and collected by kind: what all builders of scenes share."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Self, get_args, get_type_hints
+
+import msgspec
+from numpy.typing import ArrayLike
+
+from flexmb.scene import schema as s
+from flexmb.scene.bodies import ZERO
+from flexmb.scene.convert import ROOT, label, plain, to_struct
+from flexmb.scene.problems import closest
+from flexmb.scene.units import split_unit
+
+
+def make(kind: type[msgspec.Struct], place: Any = ROOT, **values: Any) -> Any:
+    """A schema struct from values named without units; SceneError (at `place`) where a value has a wrong type."""
+    keys = {split_unit(key)[0]: key for key in kind.__struct_fields__}
+    for name in values:
+        if name not in keys:
+            raise TypeError(f'a {kind.__name__} has no "{name}": {closest(name, keys)}')
+    return to_struct(plain({keys[name]: value for name, value in values.items()}), kind, place=place)
+
+
+def _collections() -> dict[type, str]:
+    """The scene's collection each kind of struct is appended to, read from the schema."""
+    table = {}
+    for key, hint in get_type_hints(s.Scene).items():
+        for item in get_args(hint):
+            for kind in get_args(item) or (item,):
+                if isinstance(kind, type) and issubclass(kind, msgspec.Struct):
+                    table[kind] = key
+    return table
+
+
+COLLECTIONS = _collections()
+
+
+class Collector:
+    """Collects the structs of a scene; `flexmb.scene.build.SceneBuilder` has a method for each kind."""
+
+    def __init__(
+        self, name: str, *, gravity: ArrayLike = ZERO, description: str = "", allow: Sequence[s.Waiver] = ()
+    ) -> None:
+        """`gravity`: uniform acceleration (m/s²) in World axes. `allow`: doubts that are meant, see `Scene`."""
+        self._head: dict[str, Any] = {
+            "name": name, "description": description, "allow": list(allow), "gravity_m_s2": plain(gravity)
+        }  # fmt: skip
+        self._lists: dict[str, list[msgspec.Struct]] = {key: [] for key in COLLECTIONS.values()}
+
+    def add(self, *structs: msgspec.Struct) -> Self:
+        """Append schema structs of any kind: bodies, hinges, wheels, loads, markers ..."""
+        for struct in structs:
+            if type(struct) not in COLLECTIONS:
+                names = ", ".join(sorted(kind.__name__ for kind in COLLECTIONS))
+                raise TypeError(f"a {type(struct).__name__} is not a part of a scene by itself; these are: {names}")
+            self._lists[COLLECTIONS[type(struct)]].append(struct)
+        return self
+
+    def _append(self, kind: type[msgspec.Struct], **values: Any) -> Self:
+        key = COLLECTIONS[kind]
+        place = ROOT.key(key, len(self._lists[key])).named(label(key, values))
+        return self.add(make(kind, place, **values))

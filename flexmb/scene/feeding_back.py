@@ -1,0 +1,105 @@
+"""The part of the builder that measures and controls.
+
+What controllers put out acts through a `flexmb.scene.functions.ControlSignal` in place of a function of time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any, Literal, Self, Unpack
+
+from numpy.typing import ArrayLike
+
+from flexmb.scene import schema as s
+from flexmb.scene.collecting import Collector
+from flexmb.scene.options import LinearLaw, OwnLaw, PidLaw, Sampling, refuse_others
+
+
+class FeedbackMaker(Collector):
+    """A method for each kind of sensor and controller."""
+
+    def sense_coordinate(self, name: str, of: str, *, quantity: Literal["value", "rate"] = "value") -> Self:
+        """Coordinates or speeds of a hinge, wheel, point mass or "<body>.modes" as a signal."""
+        return self._append(s.CoordinateSensor, name=name, of=of, quantity=quantity)
+
+    def sense_marker(
+        self, name: str, marker: str, quantity: str, *, frame: Literal["world", "marker"] = "world"
+    ) -> Self:
+        """A marker's "position", "orientation", "velocity", "angular_velocity", "acceleration", "angular_acceleration"
+        or "specific_force", in World axes or its own."""
+        return self._append(s.MarkerSensor, name=name, marker=marker, quantity=quantity, frame=frame)
+
+    def sense_distance(self, name: str, marker_a: str, marker_b: str) -> Self:
+        """The distance of two markers (m) and its rate (m/s)."""
+        return self._append(s.DistanceSensor, name=name, marker_a=marker_a, marker_b=marker_b)
+
+    def sense_load(self, name: str, hinge: str) -> Self:
+        """The load across a hinge, [torque; force] on the outboard body, World axes."""
+        return self._append(s.LoadSensor, name=name, hinge=hinge)
+
+    def sense_drive(self, name: str, coordinate: str) -> Self:
+        """The load of the drive of a prescribed or latched coordinate, "pivot.rotation"; of a free one 0."""
+        return self._append(s.DriveSensor, name=name, coordinate=coordinate)
+
+    def sense_time(self, name: str) -> Self:
+        """Time (s) as a signal."""
+        return self._append(s.TimeSensor, name=name)
+
+    def sense_profile(self, name: str, function: s.Function) -> Self:
+        """A function of time and its rate as signals."""
+        return self._append(s.ProfileSensor, name=name, function=function)
+
+    def state_space(self, name: str, inputs: str | Sequence[str], **law: Unpack[LinearLaw]) -> Self:
+        """A linear controller: `A`, `B`, `C`, `D`, `initial`; `period`, `offset`, `delay` (s) where it is sampled."""
+        refuse_others("a StateSpace", law, LinearLaw)
+        return self._append(s.StateSpace, name=name, inputs=_several(inputs), **law)
+
+    def pid(self, name: str, inputs: str | Sequence[str], **law: Unpack[PidLaw]) -> Self:
+        """kp e + integral of ki e + kd e', e = setpoint - input: gains, `setpoint`, `filter` (s), `lower`, `upper`,
+        `tracking` (s); `period`, `offset`, `delay` (s) where it is sampled."""
+        refuse_others("a Pid", law, PidLaw)
+        return self._append(s.Pid, name=name, inputs=_several(inputs), **law)
+
+    def saturation(
+        self, name: str, inputs: str | Sequence[str], *, lower: float, upper: float, **sampling: Unpack[Sampling]
+    ) -> Self:
+        """Inputs between limits."""
+        refuse_others("a Saturation", sampling, Sampling)
+        return self._append(s.Saturation, name=name, inputs=_several(inputs), lower=lower, upper=upper, **sampling)
+
+    def gain_table(
+        self, name: str, inputs: str | Sequence[str], *, points: ArrayLike, values: ArrayLike,
+        **sampling: Unpack[Sampling],
+    ) -> Self:  # fmt: skip
+        """A gain by the first input, linear between `values` at `points`, times all others."""
+        refuse_others("a GainTable", sampling, Sampling)
+        return self._append(
+            s.GainTable, name=name, inputs=_several(inputs), points=points, values=values, **sampling
+        )
+
+    def user_law(
+        self, name: str, inputs: str | Sequence[str], function: str | Callable[..., Any], **law: Unpack[OwnLaw]
+    ) -> Self:
+        """A function of one's own, which a module has at its top level, or its name "module:function".
+
+        `outputs`: how many; `initial` state; `parameters`; `period`, `offset`, `delay` (s) where it is sampled.
+        """
+        refuse_others("a UserLaw", law, OwnLaw)
+        address = function if isinstance(function, str) else _address(function)
+        return self._append(s.UserLaw, name=name, inputs=_several(inputs), function=address, **law)
+
+
+def _several(inputs: str | Sequence[str]) -> Sequence[str]:
+    return (inputs,) if isinstance(inputs, str) else inputs
+
+
+def _address(function: Callable[..., Any]) -> str:
+    """ "module:function", by which a scene finds it again; ValueError for one that no module has at its top level."""
+    plain = getattr(function, "py_func", function)
+    name = getattr(plain, "__qualname__", repr(plain))
+    if "<" in name:
+        raise ValueError(
+            f"{name} exists inside of another function only, where no file finds it: define it by def at the top level "
+            "of a module"
+        )
+    return f"{plain.__module__}:{name}"

@@ -1,0 +1,103 @@
+"""The Jacobian of closed chains against differences of their right-hand side, on the manifold and beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.closure import dynamics
+from flexmb.closure.jacobian import chain_tangent, jacobian
+from flexmb.closure.tangent import closed_jacobian
+from flexmb.scene import schema as s
+from tests.flexmb.closure import loops
+from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.entry.test_tangent import extrapolated
+
+UNIT_ROUNDOFF = 2.0**-53
+
+
+def connected() -> s.Scene:
+    """A flexible four-bar with a motor, a damped strut to the ground, a bushing, and a spring and friction in pins."""
+    coupler, rocker = m.GRASHOF.angles(1.0)
+    scene = fm.SceneBuilder("connected", gravity=(0.0, -9.81, 0.0))
+    for name, length in zip(("crank", "coupler", "rocker"), m.GRASHOF[:3], strict=True):
+        m.bar(scene, name, length, modes=1)
+    torque = s.Sine(amplitude=2.0, angular_frequency_rad_s=3.0, phase_rad=0.4)
+    scene.revolute("drive", "ground", "crank", angle=1.0, rate=2.0, torque=torque)
+    scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
+    scene.revolute("pivot", "ground", "rocker", parent_position=(m.GRASHOF.ground, 0.0, 0.0), angle=rocker)
+    scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
+    scene.spring_damper("strut", "ground", "coupler", node_b="tip", free_length=0.8, stiffness=40.0, damping=3.0)
+    scene.bushing("mount", "crank", "rocker", stiffness=np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), damping=0.1 * np.eye(6))
+    scene.angular_spring("coil", "pivot", rest=0.1, stiffness=3.0, stiffening=(0.0, 8.0), damping=0.2)
+    scene.angular_friction("bearing", "pin", sliding=0.3, smoothing=0.5)
+    return scene.scene()
+
+
+MOVING = {
+    "four-bar, overconstrained": lambda: m.four_bar(rate=2.0),
+    "flexible four-bar": lambda: m.four_bar(rate=2.0, modes=3),
+    "driven flexible four-bar": lambda: m.four_bar(
+        prescribed=s.Sine(amplitude=0.3, angular_frequency_rad_s=3.0, offset=1.0), modes=1
+    ),
+    "connected": connected,
+    "slider-crank": lambda: m.slider_crank(0.3, 0.8, angle=0.7, modes=1),
+    "Bennett": m.bennett,
+    "windows": lambda: m.windows(2, 1.5),
+} | {f"random loops {seed}": lambda seed=seed: loops.random_loops(seed) for seed in (4, 5, 8, 13, 20)}
+
+
+class Linearised:
+    """A chain at a state y (n,), with its Jacobian there, and what rounding leaves of differences over h/32."""
+
+    def __init__(self, system: fm.System, y: np.ndarray, rate: float = 0.0) -> None:
+        self.chain, self.y = system.closures.chain("articulated", rate), y
+        self.J = np.full((len(y), len(y)), np.nan)
+        dynamics.project(0.0, system.initial_state.y.copy(), self.chain)  # chooses rows
+        tangent = chain_tangent(*system.closures.constants, system.nq, system.nu)
+        assert jacobian(0.0, y, self.J, self.chain, tangent) == fm.Status.OK
+        nq, free = system.nq, system.constants.speed["prescribed"] < 0
+        M = system.mass_matrix(fm.State(y[:nq], y[nq:-1]))[np.ix_(free, free)]
+        self._rounding = np.linalg.cond(M, np.inf) * max(1.0, np.max(np.abs(self.right_side(y)))) * UNIT_ROUNDOFF
+
+    def right_side(self, y: np.ndarray) -> np.ndarray:
+        dy = np.empty_like(y)
+        assert dynamics.rhs(0.0, y, dy, self.chain, self.chain) == fm.Status.OK
+        return dy
+
+    def worst(self, J: np.ndarray, h: float = 1e-3) -> float:
+        """Largest difference of columns in what is in doubt."""
+        found = []
+        for j, unit in enumerate(np.eye(len(self.y))):
+            expected, doubt = extrapolated(lambda h, unit=unit: self.right_side(self.y + h * unit), h)
+            found.append(np.max(np.abs(J[:, j] - expected) / (30.0 * doubt + 2048.0 * self._rounding / h)))
+        return max(found)
+
+
+def state(system: fm.System, beside: float = 0.0) -> np.ndarray:
+    """[q, u, work] of the initial state, its coordinates and speeds moved by up to `beside`."""
+    y = np.r_[system.initial_state.q, system.initial_state.u, 0.0]
+    return y + beside * np.cos(np.arange(len(y)))
+
+
+@pytest.mark.parametrize("rate", [0.0, 20.0])
+@pytest.mark.parametrize("beside", [0.0, 1e-3])
+@pytest.mark.parametrize("name", MOVING)
+def test_all_columns_against_differences(name, beside, rate):
+    """Also that of work, also of open loops, where rows are redundant, driven, or decay."""
+    system = fm.compile(MOVING[name]())
+    found = Linearised(system, state(system, beside), rate)
+    assert found.worst(found.J) <= 1.0
+
+
+@pytest.mark.parametrize("name", ["four-bar, overconstrained", "flexible four-bar", "random loops 4"])
+def test_what_the_differences_would_notice(name):
+    """A planted error of a millionth, and closure loads that do not change."""
+    system = fm.compile(MOVING[name]())
+    found = Linearised(system, state(system))
+    assert found.worst(found.J * (1.0 + 1e-6)) > 10.0
+    J = np.empty((len(found.y) + 2 * len(found.chain.cw.row), len(found.y) + 1))
+    tangent = chain_tangent(*system.closures.constants, system.nq, system.nu)
+    closed_jacobian(0.0, found.y, found.chain.cw.row["load"], J, found.chain.c, tangent.w, found.chain.cc, tangent.cw)
+    assert found.worst(J[: len(found.y), :-1]) > 1e3

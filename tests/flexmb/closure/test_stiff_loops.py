@@ -1,0 +1,148 @@
+"""Methods with Jacobians on closed chains: accuracy, closures, loads, cost, restarts, and what is refused."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import flexmb as fm
+from flexmb.integrate.catalogue import INTEGRATORS
+from flexmb.scene import schema as s
+from flexmb.scene.shapes import beam_section
+from tests.bounds import observed_order
+from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.closure.test_jacobian import connected
+
+STIFF = [name for name, each in INTEGRATORS.items() if each.linearises]
+ADAPTIVE = [name for name in STIFF if not INTEGRATORS[name].fixed]
+STEEL = beam_section(E=2e11, G=8e10, A=1e-4, Iy=8e-10, Iz=8e-10, rho=7800.0)
+
+
+def stiff_four_bar(level: s.Level = "full") -> s.Scene:
+    """A four-bar of beams with static shapes, bending and axial modes, damped: up to 21,000 rad/s."""
+    bars = m.GRASHOF
+    coupler, rocker = bars.angles(1.0)
+    modes = s.Modes(count=2, families=("bending_z", "axial"), static=True, damping_ratio=0.02)
+    scene = fm.SceneBuilder("stiff four-bar", gravity=(0.0, -9.81, 0.0))
+    for name, length in zip(("crank", "coupler", "rocker"), bars[:3], strict=True):
+        scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, level=level)
+    scene.revolute("drive", "ground", "crank", angle=1.0, rate=2.0)
+    scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
+    scene.revolute("pivot", "ground", "rocker", parent_position=(bars.ground, 0.0, 0.0), angle=rocker)
+    scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
+    return scene.marker("joint", "coupler", node="tip").scene()
+
+
+SMOOTH = {
+    "four-bar, overconstrained": lambda: m.four_bar(rate=2.0),
+    "ball joint": lambda: m.four_bar(rate=2.0, closure="spherical", modes=1),
+    "driven": lambda: m.four_bar(prescribed=s.Sine(amplitude=0.3, angular_frequency_rad_s=3.0, offset=1.0)),
+    "connected": connected,
+    "Bennett": m.bennett,
+}
+
+
+def largest_gap(system: fm.System, run: fm.Trajectory) -> float:
+    states = (fm.State(q, u, t) for q, u, t in zip(run.q, run.u, run.t, strict=True))
+    return max(max(gap) for state in states for gap in system.closure_gaps(state).values())
+
+
+@pytest.mark.parametrize("name", SMOOTH)
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_adaptive_methods_agree_with_dop853(name, method):
+    """Motion, loads of closures and hinges, work; closures closed to rounding, between steps too."""
+    system = fm.compile(SMOOTH[name]())
+    exact = fm.simulate(system, 0.4, rtol=1e-12, atol=1e-12, samples=9)
+    done = fm.simulate(system, 0.4, method, rtol=1e-9, atol=1e-9, samples=9)
+    assert exact.finished and done.finished, done.message
+    assert np.abs(done.q - exact.q).max() < 1e-7 and np.abs(done.u - exact.u).max() < 1e-5
+    for key, load in exact.loads.items():
+        assert np.abs(done.loads[key] - load).max() < 1e-5 * max(1.0, np.abs(load).max()), key
+    assert np.abs(done.work - exact.work).max() < 1e-6 * max(1.0, np.ptp(exact.work))
+    assert np.abs(done.energy_drift).max() < 1e-6 * done.energy_scale
+    assert largest_gap(system, done) < 1e-12
+
+
+@pytest.mark.parametrize(("method", "order"), [("radau5", 5), ("exponential", 5)])
+def test_projection_takes_no_order(method, order):
+    """Errors against the number of steps that tolerances ask for."""
+    system = fm.compile(m.four_bar(rate=2.0))
+    exact = fm.simulate(system, 1.0, rtol=1e-12, atol=1e-12, samples=2)
+    runs = [fm.simulate(system, 1.0, method, rtol=rtol, atol=1e-2 * rtol, samples=2) for rtol in (1e-5, 1e-7, 1e-9)]
+    steps = [run.statistics.accepted_steps for run in runs]
+    errors = [np.abs(run.q[-1] - exact.q[-1]).max() for run in runs]
+    assert np.log(errors[0] / errors[-1]) / np.log(steps[-1] / steps[0]) > order - 0.5
+
+
+@pytest.mark.parametrize("name", ["four-bar, overconstrained", "Bennett"])
+def test_generalised_alpha_is_of_order_2(name):
+    system = fm.compile(SMOOTH[name]())
+    exact = fm.simulate(system, 0.4, rtol=1e-12, atol=1e-12, samples=2)
+    steps = 0.4 / 2.0 ** np.arange(9, 13)
+    runs = [fm.simulate(system, 0.4, "generalised_alpha", step=h, samples=2, rtol=1e-9) for h in steps]
+    errors = [np.abs(np.r_[run.q[-1] - exact.q[-1], run.u[-1] - exact.u[-1]]).max() for run in runs]
+    assert observed_order(steps, errors, 1e-9) == pytest.approx(2.0, abs=0.15)
+    assert max(largest_gap(system, run) for run in runs) < 1e-12
+
+
+@pytest.mark.parametrize("method", ADAPTIVE)
+def test_a_stiff_loop_takes_a_fraction_of_the_steps(method):
+    """Axial modes that follow: DOP853 is held by its stability. What the projection moves does not set them ringing."""
+    system = fm.compile(stiff_four_bar())
+    exact = fm.simulate(system, 0.3, rtol=1e-8, atol=1e-10, samples=7)
+    explicit = fm.simulate(system, 0.3, rtol=1e-3, atol=1e-5, samples=7)
+    done = fm.simulate(system, 0.3, method, rtol=1e-3, atol=1e-5, samples=7)
+    assert done.finished, done.message
+    assert np.abs(done.markers["joint"].position - exact.markers["joint"].position).max() < 1e-4
+    load = exact.loads["loop"][1:]
+    assert np.abs(done.loads["loop"][1:] - load).max() < 0.2 * np.abs(load).max()
+    assert done.statistics.accepted_steps < explicit.statistics.accepted_steps / 8
+    assert done.statistics.evaluations < explicit.statistics.evaluations / 6
+    assert 0 < done.statistics.jacobians
+
+
+def pendulum(how: str) -> s.Scene:
+    """Two bodies on pivots; the second by a hinge, or free and held by a closure."""
+    scene = fm.SceneBuilder("pendulum", gravity=(0.0, -9.81, 0.0))
+    scene.rigid_body("arm", mass=1.0, com=(0.5, 0, 0), inertia=(0.01, 0.1, 0.1), nodes={"tip": (1.0, 0.0, 0.0)})
+    scene.rigid_body("bob", mass=2.0, com=(0.2, 0.1, 0), inertia=(0.02, 0.1, 0.1))
+    scene.revolute("pivot", "ground", "arm", angle=0.3, stiffness=2e4, damping=20.0, rate=1.0)
+    if how == "hinge":
+        scene.revolute("joint", "arm", "bob", parent_node="tip")
+    else:
+        at = np.array([np.cos(0.3), np.sin(0.3), 0.0])
+        spin = {"angular_velocity": (0.0, 0.0, 1.0), "velocity": (0.0, 1.0, 0.0)}
+        turned = (np.cos(0.15), 0.0, 0.0, np.sin(0.15))
+        scene.free("space", "ground", "bob", position=at, quaternion=turned, **spin)
+        scene.closure("joint", "revolute", "arm", "bob", node_a="tip")
+    return scene.marker("end", "bob", offset=(0.4, 0.0, 0.0)).scene()
+
+
+@pytest.mark.parametrize("method", STIFF)
+def test_a_closure_is_as_good_as_the_hinge_in_its_place(method):
+    """By the same method: it errs no more than with the hinge."""
+    settings = {"step": 2e-4} if INTEGRATORS[method].fixed else {"rtol": 1e-8, "atol": 1e-10}
+    exact = fm.simulate(pendulum("hinge"), 0.5, samples=6, rtol=1e-12, atol=1e-12).markers["end"].position
+    runs = [fm.simulate(pendulum(how), 0.5, method, samples=6, **settings) for how in ("hinge", "closure")]
+    assert all(run.finished for run in runs)
+    tree, loop = (np.abs(run.markers["end"].position - exact).max() for run in runs)
+    assert loop < 2.0 * tree + 1e-8
+
+
+def test_generalised_alpha_says_where_branches_cross():
+    run = fm.simulate(m.windows(1, 30.0), 0.5, "generalised_alpha", step=1e-3)
+    assert run.status is fm.Status.BRANCH_UNKNOWN and 0.0 < run.stopped_at < 0.06
+
+
+@pytest.mark.parametrize("method", STIFF)
+def test_steps_run_out(method):
+    settings = {"step": 1e-3} if INTEGRATORS[method].fixed else {"rtol": 1e-9}
+    run = fm.simulate(m.four_bar(), 1.0, method, max_steps=5, **settings)
+    assert run.status is fm.Status.MAX_STEPS and run.restart is not None
+
+
+@pytest.mark.parametrize("method", STIFF)
+def test_ruthless_bodies_in_loops_are_refused(method):
+    settings = {"step": 1e-3} if INTEGRATORS[method].fixed else {}
+    with pytest.raises(NotImplementedError, match='as "crank".*use level "linear" or a better one'):
+        fm.simulate(stiff_four_bar("ruthless"), 0.1, method, **settings)
