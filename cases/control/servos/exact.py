@@ -100,7 +100,7 @@ def pointer(times):
 
 
 def exact(times):
-    """Motion of rim and tip, energies and the work of all motors, brakes and impulses at `times` (s), World axes, SI."""
+    """Motion of rim and tip, energies, and the work of motors, brakes and impulses, at `times` (s), World axes, SI."""
     channels, energy = {}, {}
     motions = {"rim": (table(np.rint(1e3 * times).astype(int)), RIM, 0.0 * PLACE), "tip": (pointer(times), TIP, PLACE)}
     for name, ((angle, rate), radius, place) in motions.items():
