@@ -11,7 +11,7 @@ from crosscheck.references.agreement import Agreed
 from flexmb.run.channels import distance, unit
 
 CLOCK = 1e-9  # relative difference of times that are the same
-GROWTH = 10.0  # of a stated uncertainty: estimates are no better than a factor of a few
+GROWTH = 100.0  # of a stated uncertainty: at other samples a ladder may lose credit for a tenth of its difference
 
 
 def beyond_uncertainty(before: StoredReference, now: Agreed) -> list[str]:
