@@ -25,8 +25,9 @@ By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and
 d_23, because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are
 counted. Where they grow by no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap):
 U = SPREAD d_23. Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond
-`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. With a smaller one U may be less than d_23, with
-S = `SPREAD` and for q the least of
+`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. Neither do evaluations whose growth beside the
+tolerance's, in logarithms, is more than `MUCH_MORE` times the growth before: error control fights round-off that the
+scene magnifies. Otherwise U may be less than d_23, with S = `SPREAD` and for q the least of
 
 - the fall that was seen, d_12 / d_23, and the ratio of the tolerances;
 - that ratio, divided by as much as the fall seen exceeds it: what fell too far by chance falls too little next;
@@ -65,6 +66,7 @@ EVEN_SPREAD = 10.0
 SAME_ORDER = 1.25
 LARGEST_ORDER_IN_WORK = 12.0
 HARDLY_MORE = 1.03  # evaluations at the finer of two tolerances, over those at the coarser
+MUCH_MORE = 1.5  # their growth's logarithm, over that foretold by the growth before
 ORDER_CREDIT = 4.0
 LARGEST_ORDER = 16.0
 LARGEST_RATIO = 1e6  # of two steps: an order seen across more is seen nowhere
@@ -216,9 +218,10 @@ def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
         why = "as a finer one took hardly more evaluations"
         return SPREAD, gaps[-1], f"{SPREAD:g} x the difference of the two finest tolerances, {why}", None
     seen = sizes[-2] / sizes[-1] if sizes[-1] > 0.0 else np.inf
-    ratio = rungs[-2].effort / rungs[-1].effort
-    foretold, spread = _foretold(sizes, growth, ratio)
-    factor = min(max(1.0, _after_scatter(min(seen, ratio), EVEN_SPREAD)), _after_scatter(foretold, spread))
+    before, ratio = (coarse.effort / fine.effort for coarse, fine in pairwise(rungs[-3:]))
+    factor = max(1.0, _after_scatter(min(seen, ratio), EVEN_SPREAD))
+    if growth[-1] <= growth[-2] ** (MUCH_MORE * np.log(ratio) / np.log(before)):
+        factor = min(factor, _after_scatter(*_foretold(sizes, growth, ratio)))
     return factor, gaps[-1], f"{factor:.2g} x the difference of the two finest tolerances", None
 
 
@@ -234,7 +237,7 @@ def _foretold(sizes: Sequence[float], growth: Sequence[float], ratio: float) -> 
         float(np.log(fall) / np.log(more)) if fall > 1.0 and more > 1.0 else np.inf
         for fall, more in zip(falls, growth, strict=False)
     ]
-    if not (orders[-1] <= LARGEST_ORDER_IN_WORK and growth[-1] > 1.0):
+    if not orders[-1] <= LARGEST_ORDER_IN_WORK:
         return 1.0, SPREAD
     fall = min(falls[-1], ratio, growth[-1] ** orders[-1])
     if len(orders) > 1 and max(orders) <= SAME_ORDER * min(orders):

@@ -6,6 +6,8 @@ library's own engine, so that what is judged stays as the case says; it is drawn
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 
@@ -14,7 +16,7 @@ from crosscheck.running.draw import draw
 from flexmb.interchange.sid.blocks import SidError
 from flexmb.interchange.sid.to_body import with_sid_bodies
 from flexmb.scene.bodies import BeamBody, BeamNode, Body, RigidBody
-from flexmb.scene.hinges import Prismatic
+from flexmb.scene.hinges import LinearCoordinate, Prismatic
 from flexmb.scene.schema import Marker, Scene
 from flexmb.scene.tree import coordinates, rest_frames
 
@@ -61,8 +63,9 @@ def _hung(scene: Scene) -> Scene:
         return scene
     bodies, hinges = list(scene.bodies), list(scene.hinges)
     for mass in moving:
-        place = {"parent": mass.body, "parent_node": mass.node, "parent_position_m": mass.offset_m}
+        place: dict[str, Any] = {"parent": mass.body, "parent_node": mass.node, "parent_position_m": mass.offset_m}
         for number, (axis, named) in enumerate(zip(mass.directions, coordinates(mass), strict=True), start=1):
+            assert isinstance(named.coordinate, LinearCoordinate)
             last = number == len(mass.directions)
             own = mass.name if last else f"{mass.name} {ADDED} {number}"
             bodies.append(RigidBody(name=own, mass_kg=mass.mass_kg if last else 0.0, inertia_kg_m2=NO_INERTIA))

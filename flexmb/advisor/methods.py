@@ -72,7 +72,7 @@ def ladders(highest: float, slow: float, algorithm: Algorithm, tree: bool) -> tu
     """For each integrator its methods from loose to tight, those that linearise first.
 
     Fixed steps follow the frequency `highest` (rad/s), those of implicit methods `slow`, the frequency of the scene
-    with all bodies rigid. Methods that linearise are for trees and the recursion only.
+    with all bodies rigid. Methods that linearise are tried on trees only, and by the recursion.
     """
     chosen = [each for each in INTEGRATORS.values() if tree or not each.linearises]
     return tuple(

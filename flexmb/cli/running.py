@@ -2,21 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated, get_args
+from typing import TYPE_CHECKING
 
 import typer
 from rich.text import Text
 
+from flexmb.cli import run_options as o
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
-from flexmb.integrate.integrator import Method
 from flexmb.output.writing import check_folder, folder, writing
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
 from flexmb.scene.values import parsed
 
-METHODS = ", ".join(f"`{name}`" for name in get_args(Method))
+if TYPE_CHECKING:
+    from flexmb.run.trajectory import Trajectory
 
 FORMATS = {"npz": "to_npz", "parquet": "to_parquet", "rrd": "to_rerun"}
 """Endings, and the methods of a trajectory that write them."""
@@ -26,54 +28,22 @@ SECTIONS = 21  # equally spaced, where no positions are given
 
 def simulate(
     scene: SceneFile,
-    t_end: Annotated[float, typer.Option("--t-end", help="End of the run in s.", show_default=False)],
-    out: Annotated[Path, typer.Option("--out", "-o", help="Folder for trajectory.csv and charts.")] = Path("out"),
-    method: Annotated[
-        str,
-        typer.Option(
-            help=f"{METHODS}: see docs/integrators.md. Methods of equal steps need `--step`."
-        ),
-    ] = "dop853",
-    rtol: Annotated[float, typer.Option(help="Relative error allowed in a step.")] = 1e-10,
-    atol: Annotated[float, typer.Option(help="Absolute error allowed in a step, SI units.")] = 1e-12,
-    step: Annotated[
-        float | None, typer.Option(help="Step in s (rk4, generalised_alpha).", show_default=False)
-    ] = None,
-    spectral_radius: Annotated[
-        float | None,
-        typer.Option(help="What generalised_alpha leaves of unresolved modes in a step; 0.8.", show_default=False),
-    ] = None,
-    from_time: Annotated[
-        float | None, typer.Option("--from-time", help="Start of the run in s; 0.", show_default=False)
-    ] = None,
-    values: Annotated[
-        list[str] | None,
-        typer.Option("--set", help="A value in the scene, `rod.mass_kg=2.0`; may be repeated.", show_default=False),
-    ] = None,
-    restart: Annotated[
-        Path | None,
-        typer.Option(help="Go on from this `restart.npz` of another run, to the last bit.", show_default=False),
-    ] = None,
-    samples: Annotated[int, typer.Option(help="Output times, equally spaced, both ends included.")] = 201,
-    algorithm: Annotated[
-        str,
-        typer.Option(
-            help="`articulated` (recursion), `composite` (mass matrix), `frisch` (nested bodies, 1975) or "
-            "`frisch_as_printed`."
-        ),
-    ] = "articulated",
-    also: Annotated[
-        list[str] | None,
-        typer.Option(help="Besides the CSV: `npz`, `parquet`, or `rrd` for the viewer rerun; may be repeated."),
-    ] = None,
-    plots: Annotated[bool, typer.Option("--plots/--no-plots", help="Write charts beside the CSV.")] = True,
-    sections: Annotated[
-        list[str] | None,
-        typer.Option(help="Loads across a beam's sections, to sections-BEAM.csv: `BEAM`, or `BEAM:x,x,...` in m."),
-    ] = None,
-    error: Annotated[
-        bool, typer.Option("--error-estimate", help="Run again, tighter, and print the largest error of each channel.")
-    ] = False,
+    t_end: o.EndTime,
+    out: o.Folder = Path("out"),
+    method: o.MethodName = "dop853",
+    rtol: o.Relative = 1e-10,
+    atol: o.Absolute = 1e-12,
+    step: o.Step = None,
+    spectral_radius: o.SpectralRadius = None,
+    from_time: o.StartTime = None,
+    values: o.Values = None,
+    restart: o.RestartFile = None,
+    samples: o.Samples = 201,
+    algorithm: o.AlgorithmName = "articulated",
+    also: o.Also = None,
+    plots: o.Plots = True,
+    sections: o.Sections = None,
+    error: o.ErrorEstimate = False,
     strict: Strict = False,
 ) -> None:
     """
@@ -123,17 +93,7 @@ def simulate(
             except Interrupted as stopped:
                 trajectory, interrupted = stopped.trajectory, True
         console.print(summary(trajectory))  # first: a full disk takes the files only
-        folder(out)
-        with writing(out / "trajectory.csv"):
-            trajectory.to_csv(out / "trajectory.csv")
-        with writing(out):
-            others = [out / f"trajectory.{word}" for word in dict.fromkeys(also or ())]
-            for path in others:
-                getattr(trajectory, FORMATS[path.suffix[1:]])(path)
-            written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
-            if trajectory.restart is not None:
-                written.append(out / "restart.npz")
-                trajectory.restart.save(written[-1])
+        written = _written(trajectory, out, also or (), plots)
         console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
         for name, x in wanted.items():  # from here on the run itself is safe
             loads, path = trajectory.section_loads(name, x), out / f"sections-{name}.csv"
@@ -148,6 +108,22 @@ def simulate(
         raise typer.Exit(EXIT_INTERRUPTED)
     if not trajectory.finished:
         raise typer.Exit(EXIT_STOPPED)
+
+
+def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool) -> list[Path]:
+    """The files of a run, in a folder that is made for them."""
+    folder(out)
+    with writing(out / "trajectory.csv"):
+        trajectory.to_csv(out / "trajectory.csv")
+    with writing(out):
+        others = [out / f"trajectory.{word}" for word in dict.fromkeys(also)]
+        for path in others:
+            getattr(trajectory, FORMATS[path.suffix[1:]])(path)
+        written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
+        if trajectory.restart is not None:
+            written.append(out / "restart.npz")
+            trajectory.restart.save(written[-1])
+    return written
 
 
 def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:

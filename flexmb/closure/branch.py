@@ -9,9 +9,13 @@ So every evaluation of a step compares its Q with that of the state from which t
 has turned by more than 60 degrees has either been turned over or moved further than a step can tell. Methods that adapt
 their steps try a shorter one, and so come ever closer to a singular position from one side, until nothing tells its
 branches apart: at a distance of d sizes of the mechanism they differ by d^2 in the gap of the closure, which is closed
-to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, a little more than 2^-22.
+to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `AT_CROSSING`, well above 2^-22.
 What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
 come closer than `TO_LEAP` only where there was no leap.
+
+Errors of a step are powers of what it covers of the distance to a singular position, be it one that the mechanism only
+passes. Methods that estimate their errors shorten their steps there; of others, whose steps are equal, those fail that
+are too long for the distance (`unresolved`).
 """
 
 from math import inf
@@ -19,11 +23,31 @@ from math import inf
 from flexmb.closure.factor import entry
 from flexmb.jit.kernel import helper
 
-TURNED = 0.5  # cosine of the angle by which a row of Q may turn in a step
+# Cosine of the angle by which a row of Q may turn in a step. A near miss turns it by a right angle in all, and no step
+# takes the whole of it.
+TURNED = 0.5
+# Leaps go from 2^-10 and are tried wherever a step fails: steps fail before they leave that range.
 TO_LEAP = 2.0**-12
+# There branches differ by 2^-40 in the gap of a closure: 16 times what closed closures are left open by.
 AT_CROSSING = 2.0**-20
-ROUND_OFF = 2.0**-40  # what rounding may change a pivot by
-FASTEST = 2.0**10  # fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large
+# What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
+ROUND_OFF = 2.0**-40
+# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. Not derived: random
+# mechanisms with masses six decades apart pass with it (tests/flexmb/closure/near_singular.py).
+FASTEST = 2.0**10
+# Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
+# 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
+RESOLVED = 2.0**-4
+# Far from singular positions a step changes a row by less than what its mechanism moves, in its sizes: `passing_time`
+# adds the ports' speeds up, several times the true one. Twice that is a distance below half of the size.
+NEARBY = 2.0
+# Of the distance no step covers more, however far its mechanism moves: the row could vanish within two of them.
+HALF = 0.5
+
+
+def watch_steps(chain):
+    """Let steps fail that are too long near a singular position: of a method whose errors do not shorten them."""
+    chain.cw.resolved[0] = RESOLVED
 
 
 @helper
@@ -76,16 +100,43 @@ def at_crossing(t, cc, cw):
 
 
 @helper
+def along(cc, cw, g, a):
+    """Cosine of the angle by which row a of Q of group g has turned since the step started."""
+    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
+    total, at = 0.0, cc.group[g].half + a * (stop - start)
+    for j in range(at, at + own - start):
+        total += cw.basis[j] * cw.former[j]
+    return total
+
+
+@helper
 def turned_over(cc, cw):
     """The first chosen row that points another way than when the step started, or -1. Needs the same."""
     for g in range(cc.group.shape[0]):
-        start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
         for a in range(cw.rank[g]):
-            total, at = 0.0, cc.group[g].half + a * (stop - start)
-            for j in range(at, at + own - start):
-                total += cw.basis[j] * cw.former[j]
-            if not total >= TURNED:
+            if not along(cc, cw, g, a) >= TURNED:
                 return cw.chosen[cc.group[g].row_start + a]
+    return -1
+
+
+@helper
+def unresolved(t, cc, cw):
+    """The first chosen row of which the step has changed too much, or -1: near a singular position. Needs the same.
+
+    What is left of a row is a vector that vanishes at the position, R[a, a] times row a of Q. In terms of its length
+    the step changes it by what it covers of the distance, whether the mechanism goes there or only passes.
+    """
+    if cw.resolved[0] == 0.0:
+        return -1
+    for g in range(cc.group.shape[0]):
+        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
+        most = min(max(cw.resolved[0], NEARBY * moved), HALF)
+        for a in range(cw.rank[g]):
+            place = cc.group[g].row_start + a
+            before, now = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
+            changed = (now - before) ** 2 + 2.0 * before * now * (1.0 - along(cc, cw, g, a))
+            if not changed <= (most * min(before, now)) ** 2:
+                return cw.chosen[place]
     return -1
 
 

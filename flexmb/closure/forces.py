@@ -4,7 +4,7 @@ By unit loads that pass through the articulated quantities, `Recursion`; all oth
 """
 
 from flexmb.closure import generalised
-from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over
+from flexmb.closure.branch import at_crossing, has_started, is_further, turned_over, unresolved
 from flexmb.closure.factor import choose_rows, entry, factorise, solve, sum_rows
 from flexmb.closure.rows import evaluate_rows, load_on_b
 from flexmb.closure.tables import Recursion
@@ -139,6 +139,8 @@ def on_branch(t, w, cc, cw):
     row, status = at_crossing(t, cc, cw), CLOSURE_SINGULAR
     if row < 0:
         row, status = turned_over(cc, cw), BRANCH_UNKNOWN
+    if row < 0:
+        row = unresolved(t, cc, cw)
     if row < 0:
         return OK
     w.fault[0] = cc.row[row].closure

@@ -3,42 +3,65 @@
 At a singular position pivots of B P = Q R vanish and branches of the motion cross. A mechanism that moves goes on along
 the branch whose direction it has: loads are bounded, so its speeds cannot jump to those of another branch. On either
 side accelerations are smooth; only at the position itself, and for what strays from the branch near it, no stage of an
-integrator can be evaluated. So a run comes close by ordinary steps and then takes one step by the trapezoidal rule,
-which evaluates the equations of motion at both its ends only. It goes from a distance between `NEAREST` and `LEAP`
-sizes of the mechanism: the rule's error is the cube of twice that over twelve, below 2^-30 of the speed, and rounding
-does not blur the branches. What comes before the position and what comes after it are on one branch where
+integrator can be evaluated. So a run comes close by ordinary steps and then takes one step by Lobatto's rule of order
+6, with nodes at both ends and at `INNER` from either, none of which is near the position. States there are by the
+trapezoidal rule, which errs by the cube of the leap over twelve, 2^-30 of a size from the furthest; what remains of
+that after the one pass is 2^-39, and 2^-44 from half as far. A leap goes from between `NEAREST` and `LEAP` sizes of
+the mechanism. What comes before the position and what comes after it are on one branch where
 
 - every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
   over, while all other rows are where they were; and
-- the accelerations that the closures demand along these rows go on smoothly. A mechanism that only passes near a
-  singular position turns there, within the leap, and its accelerations before and after are opposite. On branches that
-  are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so that a c of 2^-40 or more is noticed.
+- the accelerations that the closures demand along these rows go on smoothly: they change in proportion to the length
+  of the leap. A mechanism that only passes near a singular position turns there, within the leap, and its accelerations
+  before and after are opposite. On branches that are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so
+  that a c of 2^-40 or more is noticed.
 
 Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or
 the run ends with the status it had.
 """
 
+import math
 from math import inf
 
-from flexmb.closure.branch import TO_LEAP, TURNED, passing_time, recall, remember
+import numpy as np
+
+from flexmb.closure.branch import TO_LEAP, TURNED, along, passing_time, recall, remember
 from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
+from flexmb.integrate.control import Interval
+from flexmb.integrate.leap import cubic
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, store_slope
 from flexmb.motion.coordinates import project as project_tree
 from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
-LEAP = 2.0**-10  # sizes of the mechanism to a singular position from where a leap goes
+# Sizes of the mechanism to a singular position from where a leap goes: the error above.
+LEAP = 2.0**-10
+# A leap from nearer may end where its steps may not be, and gaps of 2^-50 become accelerations.
 NEAREST = TO_LEAP / 2.0
-TIGHT = 2.0**-50  # gap of closures at both ends of a leap: rounding
-PROBE = 2.0**-14  # sizes of the mechanism that are tried to see how pivots fall
-APART = 3.0  # times the distance of a singular position, that of the next one that is not leapt over too
-BEYOND = 0.25  # of the distance before it, the least beyond the position
-SMOOTH = 2.0**-4  # change of accelerations in a leap, as part of them and of speed squared over size
-APPROACHES = 3  # by which the implicit rule converges: Euler's, then its own twice
+# Gap of closures at all nodes of a leap: eight roundings of their size.
+TIGHT = 2.0**-50
+# Sizes that are tried to see how pivots fall: less than `NEAREST`, so on this side of the position, and more than 2^-4
+# of the distance, which pivots show to nine digits.
+PROBE = 2.0**-14
+# Times the distance of a singular position, that of the next one that is not leapt over too: a leap ends at twice the
+# distance, and is then as far from the next as it started from the first.
+APART = 3.0
+# Of the distance before it, the least beyond the position where the run's end or a segment's cuts a leap short.
+BEYOND = 0.25
+# Change of accelerations over what is usual, times the part of their size that ports move in a leap. Smooth motions
+# have 1 or a few; that 8 refuses no leap is measured (tests/flexmb/closure/near_singular.py).
+ROUGH = 8.0
+# c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
+# bodies added up, and closures far from the origin.
+UNSEEN = 2.0**-42
+# Of a leap from either end: the inner nodes of Lobatto's rule, of weights 1, 5, 5, 1 over 12.
+INNER = 0.5 - math.sqrt(0.05)
+# By which the trapezoidal rule converges: Euler's, then its own twice.
+APPROACHES = 3
 
 
 @kernel
@@ -140,7 +163,7 @@ def _vanish(probe, cc, cw):
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
             before, after = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
-            if _along(cc, cw, g, a) < 0.0:
+            if along(cc, cw, g, a) < 0.0:
                 after = -after
             ahead = before * probe / (before - after) if before > after else inf
             cw.vanishing[place] = ahead
@@ -163,13 +186,26 @@ def _vanish(probe, cc, cw):
 
 @helper
 def _lands(t, h, y, dy, y_new, dy_new, s):
-    """Whether the trapezoidal rule leads from y to y_new on the same branch."""
+    """Whether there is a y_new on the same branch: by the trapezoidal rule, then by Lobatto's."""
     for approach in range(APPROACHES):
         for i in range(y.shape[0]):
             slope = dy[i] if approach == 0 else 0.5 * (dy[i] + dy_new[i])
             y_new[i] = y[i] + h * slope
         if _slope(t + h, y_new, dy_new, s) != OK:
             return False
+    inner, slope, total = np.empty(y.shape[0]), np.empty(y.shape[0]), np.empty(y.shape[0])
+    for i in range(y.shape[0]):
+        total[i] = (dy[i] + dy_new[i]) / 12.0
+    for x in (INNER, 1.0 - INNER):
+        cubic(Interval(t, t + h, t + h), y, dy, y_new, dy_new, t + x * h, inner)
+        if _slope(t + x * h, inner, slope, s) != OK:
+            return False
+        for i in range(y.shape[0]):
+            total[i] += 5.0 / 12.0 * slope[i]
+    for i in range(y.shape[0]):
+        y_new[i] = y[i] + h * total[i]
+    if _slope(t + h, y_new, dy_new, s) != OK:
+        return False
     return largest_gap(s.cc, s.cw)[0] <= OPEN and _same_branch(h, s.cc, s.cw)
 
 
@@ -179,31 +215,22 @@ def _same_branch(h, cc, cw):
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
             r = cw.chosen[place]
-            along, ahead = _along(cc, cw, g, a), cw.vanishing[place]
+            turned, ahead = along(cc, cw, g, a), cw.vanishing[place]
             if not ahead < inf:
-                if not along >= TURNED:
+                if not turned >= TURNED:
                     return False
             else:
                 expected = cw.former_pivot[place] * (h - ahead) / ahead
                 found = cw.factor[entry(cc, g, a, a)]
-                if not (-along >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
+                if not (-turned >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
                     return False
                 closure = cw.closure[cc.row[r].closure]
                 before, after = cw.demand[place], -_demand(cc, cw, g, a)  # Q points the other way
                 usual = closure.speed**2 / closure.size + cw.size[r] * min(abs(before), abs(after))
-                if not cw.size[r] * abs(after - before) <= SMOOTH * usual:
+                far = h / passing_time(cc, cw, g)
+                if not cw.size[r] * abs(after - before) <= (ROUGH * far + 32.0 * UNSEEN / far**3) * usual:
                     return False
     return True
-
-
-@helper
-def _along(cc, cw, g, a):
-    """Cosine of the angle by which row a of Q of group g has turned since the last good state."""
-    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
-    total, at = 0.0, cc.group[g].half + a * (stop - start)
-    for j in range(at, at + own - start):
-        total += cw.basis[j] * cw.former[j]
-    return total
 
 
 @helper

@@ -118,6 +118,7 @@ class ClosureWorkspace:
     former_pivot: Real  # (G,) diagonal of `factor` there
     former_rows: Index  # (G,) `chosen` there
     state: Real  # (nq+nu+1,) that state
+    resolved: Real  # (1,) of the distance to a singular position that a step may cover; 0 where errors choose steps
     closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
     vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
     demand: Real  # (G,) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along the rows of Q
@@ -178,6 +179,7 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         former_pivot=np.zeros(rows),
         former_rows=np.arange(rows),
         state=np.zeros(coordinates + nu + 1),
+        resolved=np.zeros(1),
         closer=np.zeros(1, np.int64),
         vanishing=np.zeros(rows),
         demand=np.zeros(rows),

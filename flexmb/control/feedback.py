@@ -6,22 +6,22 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from flexmb.control import loop
+from flexmb.control import leaping, loop
 from flexmb.control import tables as a
 from flexmb.control.memory import LoopMemory
 from flexmb.control.power import powers
 from flexmb.control.schedule import instants, slack
+from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
 from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Leaping, Linear, Problem, StiffProblem, problem, stiff_problem
 from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
-from flexmb.jit.pointer import NOTHING, REAL, STATUS, VECTOR, pointer
-from flexmb.scene.control import DriveSensor, LoadSensor
+from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, pointer
 from flexmb.system.algorithm import DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
-from flexmb.tables.state import State
+from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
 
@@ -48,14 +48,12 @@ class Starting(Protocol):
 class Feedback:
     """Controllers around a system that is theirs alone: its functions of time are written to.
 
-    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that
-    cannot be had, NotImplementedError for what cannot be combined.
+    `tables`: constants and workspace of the route. Raises SceneError for a function of the user's that cannot be had.
     """
 
     def __init__(self, plant: System, algorithm: DynamicsAlgorithm, route: Route, tables: tuple[Any, Any]) -> None:
         self._plant, self._algorithm, self._tables = plant, algorithm, tables
         self._wiring = wired(plant)
-        self._refuse(algorithm)
         constants, workspace = tables
         self._outputs = plant._observation.outputs()
         self._tree, self._tree_workspace = plant.constants, plant.workspace()
@@ -71,8 +69,17 @@ class Feedback:
             )
         if algorithm.observing is not None and not plant.scene.closures:
             where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
+        self._leaps = route.leaping is not None
+        if route.leaping is not None:
+            where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
+            where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
         self._where, self._held = where, self._buffers()
         self._called = self._callbacks()
+        self._loads, self._drives = self._outputs.loads, self._outputs.drives
+        if np.any(self._wiring.sensor["kind"] >= a.LOAD) and not where[a.OBSERVING]:
+            self._loads = np.zeros((len(plant._observation.names.hinges) + len(plant.scene.closures), 6))
+            self._called.append(Called(self._find_loads, ()))
+            where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
 
@@ -83,8 +90,8 @@ class Feedback:
     def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone: what
-        they put out is remembered, or zero.
+        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone:
+        what they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
@@ -104,10 +111,13 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
+        leaps = Leaping(leaping.back, leaping.leap) if self._leaps else None
         if linear is not None:
-            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move))
+            if made.continuous[0]:
+                linear = linear._replace(jacobian=jacobian, exact=made, tangent=self._tangent(linear, len(y)))
+            posed: Any = stiff_problem(*kernels, linear._replace(move=loop.move), leaps)
         else:
-            posed = problem(*kernels)
+            posed = problem(*kernels, leaps)
         controlled = accuracy._replace(controlled=accuracy.controlled + len(self._wiring.continuous))
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
@@ -232,14 +242,17 @@ class Feedback:
         seen = (kinds >= a.POSITION) & (kinds <= a.DISTANCE)
         return bool(np.any(seen | ((kinds >= a.ACCELERATION) & (kinds < a.LOAD))))
 
-    def _refuse(self, algorithm: DynamicsAlgorithm) -> None:
-        """NotImplementedError for loads that this algorithm does not have in compiled code."""
-        loads = [sensor.name for sensor in self._plant.scene.sensors if isinstance(sensor, LoadSensor | DriveSensor)]
-        if loads and (algorithm.observing is None or self._plant.scene.closures):
-            raise NotImplementedError(
-                f'sensor "{loads[0]}" measures a load, which is known in trees and to algorithm "articulated" only: '
-                "measure an acceleration, or leave it out"
-            )
+    def _find_loads(self, t: float) -> None:
+        """Loads at s.y as outputs have them; NaN where there are none, which ends a run that uses them."""
+        observation = self._plant._observation
+        row = np.zeros((1, observation.width))
+        try:
+            self._plant._observe_row(t, self.running.y.copy(), self._algorithm.name, row[0])
+        except DynamicsError:
+            row[:] = np.nan
+        found = observation.columns_of(row)
+        self._loads[:] = np.concatenate([found["loads"][0], found["closures"][0]])
+        self._drives[:] = found["drives"][0]
 
     def _buffers(self) -> dict[str, Real]:
         """The arrays that laws read and write, which stay where they are."""
@@ -267,8 +280,25 @@ class Feedback:
             row["function"] = found[-1].address
         return found
 
+    def _tangent(self, linear: Linear, n: int) -> a.LoopTangent:
+        """For the Jacobian of y (n,) = [q, u, x, work], from that of the motion."""
+        motion, drives = self._plant.nq + self._plant.nu, len(self._wiring.drive)
+        read = np.zeros(n - 1, bool)
+        read[motion:] = True
+        read[:motion] = self._has_markers or self._wiring.reads_at_once
+        for sensor in self._wiring.sensor[self._wiring.sensor["kind"] <= a.RATE]:
+            read[sensor["place"] : sensor["place"] + sensor["width"]] = True
+        of_motion = linear.jacobian, STATUS, REAL, VECTOR, MATRIX, linear.exact, linear.tangent
+        return a.LoopTangent(
+            address=np.array(addresses(*of_motion)),
+            column=np.flatnonzero(read), y=np.zeros(n), of_motion=np.zeros((motion + 1, motion + 1)),
+            slope=np.zeros(motion + 1), effect=np.zeros((drives, motion + 1)),
+            ahead=np.zeros(drives + n - 1 - motion), behind=np.zeros(drives + n - 1 - motion),
+        )  # fmt: skip
+
     def _loop(self, table: Any, held: Real, apart: float) -> a.Loop:
         w, plant, out = self._wiring, self._plant, self._outputs
+        n = plant.nq + plant.nu + 1
         at_once = bool(np.any(w.sensor["kind"] >= a.AT_ONCE))
         return a.Loop(
             address=self._where, sensor=w.sensor, controller=w.controller, wire=w.wire, number=w.number, drive=w.drive,
@@ -277,9 +307,11 @@ class Feedback:
             has_markers=np.array([self._has_markers], np.int64), has_at_once=np.array([at_once], np.int64),
             follows=np.array([w.reads_at_once], np.int64), gravity=plant.constants.gravity,
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
-            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(plant.nq + plant.nu + 1),
-            dy=np.zeros(plant.nq + plant.nu + 1), rates=out.rates, markers=out.markers, loads=out.loads,
-            drives=out.drives, doubt=self._doubt, **self._held,
+            replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(n), dy=np.zeros(n),
+            stuck=np.zeros(1, np.int64), good=np.zeros(len(w.initial)), before=np.zeros(n),
+            slope_before=np.zeros(n), after=np.zeros(n), slope_after=np.zeros(n), mean=np.zeros(len(w.drive)),
+            rates=out.rates, markers=out.markers, loads=self._loads, drives=self._drives, doubt=self._doubt,
+            **self._held,
         )  # fmt: skip
 
 

@@ -11,35 +11,35 @@ A loop is passed as constants and as workspace: `s`, and the `same` once more.
 from flexmb.control import tables as a
 from flexmb.control.laws import FILTERED, act, pid_error
 from flexmb.control.measuring import measure_at_once, measure_motion
-from flexmb.jit.direct import nothing_at, status_at
+from flexmb.jit.direct import nothing_at, real_at, status_at
 from flexmb.jit.kernel import helper, kernel
-from flexmb.tables.status import OK
+from flexmb.tables.status import CLOSURE_SINGULAR, OK
 
 
 @kernel
 def rhs(t, y, dy, s, same):
     """dy/dt of y = [q, u, x, work] at time t; returns a status code."""
-    _take(y, s)
+    if s.stuck[0]:
+        return CLOSURE_SINGULAR
+    take(y, s)
     status = _set(t, s)
     if status == OK:
-        status = _move(t, s)
+        status = accelerate(t, s)
     if status == OK and s.follows[0]:
-        status = _follow(t, s)
-    _give(s.dy, s.change, s, dy)
+        status = follow(t, s)
+    give(s.dy, s.change, s, dy)
     return status
 
 
 @kernel
 def project(t, y, s):
     """Put the mechanics' part of y on its manifold."""
-    _take(y, s)
-    nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
-    _give(s.y, s.state, s, y)
+    settle(t, y, s)
 
 
 @kernel
 def move(y, increment, result, s):
-    """Coordinates of result = q o exp(increment), as of the mechanics alone; for loops without continuous states."""
+    """Coordinates of result = q o exp(increment), as of the mechanics alone; increments of x move none."""
     nothing_at(s.address[a.RETRACTION], (y, increment, result, s.address[a.CONSTANTS]))
 
 
@@ -55,13 +55,13 @@ def start(t, y, s):
 
     Puts the continuous controllers' states into y.
     """
-    _take(y, s)
+    take(y, s)
     measure_motion(t, s)
     for i in range(s.controller.shape[0]):
         _gather(i, s)
         if s.controller[i].law == a.PID:
             s.state[s.controller[i].state + FILTERED] = pid_error(i, s)
-    _give(s.y, s.state, s, y)
+    give(s.y, s.state, s, y)
 
 
 @kernel
@@ -69,11 +69,11 @@ def retrace(times, states, s, course):
     """Signals (T,S) at the output times (T,) of a run that is over, from its states (T,n); how many could be found."""
     for sample in range(times.shape[0]):
         t = times[sample]
-        _take(states[sample], s)
-        if _keep_time(t, s) != OK or _steer(t, s) != OK:
+        take(states[sample], s)
+        if _keep_time(t, s) != OK or steer(t, s) != OK:
             return sample
         if s.has_at_once[0]:
-            if _move(t, s) != OK:
+            if accelerate(t, s) != OK:
                 return sample
             measure_at_once(t, s)
         for i in range(s.signal.shape[0]):
@@ -84,14 +84,14 @@ def retrace(times, states, s, course):
 @kernel
 def hold(t, y, s):
     """Have the functions of the mechanics say what the controllers say at t, at y; returns a status code."""
-    _take(y, s)
+    take(y, s)
     return _set(t, s)
 
 
 @kernel
 def look(t, y, signal, s):
     """All signals (S,) at t and y, between instants; a status code."""
-    _take(y, s)
+    take(y, s)
     status = _look(t, s)
     for i in range(signal.shape[0]):
         signal[i] = s.signal[i]
@@ -99,17 +99,28 @@ def look(t, y, signal, s):
 
 
 @helper
+def settle(t, y, s):
+    """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""
+    take(y, s)
+    nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
+    if s.address[a.BACK] and real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS])) == t:
+        for i in range(s.state.shape[0]):
+            s.good[i] = s.state[i]
+    give(s.y, s.state, s, y)
+
+
+@helper
 def _set(t, s):
     """What controllers drive, as it is at t; returns a status code. Without continuous ones nobody looks at sensors."""
     status = _keep_time(t, s)
     if status == OK and s.continuous[0]:
-        return _steer(t, s)
+        return steer(t, s)
     _drive(s)
     return status
 
 
 @helper
-def _take(y, s):
+def take(y, s):
     """s.y = [q, u, work] and the continuous controllers' states from y = [q, u, x, work]."""
     n = s.y.shape[0] - 1
     for i in range(n):
@@ -123,7 +134,7 @@ def _take(y, s):
 
 
 @helper
-def _give(of_mechanics, of_controllers, s, y):
+def give(of_mechanics, of_controllers, s, y):
     """The other way round, for states or their rates."""
     n = s.y.shape[0] - 1
     for i in range(n):
@@ -178,9 +189,9 @@ def _rewind(s):
 @helper
 def _look(t, s):
     """Everything that a sampled controller may read at t: sensors of all kinds, and continuous controllers."""
-    status = _steer(t, s)
+    status = steer(t, s)
     if status == OK and s.has_at_once[0]:
-        status = _move(t, s)
+        status = accelerate(t, s)
         if status == OK:
             measure_at_once(t, s)
     return status
@@ -215,7 +226,7 @@ def _gather(i, s):
 
 
 @helper
-def _steer(t, s):
+def steer(t, s):
     """Sensors, continuous controllers, and what they drive; returns a status code.
 
     What depends on forces at once is not known yet: it reaches outputs through states only, and is zero here.
@@ -258,13 +269,13 @@ def _act_continuously(t, s):
 
 
 @helper
-def _move(t, s):
+def accelerate(t, s):
     """The mechanics' right-hand side: s.dy."""
     return status_at(s.address[a.MOTION], (t, s.y, s.dy, s.address[a.CONSTANTS], s.address[a.WORKSPACE]))
 
 
 @helper
-def _follow(t, s):
+def follow(t, s):
     """Rates of controllers that read what depends on forces at once, now that it is known."""
     measure_at_once(t, s)
     return _act_continuously(t, s)

@@ -1,7 +1,7 @@
 """What sensors measure at y = [q, u, work] in s.y, into s.signal."""
 
 from flexmb.control import tables as a
-from flexmb.jit.direct import nothing_at
+from flexmb.jit.direct import nothing_at, status_at
 from flexmb.jit.kernel import helper
 from flexmb.spatial.scalar import sqrt
 from flexmb.spatial.vector import dot, mat3, store3, sub, times_t, vec3
@@ -28,6 +28,8 @@ def measure_at_once(t, s):
         s.rates[j] = s.dy[first + j]
     if s.address[a.OBSERVING]:
         nothing_at(s.address[a.OBSERVING], (s.address[a.CONSTANTS], s.address[a.WORKSPACE], s.address[a.OUTPUTS]))
+    if s.address[a.ASKING]:
+        status_at(s.address[a.ASKING], (t,))  # what Python raises ends the run by itself
     if s.has_markers[0]:
         see_markers(t, s)
     for i in range(s.sensor.shape[0]):

@@ -22,7 +22,11 @@ SAMPLE, APPLY = range(2)
 
 # Kernels and tables that the loop reaches by address: places in `Loop.address`.
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
-ADDRESSES = 10
+BACK, LEAP = range(10, 12)  # of closed chains; 0 elsewhere
+ASKING = 12  # Python, for loads that no kernel finds where the motion was just evaluated; 0 where there is one
+ADDRESSES = 13
+# The same of `LoopTangent.address`.
+JACOBIAN, EXACT, TANGENT = range(3)
 
 _F, _I = np.float64, np.int64
 
@@ -99,8 +103,29 @@ class Loop:
     now: Real  # (1,) s, of the last evaluation while replaying
     y: Real  # (nq+nu+1,) [q, u, work]
     dy: Real
+    stuck: Index  # (1,) whether controllers are too fast for a leap that has been tried
+    good: Real  # `state` at the last good state of a closed chain's run
+    before: Real  # (nq+nu+1,) on one side of a leap, with its slope ...
+    slope_before: Real
+    after: Real  # ... and on the other
+    slope_after: Real
+    mean: Real  # (drives,) what is driven in a leap, on average
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
-    loads: Real  # (N,6)
+    loads: Real  # (N+C,6) of hinges, then of closures
     drives: Real  # (nu,)
     doubt: Index  # (1,) of the mechanics' workspace
+
+
+@bundle
+class LoopTangent:
+    """What the Jacobian of a closed loop needs besides, y = [q, u, x, work] (n,)."""
+
+    address: Index  # (3,) of the mechanics' Jacobian and its tables
+    column: Index  # places in y that sensors read, and those of x
+    y: Real  # (n,)
+    of_motion: Real  # (nq+nu+1, nq+nu+1)
+    slope: Real  # (nq+nu+1,)
+    effect: Real  # (drives, nq+nu+1)
+    ahead: Real  # (drives + X,) what is driven, and rates of x, on one side of y ...
+    behind: Real  # ... and on the other

@@ -142,7 +142,7 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
         case DistanceSensor(marker_a=one, marker_b=other):
             return a.DISTANCE, list(observed.markers).index(one), 2, list(observed.markers).index(other)
         case LoadSensor(hinge=hinge):
-            return a.LOAD, list(observed.hinges).index(hinge), 6, a.WORLD
+            return a.LOAD, [*observed.hinges, *observed.closures].index(hinge), 6, a.WORLD
         case DriveSensor(coordinate=coordinate):
             return a.DRIVE_LOAD, _driven(system, coordinate), 1, a.WORLD
         case TimeSensor():

@@ -10,7 +10,7 @@ from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
 from flexmb.jit.kernel import helper
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
-EVALUATED = 5  # about as often a leap evaluates equations of motion
+EVALUATED = 8  # about as often a leap evaluates equations of motion
 
 
 @helper
@@ -30,7 +30,7 @@ def leap(problem, end, y, dy, y_new, dy_new, counts):
 
 
 @helper
-def _cubic(step, y, dy, y_new, dy_new, t, result):
+def cubic(step, y, dy, y_new, dy_new, t, result):
     """The state within a leap, by Hermite's cubic: it is much shorter than a step."""
     h = step.end - step.start
     x = (t - step.start) / h
@@ -43,7 +43,7 @@ def _cubic(step, y, dy, y_new, dy_new, t, result):
 @helper
 def in_leap(problem, step, ends, s, t, result, run):
     """The state within a leap, as `flexmb.integrate.watch` asks for it."""
-    _cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)
+    cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)
     return OK
 
 
@@ -55,6 +55,6 @@ def store_leapt(step, y, dy, y_new, dy_new, times, out, counts):
         if times[sample] == step.end:
             copy(y_new, out[sample])
         else:
-            _cubic(step, y, dy, y_new, dy_new, times[sample], out[sample])
+            cubic(step, y, dy, y_new, dy_new, times[sample], out[sample])
         sample += 1
     counts[SAMPLES] = sample

@@ -6,6 +6,7 @@ Functions and tables are given by address, so that each integrator is compiled o
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -87,10 +88,15 @@ class Accuracy(NamedTuple):
 
 
 class Leaping(NamedTuple):
-    """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails."""
+    """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails.
+
+    watch_steps(constants) prepares it for a method that does not estimate errors: steps fail that are too long to
+    resolve what they meet.
+    """
 
     back: Any
     leap: Any
+    watch_steps: Callable[[Any], None]
 
 
 class Linear(NamedTuple):
@@ -116,7 +122,7 @@ def _no_leap(end, y, dy, y_new, dy_new, constants):
 def problem(rhs: Any, project: Any, constants: Any, workspace: Any, leaping: Leaping | None = None) -> Problem:
     """Of kernels and bundles; without `leaping` nothing goes on from where a step fails."""
     anything = AnyBundle._numba_type_
-    back, leap = leaping or (_no_way_back, _no_leap)
+    back, leap = leaping[:2] if leaping else (_no_way_back, _no_leap)
     known = constants if leaping else anything
     return Problem(
         pointer(rhs, STATUS, REAL, VECTOR, VECTOR, constants, workspace),

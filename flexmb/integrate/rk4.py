@@ -65,16 +65,14 @@ def inside(problem, step, ends, k, t, result, run):
 def _detour(problem, watch, trouble, step, y, scratch, output, run):
     """From the last good state to `step.end` or further, by shorter steps and leaps, where a step there met `trouble`.
 
-    Returns a status code and the time of y, which is again the last good state. Without a leap it is still `trouble`:
-    what made the step fail goes on in less time than a step, and nobody knows how short steps had to be. scratch:
-    slopes (4,n) and a state (n,); output: times of samples, and samples; run: accuracy and counts. CROSSED, and the
-    time, where it comes to a level.
+    Returns a status code and the time of y, which is again the last good state. scratch: slopes (4,n) and a state (n,);
+    output: times of samples, and samples; run: accuracy and counts. CROSSED, and the time, where it comes to a level.
     """
     (k, trial), (times, out), target, last, (accuracy, counts) = scratch, output, step.end, step.last, run
     t = problem.back(y, problem.constants)
     if not t > -math.inf:
         return trouble, target
-    h, failed, outcome = RETREAT * (target - t), True, trouble
+    h, failed = RETREAT * (target - t), True
     while t < target:
         status = permitted(accuracy.max_steps, counts)
         if status != OK:
@@ -88,7 +86,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
                 if status != OK:
                     return status, t_at
             store_leapt(leapt, y, k[0], trial, k[1], times, out, counts)
-            t, h, outcome = t + far, far, OK
+            t, h = t + far, far
         else:
             status, t_new = step_end(t, h, target, trouble, accuracy.max_steps, counts)
             if status != OK:
@@ -113,7 +111,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
         copy(trial, y)
         counts[ACCEPTED] += 1
         failed = False
-    return outcome, t
+    return OK, t
 
 
 @kernel

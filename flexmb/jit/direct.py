@@ -2,8 +2,8 @@
 
 A dispatcher finds out the type of every argument at each call: of a bundle in half a microsecond. Here the addresses of
 a kernel and of its bundles go, as whole numbers, to an entry that is compiled once for all kernels whose arguments are
-arranged alike, and the entry calls through the address. In kernels `status_at` and `nothing_at` do that, and
-`at_address` makes the bundle of an address.
+arranged alike, and the entry calls through the address. In kernels `status_at`, `real_at` and `nothing_at` do
+that, and `at_address` makes the bundle of an address.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
 from flexmb.jit.kernel import kernel
-from flexmb.jit.pointer import NOTHING, STATUS, pointer
+from flexmb.jit.pointer import NOTHING, REAL, STATUS, pointer
 from flexmb.jit.tables import TableType
 
 ADDRESS = types.int64
@@ -131,6 +131,16 @@ def nothing_at(function: Any, arguments: Any) -> Any:
     function(*arguments)
 
 
+def real_at(function: Any, arguments: Any) -> Any:
+    """The same of a kernel that returns a number."""
+    return function(*arguments)
+
+
+@type_callable(real_at)
+def _type_of_real(context):
+    return lambda function, arguments: REAL
+
+
 @type_callable(status_at)
 def _type_of_status(context):
     return lambda function, arguments: STATUS
@@ -141,6 +151,7 @@ def _type_of_nothing(context):
     return lambda function, arguments: NOTHING
 
 
+@lower_builtin(real_at, types.Integer, types.BaseTuple)
 @lower_builtin(status_at, types.Integer, types.BaseTuple)
 @lower_builtin(nothing_at, types.Integer, types.BaseTuple)
 def _call(context, builder, sig, args):

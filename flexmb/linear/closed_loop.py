@@ -14,10 +14,10 @@ from typing import NamedTuple
 import numpy as np
 
 from flexmb.control.feedback import Feedback
-from flexmb.control.loop import rhs
+from flexmb.control.loop import project, rhs
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.linear_model import LinearModel
-from flexmb.linear.variations import Equations
+from flexmb.linear.variations import Equations, equations_of
 from flexmb.motion.retraction import move
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
@@ -37,40 +37,69 @@ STEP = 1e-3
 def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
     """About a state, and the controllers' initial states; `model` makes the linear model of a motion.
 
-    NotImplementedError for closed chains, and for controllers that are sampled or read what depends on forces of the
-    same instant.
+    NotImplementedError for controllers that are sampled or read what depends on forces of the same instant.
     """
-    _refuse(system)
-    plant = system._anew()
-    made = algorithms.chosen("articulated").route
-    assert made is not None
-    route = made(plant)
-    feedback = Feedback(plant, algorithms.chosen("articulated"), route, route.tables())
-    if feedback.reads_at_once:
-        raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
-    clock = Clock(np.array([state.t, state.t + 1.0]), np.array([state.t + 1.0]))
-    y = feedback.begin(_Start(state), clock, Accuracy(0.0, 0.0, 0, 0), None).y
-    equations = Equations(plant)
-    seen = _Seen(feedback, state.t, plant.nq + plant.nu)
-    derivative = np.column_stack([
-        (at[0] - at[3] + 8.0 * (at[2] - at[1])) / (12.0 * size)
-        for move_by, size in _variations(plant, y, equations, state)
-        for at in [[seen(move_by(k * size)) for k in (-2, -1, 1, 2)]]
-    ])  # fmt: skip
-    drives = len(seen(y)) - len(feedback.state_names)  # and the controllers say again what they say at the state
-    of_motion = model(equations, state)
-    n, states = len(equations.free), len(feedback.state_names)
-    A = np.zeros((2 * n + states, 2 * n + states))
-    A[: 2 * n, : 2 * n] = of_motion.A
-    A[n : 2 * n] += _effect(equations, state, feedback.driven) @ derivative[:drives]
-    A[2 * n :] = derivative[drives:]
+    if isinstance(system, ClosedSystem):
+        state = system._admissible(*system.layout.entering(state))
+    loop = ClosedLoop(system, state)
+    found = loop.at(state, loop.initial, model)
+    of_motion, states = found.of_motion, len(loop.initial)
     return replace(
         of_motion,
-        states=(*of_motion.states, *((name, "") for name in feedback.state_names)),
-        A=A,
+        states=(*of_motion.states, *((name, "") for name in loop.state_names)),
+        A=found.A,
         B=np.vstack([of_motion.B, np.zeros((states, len(of_motion.inputs)))]),
         C=np.hstack([of_motion.C, np.zeros((len(of_motion.outputs), states))]),
     )
+
+
+class AtState(NamedTuple):
+    """A closed loop linearised: A (2f+X,2f+X) of [xi; du; dx]; rates (X,) of x; the model of the motion by itself."""
+
+    A: Real
+    rates: Real
+    of_motion: LinearModel
+
+
+class ClosedLoop:
+    """A system with its controllers, continuous ones, at any of their states."""
+
+    def __init__(self, system: System, start: State) -> None:
+        _refuse(system)
+        self._plant = plant = system._anew()
+        chosen, route = algorithms.chosen("articulated"), plant.route()
+        self._feedback = feedback = Feedback(plant, chosen, route, route.tables())
+        if feedback.reads_at_once:
+            raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
+        clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
+        y = feedback.begin(_Start(start), clock, Accuracy(0.0, 0.0, 0, 0), None).y
+        self.initial: Real = y[plant.nq + plant.nu : -1]
+        """(X,) states of controllers at the start."""
+        self.state_names = feedback.state_names
+        project(start.t, y, feedback.running)  # which finds the independent rows of closures
+
+    def at(self, state: State, x: Real, model: Callable[[Equations, State], LinearModel]) -> AtState:
+        """Linearised about a state of the motion and x (X,) of the controllers."""
+        plant, feedback = self._plant, self._feedback
+        y = np.concatenate([state.q, state.u, x, [0.0]])
+        equations = equations_of(plant)
+        seen = _Seen(feedback, state.t, plant.nq + plant.nu)
+        derivative = np.column_stack([
+            (at[0] - at[3] + 8.0 * (at[2] - at[1])) / (12.0 * size)
+            for move_by, size in _variations(plant, y, equations, state)
+            for at in [[seen(move_by(k * size)) for k in (-2, -1, 1, 2)]]
+        ])  # fmt: skip
+        now = seen(y)  # and the controllers say again what they say at the state
+        of_motion, at = model(equations, state), equations.variations(state)
+        n, drives, states = equations.freedom, len(now) - len(x), len(x)
+        by_independent = np.eye(len(at.by_chosen) + states, 2 * n + states, 2 * n - len(at.by_chosen))
+        by_independent[: len(at.by_chosen), : 2 * n] = at.by_chosen
+        derivative = derivative @ by_independent
+        A = np.zeros((2 * n + states, 2 * n + states))
+        A[: 2 * n, : 2 * n] = of_motion.A
+        A[n : 2 * n] += _effect(equations, state, feedback.driven)[at.chosen] @ derivative[:drives]
+        A[2 * n :] = derivative[drives:]
+        return AtState(A, now[drives:], of_motion)
 
 
 class _Start(NamedTuple):
@@ -102,8 +131,6 @@ class _Seen:
 
 
 def _refuse(system: System) -> None:
-    if isinstance(system, ClosedSystem):
-        raise NotImplementedError(f'scene "{system.scene.name}" has closures and controllers: {REMEDY}')
     sampled = [each.name for each in system.scene.controllers if each.period_s is not None]
     if sampled:
         raise NotImplementedError(

@@ -25,8 +25,8 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     Of a closed chain it is that of as many independent coordinates as the closures leave; those that depend on them are
     among the outputs. Of a scene with controllers it is that of the closed loop: their states come last, and start
     where the scene says. Raises DynamicsError where the accelerations do not exist, NotImplementedError for sampled
-    controllers, controllers of closed chains and closures on bodies of level "ruthless", ValueError or TypeError for
-    what is not a state of this system or leaves closures open.
+    controllers and closures on bodies of level "ruthless", ValueError or TypeError for what is not a state of this
+    system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)

@@ -54,9 +54,10 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     change[: len(places)] = [speeds.get(j, state.u[j]) - state.u[j] for j in places]
     factors = system.factorise(state)
     half = factors.half_solve(along.T)
-    moved = np.linalg.lstsq(half.T, change, rcond=DEPENDENT)[0]
+    size = _sizes(half, len(places))
+    moved = np.linalg.lstsq((half / size).T, change / size, rcond=DEPENDENT)[0]
     _refuse_unreached(half.T @ moved - change, state)
-    impulses = np.linalg.lstsq(half, moved, rcond=DEPENDENT)[0]
+    impulses = np.linalg.lstsq(half / size, moved, rcond=DEPENDENT)[0] / size
     u = state.u + factors.solve(along.T @ impulses)
     u[places] = state.u[places] + change[: len(places)]
     if np.max(np.abs(u), initial=0.0) <= AT_REST * np.max(np.abs(state.u), initial=0.0):
@@ -66,6 +67,13 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     return Struck(
         u, dict(zip(places, held.tolist(), strict=True)), 0.5 * float(held @ (u[places] + state.u[places])), closures
     )
+
+
+def _sizes(half: Real, coordinates: int) -> Real:
+    """By which responses are compared: each coordinate's own, and one of all rows, whose impulses are the least."""
+    size = np.linalg.norm(half, axis=0)
+    size[coordinates:] = np.max(size[coordinates:], initial=0.0)
+    return np.where(size > 0.0, size, 1.0)
 
 
 def _by_name(system: System, wrenches: Real) -> dict[str, Real]:

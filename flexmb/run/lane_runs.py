@@ -18,6 +18,7 @@ from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.integrate.rk4_lanes import rk4_lanes
 from flexmb.integrate.settings import Settings
 from flexmb.jit.lanes import LANES
+from flexmb.run.origin import Beginning
 from flexmb.run.propagate import Integration, recursion
 from flexmb.run.switching import segment_ends
 from flexmb.system import algorithms
@@ -65,10 +66,13 @@ class BatchRun:
 
     def __call__(self, n: int, threads: int) -> None:
         """Run the first n copies."""
-        blocks = list(range(0, n, LANES)) if self._batch.in_lanes and self._settings.method in _IN_LANES else []
-        in_threads(self._in_lanes, blocks, threads)
+        controlled = bool(self._batch.systems[0].scene.controllers)
+        in_lanes = self._batch.in_lanes and not controlled and self._settings.method in _IN_LANES
+        blocks = list(range(0, n, LANES)) if in_lanes else []
+        if blocks:
+            in_threads(self._in_lanes, blocks, threads)
         left = [copy for copy in range(n) if self._found.status[copy] == _NOT_YET]
-        in_threads(self._alone, left, threads if self._batch.in_lanes else 1)
+        in_threads(self._alone, left, threads if self._batch.in_lanes and not controlled else 1)
 
     def _copies_ends(self, copies: Sequence[int]) -> list[Real]:
         """Ends of the segments of each copy."""
@@ -130,8 +134,8 @@ class BatchRun:
         last, solve = None, None
         for copy in copies:
             system = self._batch.system(copy)
-            if solve is None or system is not last:
-                last, solve = system, Alone(system, self._settings.integrator)
+            if solve is None or system is not last or system.scene.closures:  # chains remember their branch
+                last, solve = system, alone(system, self._settings.integrator)
             [ends] = self._copies_ends([copy])
             found.counts[copy, :STOP], found.out[copy] = 0, np.nan
             clock, out, counts = Clock(self._times, ends), found.out[copy], found.counts[copy]
@@ -139,8 +143,36 @@ class BatchRun:
             found.status[copy], found.stopped_at[copy], found.fault[copy] = status, t, solve.fault
 
 
-class Alone:
+def alone(system: System, method: Integrator) -> Alone | Controlled:
     """An integrator for copies of one system, one at a time."""
+    return Controlled(system, method) if system.scene.controllers else Alone(system, method)
+
+
+class Controlled:
+    """Of a system with controllers, which begin anew in each run."""
+
+    def __init__(self, system: System, method: Integrator) -> None:
+        self._own, self._method = system._anew(), method
+        self._solve = Integration(self._own, algorithms.chosen("articulated"), self._own.route(), method)
+
+    def __call__(self, y: Real, clock: Clock, accuracy: Accuracy, out: Real, counts: Index) -> tuple[int, float]:
+        """See `Integrator`; out (T,nq+nu+1) is without the states of controllers."""
+        begin = Beginning(self._own.layout.known(float(clock.times[0]), y), y, None)
+        y, clock, accuracy = self._solve.begin(begin, clock, accuracy, counts)
+        found = np.empty((len(out), len(y)))
+        status, t = self._solve(y, clock, accuracy, found, counts, self._method.memory(len(y)), None)
+        self._solve.ended()
+        out[:, :-1], out[:, -1] = found[:, : out.shape[1] - 1], found[:, -1]
+        return status, t
+
+    @property
+    def fault(self) -> int:
+        """Where an evaluation failed."""
+        return self._solve.fault
+
+
+class Alone:
+    """Of a system without."""
 
     def __init__(self, system: System, method: Integrator) -> None:
         self._method = method

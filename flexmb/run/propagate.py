@@ -83,6 +83,8 @@ class Integration:
                 self.feedback.with_retraction(self._linear.move)
         else:
             self._problem = problem(*motion, route.leaping)
+            if integrator.fixed and route.leaping is not None:
+                route.leaping.watch_steps(constants)
         self.batch: Sampler | None = None
         """Observes many samples at once."""
         self._batched = algorithm.observing is not None and not system.scene.closures

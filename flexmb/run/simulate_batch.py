@@ -17,7 +17,6 @@ from flexmb.run.lane_runs import BatchRun, Runs, runs
 from flexmb.run.samples import OUTPUT_BYTES, sample_times
 from flexmb.run.simulate import RunSettings, refuse_unknown, refuse_without_jacobian
 from flexmb.run.switching import refuse_times
-from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Scene
 from flexmb.system.batch import Batch, compile_batch, number_of_threads
 from flexmb.system.tree_system import System
@@ -42,8 +41,8 @@ def simulate_batch(
     one compiled system, whose copies differ in their initial states. q (n,nq), u (n,nu): initial coordinates and speeds
     of all copies, by default those of the scenes. method, samples and settings: see `simulate`. "rk4" and "dop853" run
     eight copies at once in the lanes of the processor, each with steps of its own; the other methods, and scenes with
-    closures, run one copy after the other. All modes are eliminated explicitly. threads: how many, by default one for
-    each processor.
+    closures or controllers, run one copy after the other. In lanes all modes are eliminated explicitly. threads: how
+    many, by default one for each processor.
 
     A run that fails fails no other one and raises nothing: `status` and `message` of the result say why it stopped.
     Raises SceneError, ValueError, TypeError or NotImplementedError as `simulate` does, ValueError where states do not
@@ -55,7 +54,6 @@ def simulate_batch(
     chosen = Settings(method, **settings).checked(t_end)
     if chosen.integrator.linearises:
         refuse_without_jacobian(batch.systems[0], "articulated", method)
-    refuse_feedback(batch.systems[0].scene, "simulate_batch")
     for system in batch.systems:
         refuse_times(system, 0.0, t_end)
         if system.scene.events:

@@ -55,7 +55,11 @@ class DistanceSensor(SceneStruct, frozen=True, kw_only=True, tag="distance", tag
 
 
 class LoadSensor(SceneStruct, frozen=True, kw_only=True, tag="load", tag_field="kind"):
-    """Total load across a hinge, six numbers [torque; force] on the outboard body about the hinge point, World axes."""
+    """Total load across a hinge, six numbers [torque; force] on the outboard body about the hinge point, World axes.
+
+    `hinge` may name a closure: then on body_b about its frame. By algorithm "articulated" it costs little in trees; in
+    closed chains and by others, half a millisecond each time.
+    """
 
     name: str
     hinge: str

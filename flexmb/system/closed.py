@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
 from flexmb.closure.assembly import consistent
+from flexmb.closure.branch import watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.jacobian import chain_tangent
@@ -31,7 +32,9 @@ from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
 
-FAR = 1e-2  # in the size of a closure: a state that is given opens it by less
+# In the size of a closure: a state that is given opens it by less. At a distance of d sizes from where branches cross
+# they differ by d^2 in the gap: beyond a tenth of the size the nearest is the one that is meant. Three digits do.
+FAR = 1e-2
 
 
 class ClosedSystem(System):
@@ -200,7 +203,8 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, Leaping(back, leap), self._linear)
+        leaping = Leaping(back, leap, watch_steps)
+        return Route(tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear)
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:
         tangent = chain_tangent(chain.c, chain.cc, self.nq, self.nu)

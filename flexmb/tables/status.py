@@ -76,8 +76,8 @@ _ADVICE = {
         'adapts its step, "radau5"'
     ),
     Status.CHATTERING: (
-        "events follow each other faster and faster without end: let an `Impact` with little rebound become a `Latch`, "
-        "or take a stiff spring with a damper in place of the stop"
+        "events follow each other faster and faster without end: let an `Impact` come to rest (`rests`) or become a "
+        "`Latch`, or take a stiff spring with a damper in place of the stop"
     ),
     Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",

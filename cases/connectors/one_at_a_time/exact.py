@@ -1,4 +1,4 @@
-"""Each body by itself: harmonic pieces between contacts, a forced oscillator, quadratures of friction, a curve by SciPy.
+"""Each body by itself: harmonic pieces, a forced oscillator, quadratures of friction, a curve by SciPy.
 
 Friction by a quadrature: with u = log v, dt = -J sqrt(v² + vr²) / level(v) du, which is smooth down to any speed.
 """
@@ -87,11 +87,15 @@ def braked(times, v0, inertia, friction):
         value = quad(lambda z: weight(np.exp(z)) * inertia / level(np.exp(z), friction), u, before, epsabs=1e-15)
         return value[0]
 
+    def after(span, u):
+        """The logarithm of the rate, `span` after it was u."""
+        lower = u - 50.0 * span - 1.0
+        return brentq(lambda z: over(lambda v: 1.0, z, u) - span, lower, u, xtol=1e-15, rtol=1e-15)
+
     u, t, angle, rows = np.log(v0), 0.0, 0.0, []
     for time in times:
         if time > t:
-            lower = u - 50.0 * (time - t) - 1.0
-            new = brentq(lambda z: over(lambda v: 1.0, z, u) - (time - t), lower, u, xtol=1e-15, rtol=1e-15)
+            new = after(time - t, u)
             angle += over(lambda v: v, new, u)
             u, t = new, time
         rows.append((angle, np.exp(u)))

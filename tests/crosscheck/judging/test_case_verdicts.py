@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from crosscheck.judging.case_verdicts import CLOCK
-from crosscheck.judging.results import RUNGS
+from crosscheck.judging.results import NEEDED
 from crosscheck.judging.verdict import GRAVITY, STATUSES
 from crosscheck.records.kinds import RunStatus
 from crosscheck.records.packing import pack
@@ -138,7 +138,7 @@ def test_within_a_variant_the_refined_run_does_not_matter() -> None:
     assert single(judged(text, runs)).status == "agree"
 
 
-@pytest.mark.parametrize("rung", range(RUNGS - 1))
+@pytest.mark.parametrize("rung", range(NEEDED - 1))
 @pytest.mark.parametrize("status", ["failed", "crashed", "did not finish", "refused", None])
 def test_a_lower_effort_without_result_leaves_the_uncertainty_unknown(rung: int, status: str | None) -> None:
     one, two = ladder("one", {TIP: way()}), ladder("two", {TIP: way()})

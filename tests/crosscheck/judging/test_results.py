@@ -134,6 +134,27 @@ def test_two_efforts_that_did_the_same_say_nothing_where_the_first_diverged() ->
     assert how == "unknown: fewer than two efforts finished with different results"
 
 
+def four_tolerances() -> list[RunRecord]:
+    """A hundredth apart, by a method of order 4: errors fall as the tolerances do, and evaluations grow by sqrt(10)."""
+    made = ladder("one", {TIP: way()})
+    return [
+        msgspec.structs.replace(
+            run, effort=f"rtol {n}", effort_value=1e-2 * 1e-2**n, rung=n, rungs=4,
+            evaluations=round(100 * 10 ** (n / 2)), channels={TIP: pack(way(1.0 + 1e-2**n))},
+        )
+        for n, run in enumerate((made[0], *made))
+    ]  # fmt: skip
+
+
+def test_an_effort_before_the_last_three_narrows_u_and_is_not_needed() -> None:
+    runs = four_tolerances()
+    difference = 1e-4 - 1e-6
+    assert one(runs).uncertainty(TIP).value == pytest.approx(10.0 / 90.0 * difference, rel=0.05)
+    narrow = 15.0 / 85.0 * difference
+    for lost in (ended(runs[0], "crashed"), msgspec.structs.replace(runs[0], channels={})):
+        assert one([lost, *runs[1:]]).uncertainty(TIP).value == pytest.approx(narrow, rel=0.05)
+
+
 def test_spatial_doubt_keeps_the_order_and_ends_at_its_largest() -> None:
     runs = [*steps({TIP: GROWING}, 2.0), *ladder("one", {TIP: 1.5 * GROWING}, role="refined")[-1:]]
     doubt = one(runs, TWO_VARIANTS).doubt(TIP, True)

@@ -129,7 +129,8 @@ def test_each_connector_costs_what_the_one_before_it_does():
     def operations(connectors: int) -> int:
         builder = slider(position=0.3)
         for i in range(connectors):
-            builder.spring_damper(f"s{i}", "ground", "body", position_a=(-1.0, 0.1 * i, 0.0), stiffness=2.0, damping=0.1)
+            end = (-1.0, 0.1 * i, 0.0)
+            builder.spring_damper(f"s{i}", "ground", "body", position_a=end, stiffness=2.0, damping=0.1)
         system = fm.compile(builder.scene())
         y = system.initial_state.y
         counted = count(articulated.rhs, 0.0, y, np.empty_like(y), system.constants, system.workspace())

@@ -34,6 +34,12 @@ def lagging(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, chan
     outputs[0] = parameters[1] * state[0]
 
 
+def plainly_lagging(t: float, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
+    """The same in Python."""
+    change[0] = (inputs[0] - state[0]) / parameters[0]
+    outputs[0] = parameters[1] * state[0]
+
+
 @fm.user_function
 def counting(t: Any, inputs: Any, state: Any, parameters: Any, outputs: Any, change: Any) -> None:
     """How often it was called."""

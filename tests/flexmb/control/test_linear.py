@@ -101,9 +101,8 @@ def _started(scene: fm.Scene, q: Any) -> fm.Scene:
 
 
 @pytest.mark.parametrize(("ask", "reason"), [
-    (fm.linearize, "is sampled"), (fm.equilibrium, "has controllers"),
-    (lambda s: fm.advise(s, 1e-3), "has controllers"), (lambda s: fm.simulate_batch([s], 1.0), "has controllers"),
-], ids=["linearize", "equilibrium", "advise", "batch"])  # fmt: skip
+    (fm.linearize, "is sampled"), (fm.equilibrium, "is sampled"), (lambda s: fm.advise(s, 1e-3), "has controllers"),
+], ids=["linearize", "equilibrium", "advise"])  # fmt: skip
 def test_what_knows_of_no_controllers_says_so(ask: Any, reason: str) -> None:
     scene = rotor(fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),), period_s=0.1))
     with pytest.raises(NotImplementedError, match=f"{reason}.*open_loop"):
@@ -116,3 +115,47 @@ def test_an_open_loop_is_the_scene_without_its_controllers() -> None:
     assert not opened.controllers and not opened.sensors
     assert fm.linearize(opened).eigenvalues.imag.max() == pytest.approx(np.sqrt(2.0 / INERTIA))
     assert fm.linearize(rotor(law, stiffness=2.0)).eigenvalues.imag.max() == pytest.approx(np.sqrt(3.0 / INERTIA))
+
+
+def test_a_loop_rests_where_its_law_balances_the_weight() -> None:
+    """A proportional law sags by the weight it carries; an integral leaves nothing of it; run there, nothing moves."""
+    proportional = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-40.0, -4.0),))
+    system = fm.compile(pendulum(proportional, torque=fm.ControlSignal(source="law")).scene())
+    state = fm.equilibrium(system)
+    weight = 9.81 * (1.0 * 0.5 + 0.5 * 1.0) * np.cos(state.q[0])  # the lower arm hangs: its weight is at the elbow
+    assert state.q[0] + state.q[1] == pytest.approx(np.pi / 2, abs=1e-9)
+    assert 40.0 * state.q[0] == pytest.approx(weight, rel=1e-9)
+    assert state.q[0] > 0.1  # what it would be without weight is 0
+    run = fm.simulate(system, 1.0, state=state)
+    assert np.abs(run.q - state.q).max() < 1e-8
+    whole = fm.Pid(name="law", inputs=("angle",), kp=40.0, ki=60.0, kd=4.0, filter_s=0.05, setpoint=0.2)
+    held = fm.equilibrium(pendulum(whole, torque=fm.ControlSignal(source="law")).scene())
+    assert held.q == pytest.approx([0.2, np.pi / 2 - 0.2], abs=1e-9)
+
+
+def test_a_law_that_nothing_balances_rests_nowhere() -> None:
+    """A steady torque on a free rotor; and an integral of an error that no displacement changes."""
+    steady = fm.StateSpace(name="law", inputs=("one[0]",), D=((1.0,),))
+    summing = fm.StateSpace(name="law", inputs=("one[0]",), A=((0.0,),), B=((1.0,),), C=((0.0,),))
+    for law in (steady, summing):
+        with pytest.raises(fm.EquilibriumError, match="are left that no displacement removes"):
+            fm.equilibrium(rotor(ONE, law))
+
+
+def test_a_batch_of_controlled_scenes_is_their_runs() -> None:
+    """Each as `simulate` runs it, controllers of its own; other gains move otherwise."""
+    scenes = [
+        rotor(fm.StateSpace(name="law", inputs=("angle",), A=((-2.0,),), B=((1.0,),), C=((-k,),), period_s=period))
+        for k, period in ((1.0, None), (2.0, None), (2.0, None))
+    ]
+    found = fm.simulate_batch(scenes, 1.0, samples=5)
+    assert found.finished
+    for i, scene in enumerate(scenes):
+        run = fm.simulate(scene, 1.0, samples=5)
+        assert np.array_equal(found.q[i], run.q) and np.array_equal(found.work[i], run.work)
+    assert np.abs(found.q[1] - found.q[0]).max() > 1e-3
+    sampled = rotor(fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),), period_s=0.1))
+    angles = np.array([[0.1], [0.3]])
+    several = fm.simulate_batch(fm.compile(sampled), 1.0, q=angles, samples=5)
+    assert np.array_equal(several.q[1], fm.simulate(sampled, 1.0, samples=5).q)
+    assert np.abs(several.q[0] - several.q[1] / 3.0).max() < 1e-9

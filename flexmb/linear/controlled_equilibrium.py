@@ -1,0 +1,95 @@
+"""Where a closed loop rests: neither the motion accelerates nor do states of controllers change.
+
+Newton's method over displacements xi and states x of controllers together, by the linear model of the closed loop, for
+an integrator has no state of its own that belongs to a displacement. Damping is that of `flexmb.linear.equilibrium`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.linear.closed_loop import ClosedLoop
+from flexmb.linear.equilibrium import LONGEST, SMALLEST, STEPS, EquilibriumError
+from flexmb.linear.linearize import held_model
+from flexmb.linear.variations import Equations, equations_of
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.tree_system import System
+from flexmb.tables.state import DynamicsError, State
+from flexmb.typing import Real
+
+CONVERGED = 1e-10  # last correction (rad, m, units of x), of derivatives that are exact to 1e-12
+RANK = 1e-12  # directions of less stiffness, in part of the largest, are free to move and are left alone
+
+
+class _Place(NamedTuple):
+    """A state of the motion and x (X,); what is left there, accelerations and rates of x (f+X,), and its derivative."""
+
+    state: State
+    x: Real
+    left: Real
+    derivative: Real
+
+
+def resting(system: System, guess: State) -> State:
+    """The state near the guess, its speeds zero, in which the closed loop rests.
+
+    EquilibriumError where none is found, NotImplementedError for controllers that `ClosedLoop` refuses, ValueError or
+    TypeError for a guess that is not a state of this system or leaves closures open.
+    """
+    t, y = system.layout.entering(guess)
+    start = replace(guess, u=np.zeros_like(guess.u))
+    if isinstance(system, ClosedSystem):
+        start = system._admissible(t, np.r_[start.q, start.u, 0.0])
+    equations = equations_of(system).held(t)
+    loop = ClosedLoop(system, start)
+    try:
+        here = _look(loop, equations.on_functions(start), loop.initial)
+        for _ in range(STEPS):
+            inverse = np.linalg.pinv(here.derivative, RANK)
+            step = -inverse @ here.left
+            if np.abs(step).max(initial=0.0) <= CONVERGED:
+                return _if_nothing_is_left(system, here)
+            here = _damped(loop, equations, here, inverse, step)
+    except (DynamicsError, np.linalg.LinAlgError) as error:
+        raise EquilibriumError(f'scene "{system.scene.name}": no equilibrium found: {error}') from None
+    raise EquilibriumError(f'scene "{system.scene.name}": no equilibrium found in {STEPS} steps: {_CLOSER}')
+
+
+_CLOSER = "give a guess closer to it, or a setpoint that the drives can hold"
+
+
+def _look(loop: ClosedLoop, state: State, x: Real) -> _Place:
+    found = loop.at(state, x, held_model)
+    n = len(found.of_motion.rates)
+    rows, columns = slice(n, None), np.r_[:n, 2 * n : len(found.A)]
+    return _Place(state, x, np.r_[found.of_motion.rates, found.rates], found.A[rows][:, columns])
+
+
+def _damped(loop: ClosedLoop, equations: Equations, here: _Place, inverse: Real, step: Real) -> _Place:
+    """After the longest of the steps 1, 1/2, 1/4 ... whose simplified correction is shorter; EquilibriumError without.
+    """
+    at, n = equations.variations(here.state), equations.freedom
+    factor = longest = min(1.0, LONGEST / max(np.abs(step[:n]).max(initial=0.0), LONGEST))
+    while factor >= SMALLEST * longest:
+        try:
+            there = _look(loop, equations.moved(at, factor * step[:n]), here.x + factor * step[n:])
+            if np.linalg.norm(inverse @ there.left) <= (1.0 - 0.25 * factor) * np.linalg.norm(step):
+                return there
+        except DynamicsError:
+            pass  # cannot be evaluated there: take a shorter step
+        factor *= 0.5
+    raise EquilibriumError(f"no step leads closer: {_CLOSER}")
+
+
+def _if_nothing_is_left(system: System, here: _Place) -> State:
+    """The state; EquilibriumError where forces are left that no displacement removes, as at a limit of a controller."""
+    size = np.linalg.norm(here.derivative) if here.derivative.size else 0.0
+    if np.linalg.norm(here.left) > 1e3 * CONVERGED * max(size, 1.0):
+        raise EquilibriumError(
+            f'scene "{system.scene.name}": no equilibrium found: accelerations or rates of controllers\' states of '
+            f"{np.abs(here.left).max():.3g} are left that no displacement removes: {_CLOSER}"
+        )
+    return here.state

@@ -1,0 +1,177 @@
+"""Controllers in closed chains: against the chain with springs, one coordinate's equation, and loads that are known."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import msgspec
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import flexmb as fm
+from flexmb.control.feedback import Feedback
+from flexmb.tables.status import Status
+from tests.flexmb.closure import mechanisms as m
+
+STIFFNESS, DAMPING, LAG = 3.0, 0.4, 0.3
+RUNS: dict[str, dict[str, Any]] = {
+    "dop853": {}, "rk4": {"method": "rk4", "step": 1e-3}, "stabilised": {"stabilise": 20.0},
+}  # fmt: skip
+PD = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, -DAMPING),))
+LAGGING = fm.StateSpace(
+    name="law", inputs=("angle", "rate"), A=((-1 / LAG,),), B=((1 / LAG, 0.2),), C=((-STIFFNESS,),)
+)
+SAMPLED = msgspec.structs.replace(PD, period_s=0.05, delay_s=0.02)
+
+
+def windows(count: int, law: Any, speed: float = 2.0) -> fm.Scene:
+    """Four-bars in a row, which pass their singular position, with a law at the first foot."""
+    return controlled(m.windows(count, speed), "foot 0", law)
+
+
+def controlled(scene: fm.Scene, hinge: str, *parts: Any) -> fm.Scene:
+    """With sensors of a hinge, and what drives it."""
+    signal = fm.ControlSignal(source="law")
+    hinges = tuple(
+        msgspec.structs.replace(each, rotation=msgspec.structs.replace(each.rotation, torque_Nm=signal))
+        if each.name == hinge else each
+        for each in scene.hinges
+    )  # fmt: skip
+    kinds = fm.StateSpace | fm.Pid | fm.UserLaw
+    return msgspec.structs.replace(
+        scene, hinges=hinges, controllers=tuple(each for each in parts if isinstance(each, kinds)),
+        sensors=(
+            fm.CoordinateSensor(name="angle", of=hinge), fm.CoordinateSensor(name="rate", of=hinge, quantity="rate"),
+            *(each for each in parts if not isinstance(each, kinds)),
+        ),
+    )  # fmt: skip
+
+
+def turn(count: int, law: str, times: Any, speed: float = 2.0) -> Any:
+    """Angle of the uprights while they stay parallel, under the law at one of them."""
+    inertia, weight = (count + 1) / 3.0 + count, -9.81 * (0.5 * (count + 1) + count)
+
+    def slope(t: float, y: Any) -> Any:
+        torque = -STIFFNESS * y[0] - DAMPING * y[1] if law == "pd" else -STIFFNESS * y[2]
+        if law == "pid":
+            torque = 3.0 * -y[0] + 0.4 * (-y[0] - y[2]) / 2e-3
+            return [y[1], (weight * np.cos(y[0]) + torque) / inertia, (-y[0] - y[2]) / 2e-3]
+        return [y[1], (weight * np.cos(y[0]) + torque) / inertia, (y[0] - y[2]) / LAG + 0.2 * y[1]]
+
+    start = [0.5 * np.pi, -speed, -0.5 * np.pi if law == "pid" else 0.0]
+    return solve_ivp(slope, (0.0, times[-1]), start, "DOP853", times, rtol=1e-13, atol=1e-13).y
+
+
+def feet(run: fm.Trajectory, scene: fm.Scene, count: int) -> Any:
+    system = fm.compile(scene)
+    return run.q[:, [system.coordinate(f"foot {i}").start for i in range(count + 1)]]
+
+
+@pytest.mark.parametrize("settings", RUNS)
+@pytest.mark.parametrize("kind", ["pd", "lagging"])
+@pytest.mark.parametrize("count", [1, 3])
+def test_controlled_windows_pass_where_all_bars_lie_on_one_line(count: int, kind: str, settings: str) -> None:
+    scene = windows(count, PD if kind == "pd" else LAGGING)
+    run = fm.simulate(scene, 4.0, samples=41, **RUNS[settings])
+    assert run.finished, run.message
+    known = turn(count, kind, run.t)
+    assert np.abs(feet(run, scene, count) - known[0][:, None]).max() < 1e-8
+    assert np.abs(run.energy_drift).max() < 1e-7
+    if kind == "lagging":
+        assert np.abs(run.signals["law"][:, 0] + STIFFNESS * known[2]).max() < 1e-7
+
+
+@pytest.mark.parametrize("settings", ["dop853", "rk4"])
+def test_a_filter_as_short_as_a_leap_is_followed_through_it(settings: str) -> None:
+    """A derivative filtered by 2 ms, where leaps take one."""
+    law = fm.Pid(name="law", inputs=("angle",), kp=3.0, kd=0.4, filter_s=2e-3)
+    scene = windows(1, law)
+    step = {"step": 2e-4} if settings == "rk4" else {}
+    run = fm.simulate(scene, 1.0, settings, samples=41, **step)
+    assert run.finished and run.q[-1, 0] < -2.0  # beyond the first two of such positions
+    assert np.abs(feet(run, scene, 1) - turn(1, "pid", run.t)[0][:, None]).max() < 1e-7
+
+
+@pytest.mark.parametrize("settings", ["dop853", "rk4"])
+def test_sampled_controllers_in_windows(settings: str) -> None:
+    """Against one body with the inertia and weight of the windows, under the same law."""
+    scene = windows(1, SAMPLED)
+    run = fm.simulate(scene, 2.0, samples=41, **RUNS[settings])
+    single = (
+        fm.SceneBuilder("one", gravity=(0.0, -9.81, 0.0))
+        .rigid_body("bar", mass=4.0, com=(0.5, 0.0, 0.0), inertia=np.full(3, 2.0 / 3.0))
+        .revolute("foot 0", "ground", "bar", angle=0.5 * np.pi, rate=-2.0)
+        .scene()
+    )
+    alone = fm.simulate(controlled(single, "foot 0", SAMPLED), 2.0, samples=41, rtol=1e-12)
+    assert run.finished and run.q[-1, 0] != pytest.approx(0.5 * np.pi)
+    assert np.abs(feet(run, scene, 1) - alone.q).max() < 1e-8
+
+
+def test_without_leaps_there_is_no_way_through(monkeypatch: pytest.MonkeyPatch) -> None:
+    begin = Feedback.begin
+
+    def grounded(self: Feedback, *given: Any) -> Any:
+        self._leaps = False
+        return begin(self, *given)
+
+    monkeypatch.setattr(Feedback, "begin", grounded)
+    run = fm.simulate(windows(1, PD), 2.0, max_steps=1000)
+    assert not run.finished and run.stopped_at < 0.5
+
+
+def test_controllers_that_are_faster_than_any_leap_end_the_run() -> None:
+    """Never wrong and finished: the filter settles in a hundredth of a leap."""
+    law = fm.Pid(name="law", inputs=("angle",), kp=3.0, kd=0.4, filter_s=1e-5)
+    run = fm.simulate(windows(1, law), 0.6, rtol=1e-6, samples=13)
+    assert run.status is Status.CLOSURE_SINGULAR
+    assert 0.45 < run.stopped_at < 0.5
+
+
+GRASHOF = m.four_bar(gravity=-9.81)
+LOADS = fm.LoadSensor(name="pin load", hinge="pin"), fm.LoadSensor(name="loop load", hinge="loop")
+
+
+@pytest.mark.parametrize("algorithm", ["articulated", "composite"])
+@pytest.mark.parametrize("period", [0.02, None])
+def test_loads_of_hinges_and_closures_are_measured(period: float | None, algorithm: Any) -> None:
+    """What sensors say is what is observed, and what a law makes of it acts: sampled at once, continuous by a lag."""
+    read = {"name": "law", "inputs": ("pin load[3]", "loop load[4]")}
+    law = (
+        fm.StateSpace(**read, D=((0.02, -0.01),), period_s=period) if period
+        else fm.StateSpace(**read, A=((-20.0,),), B=((0.4, -0.2),), C=((1.0,),))
+    )  # fmt: skip
+    run = fm.simulate(controlled(GRASHOF, "drive", law, *LOADS), 0.2, samples=11, algorithm=algorithm, rtol=1e-8)
+    assert run.finished, run.message
+    size = np.abs(run.loads["loop"]).max()
+    assert np.abs(run.signals["pin load"] - run.loads["pin"]).max() < 1e-9 * size
+    assert np.abs(run.signals["loop load"] - run.loads["loop"]).max() < 1e-9 * size
+    if period:  # samples of the output are instants of the law
+        expected = 0.02 * run.loads["pin"][1:, 3] - 0.01 * run.loads["loop"][1:, 4]
+        before = fm.simulate(controlled(GRASHOF, "drive", law, *LOADS), 0.2, samples=11, rtol=1e-8).signals["law"]
+        assert np.abs(run.signals["law"] - before).max() < 1e-7 * np.abs(before).max()
+        assert np.abs(run.signals["law"][1:, 0] - expected).max() < 0.1 * np.abs(expected).max()
+    assert np.abs(run.energy_drift).max() < 1e-6
+    assert np.abs(run.signals["law"][-1]).max() > 1e-3
+
+
+def test_a_controlled_chain_has_the_linear_model_of_its_motion() -> None:
+    """A proportional law is a spring, at rest and in motion; a lag's state acts as what it follows would."""
+    rest, moving = m.four_bar(gravity=0.0, rate=0.0), m.four_bar()
+    hinges = tuple(
+        msgspec.structs.replace(
+            each, rotation=msgspec.structs.replace(each.rotation, stiffness_Nm_rad=STIFFNESS)
+        ) if each.name == "drive" else each
+        for each in moving.hinges
+    )  # fmt: skip
+    proportional = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-STIFFNESS, 0.0),))
+    spring = fm.linearize(msgspec.structs.replace(moving, hinges=hinges)).A
+    law = fm.linearize(controlled(moving, "drive", proportional)).A
+    assert np.abs(law - spring).max() < 1e-8 * np.abs(spring).max()
+    assert np.abs(fm.linearize(moving).A - spring).max() > 1.0  # and without the law it is another model
+    damper = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((0.0, -STIFFNESS),))
+    lag = fm.linearize(controlled(rest, "drive", LAGGING))
+    assert [name for name, _ in lag.states] == ["drive.rotation", "drive.rotation.rate", "law.state[0]"]
+    assert lag.A[2] == pytest.approx([1 / LAG, 0.2, -1 / LAG], abs=1e-9)
+    assert lag.A[1, 2] == pytest.approx(fm.linearize(controlled(rest, "drive", damper)).A[1, 1], rel=1e-9)
