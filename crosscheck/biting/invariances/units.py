@@ -25,6 +25,7 @@ from flexmb.scene.schema import Load, ModalState, Scene, Waiver
 from flexmb.scene.tree import coordinates
 from flexmb.scene.units import split_unit
 from flexmb.surrogate import modal_points
+from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import compile
 from flexmb.typing import Real
 
@@ -105,6 +106,7 @@ def _undetermined(scene: Scene) -> set[str]:
         return set()
     with general_kernels():
         system = compile(scene)
+        assert isinstance(system, ClosedSystem)  # it has closures
         determined = system.determined_loads(system.initial_state)
     parts = ("torque", slice(0, 3)), ("force", slice(3, 6))
     return {f"load:{name}.{part}" for name, known in determined.items() for part, at in parts if not known[at].all()}
