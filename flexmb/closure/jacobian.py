@@ -16,7 +16,7 @@ import numpy as np
 
 from flexmb.closure.dynamics import rhs
 from flexmb.closure.factor import solve
-from flexmb.closure.tables import Closed, ClosureConstants
+from flexmb.closure.tables import ClosureConstants
 from flexmb.closure.tangent import ClosureTangentWorkspace, closure_tangent_workspace, evaluate
 from flexmb.entry.tangent import TangentWorkspace, tangent_workspace
 from flexmb.jit.bundle import bundle

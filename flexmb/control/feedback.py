@@ -83,8 +83,8 @@ class Feedback:
     def begin(self, begin: Starting, clock: Clock, accuracy: Accuracy, linear: Linear | None) -> Begun:
         """A run, whose controllers start as the scene says, or as they were where a run ended.
 
-        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone: what
-        they put out is remembered, or zero.
+        linear: of the motion alone, for a method that linearises. Instants that were due before the start are gone:
+        what they put out is remembered, or zero.
         """
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)

@@ -98,7 +98,7 @@ def test_a_stiff_loop_takes_a_fraction_of_the_steps(method):
     assert np.abs(done.loads["loop"][1:] - load).max() < 0.2 * np.abs(load).max()
     assert done.statistics.accepted_steps < explicit.statistics.accepted_steps / 8
     assert done.statistics.evaluations < explicit.statistics.evaluations / 6
-    assert 0 < done.statistics.jacobians
+    assert done.statistics.jacobians > 0
 
 
 def pendulum(how: str) -> s.Scene:
