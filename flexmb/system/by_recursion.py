@@ -42,9 +42,7 @@ def _linear(system: Mechanics) -> Linear:
 
 
 def _route(system: Mechanics) -> Route:
-    return Route(
-        lambda: _fresh(system), articulated.rhs, coordinates.project, linear=lambda *_: _linear(system)
-    )
+    return Route(lambda: _fresh(system), articulated.rhs, coordinates.project, linear=lambda *_: _linear(system))
 
 
 def _closed_motion(closures: Closures, t: float, y: Real) -> ClosedMotion:

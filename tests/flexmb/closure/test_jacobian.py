@@ -29,8 +29,9 @@ def connected() -> s.Scene:
     scene.revolute("pivot", "ground", "rocker", parent_position=(m.GRASHOF.ground, 0.0, 0.0), angle=rocker)
     scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
     scene.spring_damper("strut", "ground", "coupler", node_b="tip", free_length=0.8, stiffness=40.0, damping=3.0)
-    springs = np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0])
-    scene.bushing("mount", "crank", "rocker", stiffness=springs, damping=0.1 * np.eye(6))
+    scene.bushing(
+        "mount", "crank", "rocker", stiffness=np.diag([1.0, 2.0, 3.0, 4.0, 5.0, 6.0]), damping=0.1 * np.eye(6)
+    )
     scene.angular_spring("coil", "pivot", rest=0.1, stiffness=3.0, stiffening=(0.0, 8.0), damping=0.2)
     scene.angular_friction("bearing", "pin", sliding=0.3, smoothing=0.5)
     return scene.scene()
