@@ -48,7 +48,7 @@ def resting(system: System, guess: State) -> State:
     try:
         here = _look(loop, equations.on_functions(start), loop.initial)
         for _ in range(STEPS):
-            inverse: Real = np.linalg.pinv(here.derivative, RANK)
+            inverse = np.asarray(np.linalg.pinv(here.derivative, RANK), float)
             step = -inverse @ here.left
             if np.abs(step).max(initial=0.0) <= CONVERGED:
                 return _if_nothing_is_left(system, here)

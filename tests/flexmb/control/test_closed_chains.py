@@ -175,3 +175,10 @@ def test_a_controlled_chain_has_the_linear_model_of_its_motion() -> None:
     assert [name for name, _ in lag.states] == ["drive.rotation", "drive.rotation.rate", "law.state[0]"]
     assert lag.A[2] == pytest.approx([1 / LAG, 0.2, -1 / LAG], abs=1e-9)
     assert lag.A[1, 2] == pytest.approx(fm.linearize(controlled(rest, "drive", damper)).A[1, 1], rel=1e-9)
+
+
+@pytest.mark.parametrize("method", ["radau5", "exponential", "generalised_alpha"])
+def test_methods_with_jacobians_refuse_continuous_controllers_of_closed_chains(method: Any) -> None:
+    settings: dict[str, Any] = {"step": 1e-3} if method == "generalised_alpha" else {}
+    with pytest.raises(NotImplementedError, match='does not know continuous controllers of closed chains, as "law"'):
+        fm.simulate(controlled(GRASHOF, "drive", PD), 0.1, method, **settings)
