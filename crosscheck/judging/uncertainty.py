@@ -21,20 +21,15 @@ the fall q foretells, e_3 <= S/q e_2. With e_2 <= d_23 + e_3, that is
 
     U = S/(q - S) d_23,        at most 3 d_23.
 
-By the differences alone, S is `EVEN_SPREAD` and q the lesser of d_12 / d_23 and the tolerances' ratio; U is at least
-d_23, because errors may have stopped to fall and the differences do not show it. The evaluations N show it, if they are
-counted. Where they grow by no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap):
-U = SPREAD d_23. Else p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. A p beyond
-`LARGEST_ORDER_IN_WORK`, which no method has, shows nothing. Neither do evaluations whose growth beside the
-tolerance's, in logarithms, is more than `MUCH_MORE` times the growth before: error control fights round-off that the
-scene magnifies. Otherwise U may be less than d_23, with S = `SPREAD` and for q the least of
-
-- the fall that was seen, d_12 / d_23, and the ratio of the tolerances;
-- that ratio, divided by as much as the fall seen exceeds it: what fell too far by chance falls too little next;
-- (N_3 / N_2)^p.
-
-Four efforts tell p twice. Where both agree within a factor of `SAME_ORDER` errors fall evenly: S is EVEN_SPREAD, and a
-fall beyond the tolerances' ratio is no chance. The spreads are those of the library, see docs/verdicts.md.
+At q the lesser of d_12 / d_23 and the tolerances' ratio, S is `SPREAD`. U is at least d_23, because errors may have
+stopped to fall and the differences do not show it. The evaluations N show it, if they are counted. Where they grow by
+no more than `HARDLY_MORE`, something else rules the steps (stability, the samples, a leap): U = `UNRULED` d_23. Else
+p = log(d_12 / d_23) / log(N_2 / N_1) is the order in the mean step. One p may be chance, as errors at the kinks of a
+stop are; four efforts tell it twice. Where both agree within a factor of `SAME_ORDER`, and neither is beyond
+`LARGEST_ORDER_IN_WORK`, which no method has, errors fall evenly: U may be less than d_23, q being the least of
+d_12 / d_23 and (N_3 / N_2)^p. Not so where evaluations grow much more than before, beside the tolerance, in
+logarithms by `MUCH_MORE`: error control fights round-off that the scene magnifies. The spreads are those of the
+library, see docs/verdicts.md.
 
 **Round-off.** N evaluations, each with relative rounding errors of size eps and random sign, add up to about
 eps sqrt(N) times the size of the signal (Henrici 1962); a systematic growth beyond that shows in the differences. The
@@ -61,8 +56,8 @@ SAFETY = 1.25
 UNPROVEN_SAFETY = 3.0
 RUNGS = 4  # of a ladder that can count
 ORDER_BAND = 0.1
-SPREAD = 15.0
-EVEN_SPREAD = 10.0
+SPREAD = 10.0
+UNRULED = 15.0
 SAME_ORDER = 1.25
 LARGEST_ORDER_IN_WORK = 12.0
 HARDLY_MORE = 1.03  # evaluations at the finer of two tolerances, over those at the coarser
@@ -216,35 +211,31 @@ def _by_tolerances(rungs: Sequence[RungSignal], gaps: Sequence[Real]) -> Bound:
     growth = [fine / coarse if coarse > 0 else np.nan for coarse, fine in pairwise(work)]
     if any(more <= HARDLY_MORE for more in growth[-2:]):
         why = "as a finer one took hardly more evaluations"
-        return SPREAD, gaps[-1], f"{SPREAD:g} x the difference of the two finest tolerances, {why}", None
+        return UNRULED, gaps[-1], f"{UNRULED:g} x the difference of the two finest tolerances, {why}", None
     seen = sizes[-2] / sizes[-1] if sizes[-1] > 0.0 else np.inf
     before, ratio = (coarse.effort / fine.effort for coarse, fine in pairwise(rungs[-3:]))
-    factor = max(1.0, _after_scatter(min(seen, ratio), EVEN_SPREAD))
+    factor = max(1.0, _after_scatter(min(seen, ratio)))
     if growth[-1] <= growth[-2] ** (MUCH_MORE * np.log(ratio) / np.log(before)):
-        factor = min(factor, _after_scatter(*_foretold(sizes, growth, ratio)))
+        factor = min(factor, _after_scatter(_foretold(sizes, growth)))
     return factor, gaps[-1], f"{factor:.2g} x the difference of the two finest tolerances", None
 
 
-def _foretold(sizes: Sequence[float], growth: Sequence[float], ratio: float) -> tuple[float, float]:
-    """How far evaluations foretell that the error falls at the last effort, and how that scatters.
+def _foretold(sizes: Sequence[float], growth: Sequence[float]) -> float:
+    """How far evaluations foretell that the error falls at the last effort; 1, not at all, where they tell no order.
 
     `sizes` of the differences, `growth` of the evaluations, which leads from each difference to the next; its last one
-    leads to the finest effort. `ratio` of the two finest tolerances. A fall of 1 is none: evaluations were not counted
-    or tell no order.
+    leads to the finest effort.
     """
     falls = [wide / near if near > 0.0 else np.inf for wide, near in pairwise(sizes)]
     orders = [
         float(np.log(fall) / np.log(more)) if fall > 1.0 and more > 1.0 else np.inf
         for fall, more in zip(falls, growth, strict=False)
     ]
-    if not orders[-1] <= LARGEST_ORDER_IN_WORK:
-        return 1.0, SPREAD
-    fall = min(falls[-1], ratio, growth[-1] ** orders[-1])
-    if len(orders) > 1 and max(orders) <= SAME_ORDER * min(orders):
-        return fall, EVEN_SPREAD
-    return min(fall, ratio * ratio / falls[-1]), SPREAD
+    if len(orders) < 2 or not max(orders) <= min(LARGEST_ORDER_IN_WORK, SAME_ORDER * min(orders)):
+        return 1.0
+    return min(falls[-1], float(growth[-1] ** orders[-1]))
 
 
-def _after_scatter(fall: float, spread: float) -> float:
-    """Bound of e_3 over d_23, if e_3 is at most spread/fall times e_2 <= d_23 + e_3."""
-    return UNPROVEN_SAFETY if fall <= spread else min(UNPROVEN_SAFETY, spread / (fall - spread))
+def _after_scatter(fall: float) -> float:
+    """Bound of e_3 over d_23, if e_3 is at most SPREAD/fall times e_2 <= d_23 + e_3."""
+    return UNPROVEN_SAFETY if fall <= SPREAD else min(UNPROVEN_SAFETY, SPREAD / (fall - SPREAD))
