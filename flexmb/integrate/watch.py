@@ -36,11 +36,12 @@ _NOWHERE, _PASSES, _TURNS = range(3)  # what becomes of a level in a step
 class Watch(NamedTuple):
     """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
-    side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of a signal that is
-    at its level where a run begins, the side that it came from, else 0. still (k,): what moves by less within a step is
-    at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at which a run
-    paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level, its side at
-    the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are watched.
+    side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of what is at its
+    level where a run begins and may go either way, the side that it came from, else 0. still (k,): what moves by less
+    within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at
+    which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level,
+    its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are
+    watched.
     look(t, y, signal, constants) finds all signals and returns a status code.
     """
 
@@ -166,7 +167,7 @@ def meets(problem, watch, step, ends):
 
 @helper
 def _leave(watch, i, change, value):
-    """The side on which signal i leaves its level, by its first change in a step or, at rest, where it drifts to.
+    """The side on which i leaves its level, by its first change in a step or, at rest, where it drifts to.
 
     What drifts beyond the level from rest comes to it again.
     """
@@ -258,7 +259,8 @@ def _beyond(within, i):
     is on the way back: then the side is that beyond the level from now on.
     """
     watch, low, high = within.watch, within.step.start, within.step.end
-    narrow, side = _NARROW * (high - low), watch.side[i]
+    least = 4.0 * (np.nextafter(high, math.inf) - high)  # between times that rounding tells apart
+    narrow, side = max(_NARROW * (high - low), least), watch.side[i]
     while high - low > narrow:
         middle = 0.5 * (low + high)
         status, one = _value_at(within, i, middle - 0.5 * narrow)

@@ -81,7 +81,7 @@ class EventfulRun:
                 return self._ended(self._last(raw, ends)), raw
             names = [event.name for event in watched]
             side_of = dict(zip(names, self._sides_after(watched, levels, y), strict=True))
-            came_of = dict(zip(names, self._came(watched, levels), strict=True))
+            came_of = dict(zip(names, self._came(watched, levels, y), strict=True))
             self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
             watched = self._watched
             anew = zip(watched, self._sides(watched, y), strict=True)
@@ -195,15 +195,22 @@ class EventfulRun:
             for event in watched
         ]
 
-    def _came(self, watched: Sequence[SceneEvent], levels: Watch | None) -> list[int]:
-        """From which side signals came to the levels at which they are; 0 for others."""
+    def _came(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
+        """From which side what is at its level came, where its rate does not tell where it goes on to; 0 for others."""
         return [
-            int(levels.side[i]) if levels is not None and levels.found[i] and self._is_signal(event) else 0
+            int(levels.side[i]) if levels is not None and levels.found[i] and self._stays(event, y) else 0
             for i, event in enumerate(watched)
         ]
 
+    def _stays(self, event: SceneEvent, y: Real) -> bool:
+        """Whether the next step sees on which side of its level something is: a signal, or what is left at rest."""
+        if self._is_signal(event):
+            return True
+        rate = self._situation.rate_of(event.watch)
+        return rate is not None and y[rate] == 0.0 and not self._situation.is_held(event.watch)
+
     def _sides_after(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
-        """After an event. What was found at its level is beyond it, or back where it does not go on; held at it: 0."""
+        """After an event. What was found at its level is beyond it, or back where it does not go on; else at it: 0."""
         sides = self._sides(watched, y)
         for i, event in enumerate(watched):
             came = int(levels.side[i]) if levels is not None else 0
@@ -212,7 +219,8 @@ class EventfulRun:
             if levels is not None and levels.found[i]:
                 rate = self._situation.rate_of(event.watch)
                 goes_on = rate is None or -came * y[rate] > 0.0
-                sides[i] = 0 if self._situation.is_held(event.watch) else -came if goes_on else came
+                is_at_it = self._situation.is_held(event.watch) or self._stays(event, y)
+                sides[i] = 0 if is_at_it else -came if goes_on else came
             elif sides[i] == 0:
                 sides[i] = came
         return sides
