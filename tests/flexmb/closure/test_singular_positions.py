@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import flexmb
-from flexmb.closure.branch import turned_over
+from flexmb.closure import branch
 from flexmb.closure.tables import GROUP
 from flexmb.scene import build
 from flexmb.scene import schema as s
@@ -168,8 +168,9 @@ def test_as_many_modes_across_the_plane_as_rows_make_a_loop_singular():
 
 @pytest.mark.parametrize("turned", [0.0, 0.4, 0.6, 1.0])
 @pytest.mark.parametrize("row", [0, 1])
-def test_what_has_turned_over(row, turned):
+def test_what_has_turned_over(row, turned, monkeypatch):
     """The judge by itself: 60 degrees are the limit, and what is not a number is not the same branch."""
+    monkeypatch.setattr(branch, "along", branch.along.py_func)
 
     def found(basis: np.ndarray) -> int:
         groups = np.zeros(2, GROUP).view(np.recarray)
@@ -178,7 +179,7 @@ def test_what_has_turned_over(row, turned):
         cw = SimpleNamespace(
             basis=np.append(ahead, basis), former=np.append(ahead, former), rank=[2, 2], chosen=[1, 3, 4, 7]
         )
-        return int(turned_over.py_func(SimpleNamespace(group=groups), cw))
+        return int(branch.turned_over.py_func(SimpleNamespace(group=groups), cw))
 
     basis, angle = np.eye(2, 3), np.radians(59.0 + 2.0 * turned)
     basis[row] = np.cos(angle) * basis[row] + np.sin(angle) * np.array([0.0, 0.0, 1.0])
