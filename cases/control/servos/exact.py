@@ -32,17 +32,18 @@ def turned(angle, rate, torque, damping, span):
     return angle + final * span + (rate - final) * TABLE / damping * (1.0 - decay), final + (rate - final) * decay
 
 
-def table(stamps):
-    """Angle and rate at whole milliseconds; controllers act in the order of the scene, what waits is applied first."""
+def table(times):
+    """Angle and rate; controllers act at whole milliseconds, in the order of the scene, what waits is applied first."""
+    stamps = np.floor(1e3 * times + 1e-6).astype(int)
     angle, rate, now = 0.2, 0.5, 0
     filtered, smooth, scheduled, waiting_brake, brake = 0.0, 0.0, 0.0, 0.0, 0.0
     integral, before, aim, waiting_aim = 0.0, course(0.0) - angle, 0.0, 0.0
     found = []
     for ms in range(stamps[-1] + 1):
         if ms > now:
-            damping = DAMPING if now < GREASED_MS else GREASED
             angle, rate = turned(angle, rate, aim - brake, damping, 1e-3)
             now = ms
+        damping = DAMPING if now < GREASED_MS else GREASED
         if ms % 100 == 30:
             aim = waiting_aim
         if ms > 0 and ms % 50 == 0:
@@ -59,8 +60,8 @@ def table(stamps):
             waiting_aim = min(max(asked, -LIMIT), LIMIT)
             integral += PERIOD * (KI * error + (waiting_aim - asked) / (KP / KI))
             before = error + np.exp(-PERIOD / FILTER) * (before - error)
-        if ms == stamps[len(found)]:
-            found.append((angle, rate))
+        while len(found) < len(times) and ms == stamps[len(found)]:
+            found.append(turned(angle, rate, aim - brake, damping, times[len(found)] - 1e-3 * ms))
     return np.array(found).T
 
 
@@ -102,7 +103,7 @@ def pointer(times):
 def exact(times):
     """Motion of rim and tip, energies, and the work of motors, brakes and impulses, at `times` (s), World axes, SI."""
     channels, energy = {}, {}
-    motions = {"rim": (table(np.rint(1e3 * times).astype(int)), RIM, 0.0 * PLACE), "tip": (pointer(times), TIP, PLACE)}
+    motions = {"rim": (table(times), RIM, 0.0 * PLACE), "tip": (pointer(times), TIP, PLACE)}
     for name, ((angle, rate), radius, place) in motions.items():
         along = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
         across = np.column_stack([-np.sin(angle), np.cos(angle), 0.0 * angle])
