@@ -46,8 +46,12 @@ HALF = 0.5
 
 
 def watch_steps(chain):
-    """Let steps fail that are too long near a singular position: of a method whose errors do not shorten them."""
-    chain.cw.resolved[0] = RESOLVED
+    """Let steps fail that are too long near a singular position: of a method whose errors do not shorten them.
+
+    Not where closures are stabilised: there steps are those that the user gave, also where these make gaps grow.
+    """
+    if chain.cw.gain[0] == 0.0:
+        chain.cw.resolved[0] = RESOLVED
 
 
 @helper
