@@ -15,7 +15,7 @@ from flexmb.control.tangent import jacobian
 from flexmb.control.user import Called
 from flexmb.control.wiring import numbers_of, widest, wired
 from flexmb.entry.observation import sense_markers
-from flexmb.integrate.problem import Accuracy, Clock, Leaping, Linear, Problem, StiffProblem, problem, stiff_problem
+from flexmb.integrate.problem import Accuracy, Clock, Linear, Problem, StiffProblem, problem, stiff_problem
 from flexmb.integrate.watch import Watch
 from flexmb.jit.direct import address, addresses
 from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR, pointer
@@ -69,7 +69,7 @@ class Feedback:
             )
         if algorithm.observing is not None and not plant.scene.closures:
             where[a.OBSERVING], *_ = addresses(algorithm.observing, NOTHING, constants, workspace, self._outputs)
-        self._leaps = route.leaping is not None
+        self._leaping = route.leaping
         if route.leaping is not None:
             where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
             where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
@@ -111,7 +111,8 @@ class Feedback:
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
-        leaps = Leaping(leaping.back, leaping.leap) if self._leaps else None
+        of_motion = self._leaping
+        leaps = of_motion and of_motion._replace(back=leaping.back, leap=leaping.leap)
         if linear is not None:
             if made.continuous[0]:
                 linear = linear._replace(jacobian=jacobian, exact=made, tangent=self._tangent(linear, len(y)))
