@@ -35,7 +35,7 @@ def turned(angle, rate, torque, damping, span):
 def table(times):
     """Angle and rate; controllers act at whole milliseconds, in the order of the scene, what waits is applied first."""
     stamps = np.floor(1e3 * times + 1e-6).astype(int)
-    angle, rate, now = 0.2, 0.5, 0
+    angle, rate, now, damping = 0.2, 0.5, 0, DAMPING
     filtered, smooth, scheduled, waiting_brake, brake = 0.0, 0.0, 0.0, 0.0, 0.0
     integral, before, aim, waiting_aim = 0.0, course(0.0) - angle, 0.0, 0.0
     found = []

@@ -5,7 +5,7 @@ const SHORTEST_LOOP_S = 4, LONGEST_LOOP_S = 12, FAR = 4; // a motion this many b
 const VIEW_DEG = 32;
 const SIGNS = { play: "M3 1 L14 8 L3 15 Z", pause: "M2 1 H6 V15 H2 Z M10 1 H14 V15 H10 Z" };
 const BODIES = ["#1d69b1", "#d1495b", "#2a9d6f", "#c38600", "#7c52b6", "#0f8b8d", "#a74b40", "#556984", "#b917a1", "#497215"];
-const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#e07b00", "#ffa940"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges" };
+const CONNECTORS = { spring: ["#2b2b2b", "#e0e0e0"], mount: ["#d97500", "#ffa940"] }, NAMES_OF = { spring: "springs", mount: "bushings, springs in hinges" };
 const TURNS = 7, PER_TURN = 8; // of the coil that a spring is drawn as
 const AXES = ["#d43c3c", "#3a8f3e", "#2f74c9"], TRAIL_TONE = "#d1495b";
 

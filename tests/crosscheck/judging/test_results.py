@@ -150,9 +150,8 @@ def test_an_effort_before_the_last_three_narrows_u_and_is_not_needed() -> None:
     runs = four_tolerances()
     difference = 1e-4 - 1e-6
     assert one(runs).uncertainty(TIP).value == pytest.approx(10.0 / 90.0 * difference, rel=0.05)
-    narrow = 15.0 / 85.0 * difference
     for lost in (ended(runs[0], "crashed"), msgspec.structs.replace(runs[0], channels={})):
-        assert one([lost, *runs[1:]]).uncertainty(TIP).value == pytest.approx(narrow, rel=0.05)
+        assert one([lost, *runs[1:]]).uncertainty(TIP).value == pytest.approx(difference, rel=0.05)
 
 
 def test_spatial_doubt_keeps_the_order_and_ends_at_its_largest() -> None:

@@ -185,7 +185,10 @@ def test_colours_stand_out(scheme: str) -> None:
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("script", ["charts.js", "scene.js"])
 def test_curves_and_bodies_stand_out(script: str, scheme: str) -> None:
-    drawn = set(re.findall(r"#[0-9a-f]{6}", str(source(script))))
+    text = str(source(script))
+    pairs = re.findall(r'\["(#[0-9a-f]{6})", "(#[0-9a-f]{6})"\]', text)  # one for each scheme
+    of_both = set(re.findall(r"#[0-9a-f]{6}", text)) - {colour for pair in pairs for colour in pair}
+    drawn = of_both | {pair[["light", "dark"].index(scheme)] for pair in pairs}
     assert len(drawn) > 10
     for colour in drawn:
         assert contrast(colour, schemes()[scheme]["page"]) >= 3.0, colour
