@@ -87,7 +87,7 @@ def _count_rows(system: ClosedSystem, t: float, motion: Real) -> None:
     try:
         system.initial_state  # noqa: B018 - counts them
     except ClosureError:
-        system.begin_at(t, motion)
+        system._begin_at(t, motion)
 
 
 def _named(system: System, t: float, values: Values) -> State:

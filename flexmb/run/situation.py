@@ -170,7 +170,7 @@ class Situation:
         before, self.system = self.system, assembled(scene)
         self._built.append(self.system)
         if isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem):
-            self.system.begin_at(t, y, before)
+            self.system._begin_at(t, y, before)
 
     def _state(self, t: float, y: Real) -> State:
         return self.system.state(y[: self.system.nq].copy(), y[self.system.nq : -1].copy(), t)

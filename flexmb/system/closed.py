@@ -73,7 +73,7 @@ class ClosedSystem(System):
         self.initial_state  # noqa: B018 - counts them
         return self.closures.rank
 
-    def begin_at(self, t: float, y: Real, before: ClosedSystem | None = None) -> None:
+    def _begin_at(self, t: float, y: Real, before: ClosedSystem | None = None) -> None:
         """Go on at y = [q, u, work], which closes all closures, where the scene's own values may not.
 
         The independent rows are those of the scene before, of as many prescribed speeds, or are counted there.

@@ -52,6 +52,9 @@ WITHOUT_PART = {
     "flexmb.surrogate": "makes scenes, as plan",
     "flexmb.scene.check": "refuses scenes, and changes none",
     "flexmb.scene.build": "makes scenes",
+    "flexmb.scene.collecting": "makes scenes",
+    "flexmb.scene.connecting": "makes scenes",
+    "flexmb.scene.feeding_back": "makes scenes",
     "flexmb.scene.options": "makes scenes",
     "flexmb.scene.files": "reads scenes",
 }
