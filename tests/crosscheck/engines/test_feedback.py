@@ -35,8 +35,8 @@ def test_the_native_engine_runs_them() -> None:
     assert support_of(NativeEngine(), rotor(LAW)).kind == "exact"
 
 
-def test_implicit_methods_refuse_continuous_ones() -> None:
-    assert "continuous controllers" in support_of(radau5(), rotor(LAW)).reason
+def test_implicit_methods_take_continuous_ones() -> None:
+    assert support_of(radau5(), rotor(LAW)).kind == "exact"
 
 
 def test_a_signal_is_no_profile() -> None:

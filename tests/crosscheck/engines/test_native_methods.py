@@ -34,7 +34,7 @@ def test_the_finest_effort_of_each_agrees_with_dop853(name):
     assert np.array_equal(same.markers["centre"].position, done.markers["centre"].position)
 
 
-def test_closures_are_refused_with_the_engine_that_has_them():
+def test_every_method_takes_closures():
     loop = (
         SceneBuilder("loop")
         .rigid_body("rod", mass=1.0, com=(0.5, 0, 0), inertia=(0.1, 0.1, 0.1), nodes={"far": (1.0, 0.0, 0.0)})
@@ -43,6 +43,4 @@ def test_closures_are_refused_with_the_engine_that_has_them():
         .scene()
     )
     for name in METHODS:
-        support = engine(name).supports(loop)
-        assert support.kind == "no"
-        assert "closures are for engine native" in support.reason
+        assert engine(name).supports(loop).kind == "exact"
