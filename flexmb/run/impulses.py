@@ -11,16 +11,17 @@ closures that the motion does not determine, those of redundant rows, the least.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from flexmb.closure.factor import DEPENDENT
-from flexmb.closure.impulses import RowMotion
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State, pack
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.closure.impulses import RowMotion
 
 AT_REST = 2.0**-40  # of the speeds before
 REACHED = 1e-6  # of the largest speed: what is left of a change that closures do not allow is more
@@ -48,7 +49,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     """
     prescribed = np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist()
     places = sorted({*prescribed, *speeds})
-    rows = RowMotion(system.closures, state.t, pack(state)) if isinstance(system, ClosedSystem) else None
+    rows = _rows(system, state) if system.scene.closures else None
     along = np.eye(system.nu)[places] if rows is None else np.vstack([np.eye(system.nu)[places], rows.jacobian])
     change = -along @ state.u
     change[: len(places)] = [speeds.get(j, state.u[j]) - state.u[j] for j in places]
@@ -67,6 +68,15 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     return Struck(
         u, dict(zip(places, held.tolist(), strict=True)), 0.5 * float(held @ (u[places] + state.u[places])), closures
     )
+
+
+def _rows(system: System, state: State) -> RowMotion:
+    """Of all closures."""
+    from flexmb.closure.impulses import RowMotion  # a tree needs none of it
+    from flexmb.system.closed import ClosedSystem
+
+    assert isinstance(system, ClosedSystem)
+    return RowMotion(system.closures, state.t, pack(state))
 
 
 def _sizes(half: Real, coordinates: int) -> Real:

@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flexmb.closure.closures import ClosureError
 from flexmb.control.memory import LoopMemory
 from flexmb.integrate.memory import Memory
 from flexmb.run.restart import Restart
 from flexmb.scene.problems import closest
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State, pack
@@ -75,15 +73,19 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
         raise ValueError(f'the run that is taken up was of scene "{restart.scene.name}" with other contents{remedy}')
     y = restart.memory.y.copy()
     t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
-    if isinstance(system, ClosedSystem):
+    if system.scene.closures:
         _count_rows(system, t, motion)
     return Beginning(
         system.layout.known(t, np.r_[motion[:-1], 0.0]), y, restart.taken_up(), restart.controllers
     )
 
 
-def _count_rows(system: ClosedSystem, t: float, motion: Real) -> None:
+def _count_rows(system: System, t: float, motion: Real) -> None:
     """Of a scene that events have left, with hinges that are held, the run itself may know the only closed state."""
+    from flexmb.closure.closures import ClosureError  # a tree needs none of it
+    from flexmb.system.closed import ClosedSystem
+
+    assert isinstance(system, ClosedSystem)
     try:
         system.initial_state  # noqa: B018 - counts them
     except ClosureError:

@@ -28,7 +28,6 @@ from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import assembled
 from flexmb.system.mechanics import Precision
 from flexmb.system.tree_system import System
@@ -143,12 +142,16 @@ def _again(system: System, t_end: float, settings: Settings, **same: Any) -> Tra
 def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method) -> None:
     """NotImplementedError where a method that linearises finds no Jacobian."""
     others = " or ".join(f'"{name}"' for name, each in INTEGRATORS.items() if not each.linearises)
-    if isinstance(system, ClosedSystem) and system.closures.at_rest:
-        raise NotImplementedError(
-            f'method "{method}" needs Jacobians, which closed chains have none of where a body is of level "ruthless", '
-            f'as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its inertia is not where '
-            f'closures join it; use level "linear" or a better one, or method {others}'
-        )
+    if system.scene.closures:
+        from flexmb.system.closed import ClosedSystem  # a tree needs none of it
+
+        assert isinstance(system, ClosedSystem)
+        if system.closures.at_rest:
+            raise NotImplementedError(
+                f'method "{method}" needs Jacobians, which closed chains have none of where a body is of level '
+                f'"ruthless", as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its inertia '
+                f'is not where closures join it; use level "linear" or a better one, or method {others}'
+            )
     continuous = [each.name for each in system.scene.controllers if each.period_s is None]
     if continuous and system.scene.closures:
         raise NotImplementedError(

@@ -18,7 +18,6 @@ from flexmb.scene.hinges import LinearCoordinate
 from flexmb.scene.schema import Scene, SceneEvent, Wheel
 from flexmb.scene.tree import Coordinate, rate_name, scalar_paths
 from flexmb.scene.values import changed_at
-from flexmb.system.closed import ClosedSystem
 from flexmb.system.compile import assembled
 from flexmb.system.tree_system import System
 from flexmb.tables.state import State
@@ -169,7 +168,10 @@ class Situation:
                 return
         before, self.system = self.system, assembled(scene)
         self._built.append(self.system)
-        if isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem):
+        if scene.closures:
+            from flexmb.system.closed import ClosedSystem  # a tree needs none of it
+
+            assert isinstance(self.system, ClosedSystem) and isinstance(before, ClosedSystem)
             self.system._begin_at(t, y, before)
 
     def _state(self, t: float, y: Real) -> State:
