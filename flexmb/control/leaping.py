@@ -11,7 +11,7 @@ Where controllers are too fast for this, by themselves or through the motion, or
 is used, and the run ends before the singular position with the status of one.
 """
 
-from math import inf, sqrt
+from math import inf, nan, sqrt
 
 import numpy as np
 
@@ -27,12 +27,12 @@ from flexmb.tables.status import OK
 # What is wanted of speeds and of controllers' states, relative: less than the tightest usual tolerance, 1e-10.
 WANTED = 2.0**-34
 # The longest leap takes 2^-9 of the time in which a mechanism moves as far as it is large. Drives that change as fast as
-# it moves are then wrong by as much at first, and speeds by 2^-18: so often by a factor of `TURNED` makes `WANTED`.
+# it moves are then wrong by as much at first, and speeds by 2^-18: so often by a factor of `FED_BACK` makes `WANTED`.
 TURNS = 4
-TURNED = 2.0**-4
-# Speeds across the branch, relative: a gap of 2^-50 is 2^-37 of the position across it at a distance of 2^-13, and as
-# much over 2^-13 of its speed. What is off by this comes nearer to the branch again the further the mechanism goes.
-ACROSS = 2.0**-24
+FED_BACK = 2.0**-4
+# What rounding makes of speeds across the branch, relative: a gap of 2^-50 is 2^-37 of the position across it at a
+# distance of 2^-13, and as much over 2^-13 of its speed, 2^-24, times a few for long chains. Controllers see it.
+ACROSS = 2.0**-20
 # Parts of a leap in which states are integrated at first. A limit that is reached within one spoils the average of a
 # drive by 2^-15 of its change, which is 2^-33 of speeds at most.
 PARTS = 32
@@ -96,22 +96,22 @@ def _put(of_motion, y):
 @helper
 def _follow(step, y, dy, y_new, dy_new, s):
     """y_new and dy_new with controllers, from those of the motion under what was driven before; whether they settle."""
-    before, change = np.empty(y.shape[0]), inf
+    effect, former = inf, np.empty(s.drive.shape[0])
     for i in range(s.y.shape[0] - 1, y.shape[0] - 1):
         y_new[i], dy_new[i] = y[i], dy[i]
+    for d in range(former.shape[0]):
+        s.driven[3, d] = s.function[s.drive[d].function].data[0]
     for turn in range(TURNS + 1):
+        copy(s.driven[3], former)
         if not _carry(step, y, dy, y_new, dy_new, s) or _arrive(step.end, y_new, dy_new, s) != OK:
             return False
-        if turn > 0:
-            change, last = _change(before, y_new, s), change
-            if not change <= TURNED * last + ACROSS:
-                return False
-            if change <= WANTED:
-                break
-        if turn < TURNS:
-            copy(y_new, before)
-            if _move(step, y, dy, y_new, dy_new, s) != OK:
-                return False
+        effect, last = _effect(step, former, dy_new, s), effect
+        if not effect <= FED_BACK * (last + ACROSS):
+            return False
+        if effect <= WANTED:
+            break
+        if turn < TURNS and _move(step, y, dy, y_new, dy_new, s) != OK:
+            return False
     return True
 
 
@@ -156,7 +156,7 @@ def _carry_in(parts, step, y, dy, y_new, dy_new, s):
                 if p == 0 and stage == 0:
                     s.driven[0, d] = value
                 s.driven[3, d] = value
-        if not _is_slow(k, x, part, m, s):
+        if not _is_slow(k, x, part, parts * part, m, s):
             return False
         for i in range(m, n - 1):
             x[i] += part / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
@@ -166,7 +166,7 @@ def _carry_in(parts, step, y, dy, y_new, dy_new, s):
 
 
 @helper
-def _is_slow(k, x, part, m, s):
+def _is_slow(k, x, part, h, m, s):
     """Whether the second and third rates in a part are close: of each controller, they differ by its states alone."""
     for i in range(s.controller.shape[0]):
         o = s.controller[i]
@@ -175,7 +175,7 @@ def _is_slow(k, x, part, m, s):
             for j in range(m + o.x, m + o.x + o.states):
                 left += (part * (k[2, j] - k[1, j])) ** 2
                 change += (part * (k[1, j] - k[0, j])) ** 2
-                size += x[j] ** 2
+                size += x[j] ** 2 + (h * k[0, j]) ** 2
             if not left <= SLOW**2 * change + WANTED**2 * size:
                 return False
     return True
@@ -201,6 +201,20 @@ def _arrive(t, y, dy, s):
     give(s.y, s.state, s, y)
     give(s.dy, s.change, s, dy)
     return status
+
+
+@helper
+def _effect(step, former, dy, s):
+    """What the change of drives does to speeds in the leap, relative to them: at its end, where dy is the slope."""
+    for d in range(former.shape[0]):
+        s.function[s.drive[d].function].data[0] = former[d]
+    if _slope_beside(step.end, s) != OK:
+        return nan
+    change, size, m = 0.0, 0.0, s.y.shape[0] - 1
+    for i in range(m - s.rates.shape[0], m):
+        change += (dy[i] - s.dy[i]) ** 2
+        size += s.y[i] ** 2
+    return (step.end - step.start) * sqrt(change / size)
 
 
 @helper
@@ -231,13 +245,3 @@ def _move(step, y, dy, y_new, dy_new, s):
         j = i if i < m else n - 1
         y_new[j] = y[j] + h * total[j]
     return OK
-
-
-@helper
-def _change(before, y, s):
-    """Of the speeds since the turn before, relative to all of them."""
-    change, size, m = 0.0, 0.0, s.y.shape[0] - 1
-    for i in range(m - s.rates.shape[0], m):
-        change += (y[i] - before[i]) ** 2
-        size += y[i] ** 2
-    return sqrt(change / size)

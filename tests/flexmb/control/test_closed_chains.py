@@ -39,7 +39,7 @@ def controlled(scene: fm.Scene, hinge: str, *parts: Any) -> fm.Scene:
         if each.name == hinge else each
         for each in scene.hinges
     )  # fmt: skip
-    kinds = fm.StateSpace | fm.Pid | fm.UserLaw
+    kinds = fm.StateSpace | fm.Pid | fm.UserLaw | fm.GainTable
     return msgspec.structs.replace(
         scene, hinges=hinges, controllers=tuple(each for each in parts if isinstance(each, kinds)),
         sensors=(
@@ -47,6 +47,16 @@ def controlled(scene: fm.Scene, hinge: str, *parts: Any) -> fm.Scene:
             *(each for each in parts if not isinstance(each, kinds)),
         ),
     )  # fmt: skip
+
+
+def single() -> fm.Scene:
+    """One body with the inertia and weight of one window."""
+    return (
+        fm.SceneBuilder("one", gravity=(0.0, -9.81, 0.0))
+        .rigid_body("bar", mass=4.0, com=(0.5, 0.0, 0.0), inertia=np.full(3, 2.0 / 3.0))
+        .revolute("foot 0", "ground", "bar", angle=0.5 * np.pi, rate=-2.0)
+        .scene()
+    )
 
 
 def turn(count: int, law: str, times: Any, speed: float = 2.0) -> Any:
@@ -99,13 +109,7 @@ def test_sampled_controllers_in_windows(settings: str) -> None:
     """Against one body with the inertia and weight of the windows, under the same law."""
     scene = windows(1, SAMPLED)
     run = fm.simulate(scene, 2.0, samples=41, **RUNS[settings])
-    single = (
-        fm.SceneBuilder("one", gravity=(0.0, -9.81, 0.0))
-        .rigid_body("bar", mass=4.0, com=(0.5, 0.0, 0.0), inertia=np.full(3, 2.0 / 3.0))
-        .revolute("foot 0", "ground", "bar", angle=0.5 * np.pi, rate=-2.0)
-        .scene()
-    )
-    alone = fm.simulate(controlled(single, "foot 0", SAMPLED), 2.0, samples=41, rtol=1e-12)
+    alone = fm.simulate(controlled(single(), "foot 0", SAMPLED), 2.0, samples=41, rtol=1e-12)
     assert run.finished and run.q[-1, 0] != pytest.approx(0.5 * np.pi)
     assert np.abs(feet(run, scene, 1) - alone.q).max() < 1e-8
 
@@ -122,12 +126,43 @@ def test_without_leaps_there_is_no_way_through(monkeypatch: pytest.MonkeyPatch) 
     assert not run.finished and run.stopped_at < 0.5
 
 
+def derivative(filter_s: float) -> fm.Pid:
+    return fm.Pid(name="law", inputs=("angle",), kp=3.0, kd=0.4, filter_s=filter_s)
+
+
+def test_a_filter_that_follows_at_once_is_carried_along() -> None:
+    """It settles in a hundredth of a leap, and long before it: what it leaves to be integrated is smooth."""
+    run = fm.simulate(windows(1, derivative(1e-5)), 0.6, samples=13)
+    alone = fm.simulate(controlled(single(), "foot 0", derivative(1e-5)), 0.6, samples=13)
+    assert run.finished and run.q[-1, 0] < 0.0
+    assert np.abs(feet(run, windows(1, PD), 1) - alone.q).max() < 1e-8
+
+
+def ringing(speed: float, size: float) -> fm.StateSpace:
+    """A torque that swings whatever the motion is."""
+    return fm.StateSpace(
+        name="law", inputs=("angle",), A=((0.0, speed), (-speed, 0.0)), B=((0.0,), (0.0,)), C=((1.0, 0.0),),
+        initial=(size, 0.0),
+    )  # fmt: skip
+
+
 def test_controllers_that_are_faster_than_any_leap_end_the_run() -> None:
-    """Never wrong and finished: the filter settles in a hundredth of a leap."""
-    law = fm.Pid(name="law", inputs=("angle",), kp=3.0, kd=0.4, filter_s=1e-5)
-    run = fm.simulate(windows(1, law), 0.6, rtol=1e-6, samples=13)
+    """Never wrong and finished: it swings a hundred times in a leap, before which its method takes long steps."""
+    run = fm.simulate(windows(1, ringing(1e5, 0.1)), 0.6, "exponential", rtol=1e-6, samples=13)
     assert run.status is Status.CLOSURE_SINGULAR
-    assert 0.45 < run.stopped_at < 0.5
+    assert 0.45 < run.stopped_at < 0.55
+
+
+CUT = fm.GainTable(name="law", inputs=("angle",), points=(0.0, 3e-4), values=(2.0, 3.0))
+
+
+@pytest.mark.parametrize("law", [ringing(2.5e3, 2.0), CUT], ids=["swinging", "cut off"])
+def test_what_swings_or_comes_to_a_limit_in_a_leap_acts_by_its_average(law: Any) -> None:
+    """Against one body under the same law: a torque that swings in the time of a leap, and one at a limit in it."""
+    alone = fm.simulate(controlled(single(), "foot 0", law), 1.0, samples=21, rtol=1e-12)
+    run = fm.simulate(windows(1, law), 1.0, samples=21)
+    assert run.finished and run.q[-1, 0] < -1.0, run.message
+    assert np.abs(feet(run, windows(1, PD), 1) - alone.q).max() < 2e-8
 
 
 GRASHOF = m.four_bar(gravity=-9.81)
