@@ -26,8 +26,8 @@ from flexmb.tables.status import OK
 
 # What is wanted of speeds and of controllers' states, relative: less than the tightest usual tolerance, 1e-10.
 WANTED = 2.0**-34
-# The longest leap takes 2^-9 of the time in which a mechanism moves as far as it is large. Drives that change as fast as
-# it moves are then wrong by as much at first, and speeds by 2^-18: so often by a factor of `FED_BACK` makes `WANTED`.
+# The longest leap takes 2^-9 of the time in which a mechanism moves as far as it is large. Drives that change as fast
+# as it moves are then wrong by as much at first, and speeds by 2^-18: `FED_BACK` so often makes `WANTED` of it.
 TURNS = 4
 FED_BACK = 2.0**-4
 # What rounding makes of speeds across the branch, relative: a gap of 2^-50 is 2^-37 of the position across it at a

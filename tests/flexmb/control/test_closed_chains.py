@@ -93,6 +93,35 @@ def test_controlled_windows_pass_where_all_bars_lie_on_one_line(count: int, kind
         assert np.abs(run.signals["law"][:, 0] + STIFFNESS * known[2]).max() < 1e-7
 
 
+def crank_turn(rate: float, times: Any) -> Any:
+    """Angle of a crank of 0.5 m whose rod is as long, under the lagging law: Lagrange's equation."""
+    r, slider = 0.5, 0.4
+    bar = 0.78 * r
+    turning = 2.0 * bar * r**2 / 12.0
+
+    def slope(t: float, y: Any) -> Any:
+        c, s = r * np.cos(y[0]), r * np.sin(y[0])
+        bodies = (bar, -0.5 * s, 0.5 * c), (bar, -1.5 * s, 0.5 * c), (slider, -2.0 * s, 0.0)  # mass, d(x, y)/dangle
+        bends = (-0.5 * c, -0.5 * s), (-1.5 * c, -0.5 * s), (-2.0 * c, 0.0)
+        inertia = turning + sum(mass * (x**2 + z**2) for mass, x, z in bodies)
+        change = sum(mass * (x * dx + z * dz) for (mass, x, z), (dx, dz) in zip(bodies, bends, strict=True))
+        weight = -9.81 * sum(mass * z for mass, _, z in bodies)
+        torque = -STIFFNESS * y[2]
+        return [y[1], (weight + torque - change * y[1] ** 2) / inertia, (y[0] - y[2]) / LAG + 0.2 * y[1]]
+
+    return solve_ivp(slope, (0.0, times[-1]), [1.3, rate, 0.0], "DOP853", times, rtol=1e-13, atol=1e-13).y[0]
+
+
+@pytest.mark.parametrize("settings", RUNS)
+def test_a_controlled_crank_turns_through_where_its_rod_lies_on_it(settings: str) -> None:
+    """Accelerations depend on speeds here; the rod passes the crank back and forth."""
+    scene = controlled(m.slider_crank(0.5, 0.5, angle=1.3, rate=12.0), "drive", LAGGING)
+    run = fm.simulate(scene, 1.0, samples=21, **RUNS[settings])
+    assert run.finished, run.message
+    assert np.sum(np.diff(np.sign(np.cos(run.q[:, 0]))) != 0.0) >= 2
+    assert np.abs(run.q[:, 0] - crank_turn(run.u[0, 0], run.t)).max() < 1e-9
+
+
 @pytest.mark.parametrize("settings", ["dop853", "rk4"])
 def test_a_filter_as_short_as_a_leap_is_followed_through_it(settings: str) -> None:
     """A derivative filtered by 2 ms, where leaps take one."""

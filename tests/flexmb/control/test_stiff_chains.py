@@ -11,6 +11,7 @@ import pytest
 
 import flexmb as fm
 from flexmb.control.feedback import Feedback
+from flexmb.control.loop import project
 from flexmb.control.tangent import jacobian
 from flexmb.tables.status import OK
 from tests.bounds import observed_order
@@ -43,6 +44,7 @@ LAWS = {"pd": (PD,), "lagging": (LAGGING,), "markers": SEEN, "accelerometer": FE
 def test_the_jacobian_is_that_of_the_closed_loop_of_the_chain(kind: str) -> None:
     """Beside closed states too, where differences are taken."""
     loop, moving, y, _held = posed(controlled(GRASHOF, "drive", *LAWS[kind]))
+    project(0.3, y, loop)  # the chain chooses its rows
     found, expected = np.empty((len(y), len(y))), by_differences(loop, y)
     assert jacobian(0.3, y, found, loop, moving) == OK
     assert np.abs(found - expected).max() < 1e-7 * np.abs(expected).max()
@@ -52,10 +54,10 @@ def test_the_jacobian_is_that_of_the_closed_loop_of_the_chain(kind: str) -> None
 
 @pytest.mark.parametrize("kind", LAWS)
 def test_methods_with_jacobians_agree_with_one_without(kind: str) -> None:
-    scene = controlled(GRASHOF, "drive", *LAWS[kind])
-    known = fm.simulate(scene, 0.5, samples=6, rtol=1e-12, atol=1e-13)
+    scene, t_end = controlled(GRASHOF, "drive", *LAWS[kind]), 0.1 if kind == "loads" else 0.5  # Python finds loads
+    known = fm.simulate(scene, t_end, samples=6, rtol=1e-12, atol=1e-13)
     for method in ADAPTIVE:
-        run = fm.simulate(scene, 0.5, method, samples=6)
+        run = fm.simulate(scene, t_end, method, samples=6)
         assert run.finished and run.statistics.jacobians > 0, run.message
         assert np.abs(run.q - known.q).max() < 1e-8
         assert np.abs(run.signals["law"] - known.signals["law"]).max() < 1e-6 * np.abs(known.signals["law"]).max()
@@ -66,7 +68,7 @@ def test_methods_with_jacobians_agree_with_one_without(kind: str) -> None:
 def test_generalised_alpha_keeps_its_order(law: Any) -> None:
     scene = controlled(GRASHOF, "drive", law)
     known = fm.simulate(scene, 0.5, samples=2, rtol=1e-12, atol=1e-13)
-    steps = 0.5 / 2.0 ** np.arange(8, 12)
+    steps = 0.5 / 2.0 ** np.arange(9, 13)
     runs = [fm.simulate(scene, 0.5, "generalised_alpha", samples=2, step=h) for h in steps]
     for error in (
         [np.abs(run.q[-1] - known.q[-1]).max() for run in runs],
