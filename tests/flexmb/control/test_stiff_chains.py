@@ -19,7 +19,7 @@ from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.control.test_closed_chains import GRASHOF, LAGGING, LOADS, PD, controlled
 from tests.flexmb.control.test_stiff import by_differences, posed
 
-ADAPTIVE = ("radau5", "exponential")
+ADAPTIVE: tuple[Any, ...] = ("radau5", "exponential")
 STIFF = fm.StateSpace(name="law", inputs=("angle", "rate"), D=((-4e4, -4e2),))
 BENDING = m.four_bar(modes=1)
 SEEN = (
@@ -79,11 +79,10 @@ def test_generalised_alpha_keeps_its_order(law: Any) -> None:
 
 @pytest.mark.parametrize("method", ADAPTIVE)
 def test_in_a_chain_a_controller_takes_the_steps_of_the_spring_that_it_stands_for(method: Any) -> None:
-    rotation = GRASHOF.hinges[0].rotation
-    spring = msgspec.structs.replace(rotation, stiffness_Nm_rad=4e4, damping_Nms_rad=4e2)
-    sprung = msgspec.structs.replace(
-        GRASHOF, hinges=(msgspec.structs.replace(GRASHOF.hinges[0], rotation=spring), *GRASHOF.hinges[1:])
-    )
+    drive: Any = GRASHOF.hinges[0]
+    spring = msgspec.structs.replace(drive.rotation, stiffness_Nm_rad=4e4, damping_Nms_rad=4e2)
+    hinges = msgspec.structs.replace(drive, rotation=spring), *GRASHOF.hinges[1:]
+    sprung = msgspec.structs.replace(GRASHOF, hinges=hinges)
     settings: dict[str, Any] = {"rtol": 1e-6, "atol": 1e-8}
     ours = fm.simulate(controlled(GRASHOF, "drive", STIFF), 0.3, method, **settings)
     passive = fm.simulate(sprung, 0.3, method, **settings)
