@@ -42,7 +42,9 @@ from flexmb.tables.status import NOT_CONVERGED, OK, STEP_TOO_SMALL
 _GROW = 8.0  # strongest growth of a step
 _KEEP = 1.2  # a growth below this is not worth new factors
 _SAME = 1e-9  # relative difference of steps that share factors
-_SLOW = 1e-3  # a contraction above this asks for a new Jacobian
+_SLOW, _POOR = 1e-3, 0.03  # a contraction above this asks for a new Jacobian, after three iterations or more; after two
+_CONTRACTION = 0.15  # of Newton's method, which steps aim at where it bounds them
+_CUT = 0.7  # a step for which it failed becomes shorter by this at least
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
 
 
@@ -138,10 +140,32 @@ def recall(memory, s, counts):
 
 
 @helper
+def by_contraction(rate):
+    """New step over old that brings the contraction of Newton's method to what steps aim at.
+
+    Where stiff forces turn with the motion, as in closed chains, they turn within a step as well, which the Jacobian of
+    its start does not know. That bounds the step, where errors alone would ask for one that fails.
+    """
+    return math.sqrt(_CONTRACTION / rate) if rate > 0.0 else _GROW
+
+
+@helper
 def after_acceptance(h, length, cut, factor, rejected, worn):
     """Step after one of this length: a change that is not worth new factors is none, unless they are `worn` anyway."""
     factor = min(1.0, factor) if rejected else min(_GROW, factor)
     return next_step(h, length, 1.0 if 1.0 <= factor < _KEEP and not worn else factor, cut)
+
+
+@helper
+def after_rejection(length, status, factor, rate, fresh):
+    """(Step, whether with a new Jacobian) after a trial of this length that was not accepted."""
+    if status == OK:
+        return length * max(SHRINK, min(1.0, factor)), False
+    if status == NOT_CONVERGED and not fresh:
+        return length, True  # the Jacobian may be too old, not the step too long
+    if status == NOT_CONVERGED and rate > 0.0:
+        return length * max(SHRINK, min(_CUT, by_contraction(rate))), False
+    return length * retreat(status), not fresh
 
 
 @helper
@@ -170,7 +194,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
     The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where Newton's method does not
-    converge, an old Jacobian is renewed, then the step is halved.
+    converge, an old Jacobian is renewed, then the step is shortened by how far it is from converging.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
@@ -227,7 +251,8 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                     if status != OK:
                         return status, t_at
                 store_samples(problem, step, ends, state_at, s, samples, run)
-                renew = iterations > 2 and rate > _SLOW
+                renew = rate > (_SLOW if iterations > 2 else _POOR)
+                factor = min(factor, by_contraction(rate))
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)
                 copy(s.y_new, y)
@@ -237,14 +262,9 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 counts[ACCEPTED] += 1
                 fresh, rejected = False, False
             else:
-                if status == OK:
-                    h = length * max(SHRINK, min(1.0, factor))
-                elif status == NOT_CONVERGED and not fresh:
-                    h, renew = length, True  # the Jacobian may be too old, not the step too long
-                else:
-                    h, renew = length * retreat(status), not fresh
+                h, renew = after_rejection(length, status, factor, rate, fresh)
                 counts[REJECTED] += 1
-                rejected = True
+                rejected = rejected or h < length
         h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
         renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
     if not kept:
