@@ -1,4 +1,4 @@
-"""Derivatives of everything observable of a closed chain, at given closure loads and by these, exact to round-off.
+"""Derivatives of what sensors read of a closed chain, at given closure loads and by these, exact to round-off.
 
 As `flexmb.closure.tangent` has those of the accelerations. How the loads change with the motion is for
 `flexmb.linear.observed` to find, so that the rows' accelerations stay zero.
@@ -6,8 +6,7 @@ As `flexmb.closure.tangent` has those of the accelerations. How the loads change
 
 from flexmb.closure.rows import load_on_b
 from flexmb.closure.tangent import evaluate
-from flexmb.entry.observation import observe
-from flexmb.entry.observed_tangent import read_outputs
+from flexmb.entry.observed_tangent import read_outputs, sense
 from flexmb.jit.duals import rate, seeded
 from flexmb.jit.kernel import helper, kernel
 from flexmb.jit.lanes import LANES
@@ -43,15 +42,15 @@ def closed_observed_jacobian(t, y, load, J, closures, c, w, cc, cw, out):
                 cw.row[at - columns].load = seeded(cw.row[at - columns].load, lane)
         status = evaluate(c, w, cc, cw)
         if status == OK:
-            observe(c, w, out)
+            sense(c, w, out)
         for lane in range(count):
             at = first + lane
             if at < columns:
                 w.state[w.column[at]] = y[w.column[at]]
                 _read_column(J, w.column[at], lane, cc, cw, out)
             else:
-                cw.row[at - columns].load = load[at - columns]
                 _read_column(J, n + at - columns, lane, cc, cw, out)
+                cw.row[at - columns].load = load[at - columns]
         if status != OK:
             return status
     _store_loads(closures, cc, cw)

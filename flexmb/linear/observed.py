@@ -1,4 +1,4 @@
-"""Exact derivatives of everything observable, along the coordinates of a linear model and by generalised forces.
+"""Exact derivatives of what sensors read, along the coordinates of a linear model and by generalised forces.
 
 At given closure loads f of a closed chain they come from dual numbers, and so do those by f (of trees there are none).
 With Y the change of [q, u] by [xi; du] and g'' = K f + c the rows' accelerations, which stay zero,
@@ -28,7 +28,7 @@ LARGE = 2.0**20
 
 
 class Observed(NamedTuple):
-    """A row (E,) of everything observable, laid out as `Observation.columns`, and its derivatives: by the state
+    """A row (E,) of what sensors read, laid out as `Observation.columns`, and its derivatives: by the state
     [xi; du] (E,2f) of a linear model, by generalised forces along the n free speeds (E,n)."""
 
     value: Real
@@ -65,7 +65,7 @@ def observed(equations: Equations, at: Variations) -> Observed:
 
 
 def values(equations: Equations, state: State) -> Real:
-    """The row (E,) of everything observable at a state; DynamicsError where there are no accelerations."""
+    """The row (E,) of what sensors read at a state; DynamicsError where there are no accelerations."""
     return _free(equations, state).value
 
 
@@ -124,7 +124,7 @@ def _of_rates(equations: Equations, state: State, rates: Real) -> dict[str, Real
     out = system._out
     out.rates[:] = rates
     system._observe_motion(state.t, y)
-    return {"rates": rates, "loads": loads, "markers": out.markers.copy(), "wheel_loads": out.wheel_loads.copy()}
+    return {"rates": rates, "loads": loads, "markers": out.markers.copy()}
 
 
 def _inverse(K: Real, rank: int) -> Real:

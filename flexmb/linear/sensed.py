@@ -1,4 +1,4 @@
-"""What sensors say in a linear model: their derivatives, exact, from those of everything observable."""
+"""What sensors say in a linear model: their derivatives, exact, from those of what they read."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ _UNITS = {
 
 
 class Along(NamedTuple):
-    """A row of everything observable, its change (E,k) along k directions, and that of [q, u] (nq+nu,k)."""
+    """A row of what sensors read, its change (E,k) along k directions, and that of [q, u] (nq+nu,k)."""
 
     value: Real
     change: Real
@@ -104,7 +104,7 @@ def _change(system: System, sensor: Sensor, at: Along) -> Real:
 def _part(system: System, at: Along, name: str, i: int) -> tuple[Real, Real]:
     """Value and change of item i of a part of the row."""
     place, shape = system._observation.columns[name]
-    return at.value[place].reshape(shape)[i], at.change[place].reshape(*shape, -1)[i]
+    return at.value[place].reshape(shape)[i], at.change[place].reshape(*shape, at.change.shape[1])[i]
 
 
 def _of_marker(sensor: MarkerSensor, value: Real, change: Real, gravity: Real) -> Real:
