@@ -170,9 +170,10 @@ class Feedback:
                 raise trouble
 
     @property
-    def reads_at_once(self) -> bool:
-        """Whether a continuous controller reads what depends on forces of the same instant."""
-        return self._wiring.reads_at_once
+    def continuous_states(self) -> list[int]:
+        """Places in `Loop.state` of the continuous controllers' states x, in their order."""
+        rows = [row for row in self._wiring.controller if not row["sampled"]]
+        return [int(row["state"]) + j for row in rows for j in range(int(row["states"]))]
 
     @property
     def driven(self) -> list[int]:

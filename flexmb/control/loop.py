@@ -98,6 +98,14 @@ def look(t, y, signal, s):
     return status
 
 
+@kernel
+def respond(t, s):
+    """What continuous controllers make of the signals of sensors and of their states, as they are; a status code."""
+    status = _act_continuously(t, s)
+    _drive(s)
+    return status
+
+
 @helper
 def settle(t, y, s):
     """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""
