@@ -112,9 +112,15 @@ def settle(t, y, s):
     take(y, s)
     nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
     if s.address[a.BACK] and real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS])) == t:
-        for i in range(s.state.shape[0]):
-            s.good[i] = s.state[i]
+        keep_good(s)
     give(s.y, s.state, s, y)
+
+
+@helper
+def keep_good(s):
+    """States of controllers, for those beside the last good state of the motion."""
+    for i in range(s.state.shape[0]):
+        s.good[i] = s.state[i]
 
 
 @helper
