@@ -50,8 +50,8 @@ _AXES = "Of the scene in World axes, of bodies in their own frames; inertia abou
 def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Table:
     table = Table(title=f"\nMass properties of {scene}", title_justify="left", box=None, padding=(0, 2, 0, 0))
     table.caption, table.caption_justify = _AXES, "left"
-    table.add_column("with what it carries")
-    for heading in ("mass kg", "centre m", "inertia kg m², xx, yy, zz, xy, xz, yz"):
+    table.add_column("with what\nit carries")
+    for heading in ("mass kg", "centre m", "inertia kg m²\nxx, yy, zz,\nxy, xz, yz"):
         table.add_column(heading, justify="left")
     for name, found in rows:
         J = found.inertia_in_body
@@ -61,8 +61,9 @@ def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Table:
 
 
 def _numbers(values: Iterable[float]) -> str:
-    """Six digits; what rounding has left of the largest is zero."""
+    """Six digits, three in a line; what rounding has left of the largest is zero."""
     found = [float(value) for value in values]
     largest = max(map(abs, found))
     kept = [0.0 if abs(value) < 1e-14 * largest else value for value in found]
-    return ", ".join(f"{value:.6g}" for value in kept)
+    words = [f"{value:.6g}" for value in kept]
+    return ",\n".join(", ".join(words[i : i + 3]) for i in range(0, len(words), 3))

@@ -16,19 +16,15 @@ from flexmb.tables.status import OK
 
 
 @kernel
-def closed_observed_jacobian(t, y, load, J, closures, c, w, cc, cw, out):
+def closed_observed_jacobian(t, y, J, c, w, cc, cw, out):
     """J (E+nu+6C+G,n+G): derivatives of `every` (E,), `drives`, the loads of closures (C,6) on body_b about B, World
-    axes, and the rows' accelerations, by y = [q, u, work] (n,) and the rows' loads (G,); returns a status code.
-
-    Tables as of `flexmb.closure.tangent.closed_jacobian`. Values are left in `out`, those of the closures' loads in
-    `closures` (C,6).
+    axes, and the rows' accelerations, by y = [q, u, work] (n,) and the rows' loads in cw.row.load (G,); returns a
+    status code. Tables as of `flexmb.closure.tangent.closed_jacobian`. Values are left in `out`.
     """
     n, rows, columns = y.shape[0], cc.row.shape[0], w.column.shape[0]
     w.time[0] = t
     for i in range(n):
         w.state[i] = y[i]
-    for r in range(rows):
-        cw.row[r].load = load[r]
     for i in range(J.shape[0]):
         for j in range(J.shape[1]):
             J[i, j] = 0.0
@@ -50,10 +46,9 @@ def closed_observed_jacobian(t, y, load, J, closures, c, w, cc, cw, out):
                 _read_column(J, w.column[at], lane, cc, cw, out)
             else:
                 _read_column(J, n + at - columns, lane, cc, cw, out)
-                cw.row[at - columns].load = load[at - columns]
+                cw.row[at - columns].load = cw.row[at - columns].load.real
         if status != OK:
             return status
-    _store_loads(closures, cc, cw)
     return OK
 
 
@@ -70,11 +65,3 @@ def _read_column(J, j, lane, cc, cw, out):
     for r in range(cc.row.shape[0]):
         J[first + r, j] = rate(cw.row[r].acceleration, lane)
 
-
-@helper
-def _store_loads(closures, cc, cw):
-    for i in range(cc.closure.shape[0]):
-        tau, f = times6(mat3(cw.closure[i].world, 0), load_on_b(cc, cw, i))
-        for k in range(3):
-            closures[i, k] = tau[k].real
-            closures[i, 3 + k] = f[k].real

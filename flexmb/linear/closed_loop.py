@@ -23,7 +23,7 @@ from flexmb.control.loop import look, project, respond
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.observed import values
-from flexmb.linear.sensed import Along, sensed
+from flexmb.linear.sensed import ChangedRow, sensed
 from flexmb.linear.variations import Equations, equations_of
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
@@ -168,4 +168,4 @@ def _effect(equations: Equations, state: State, driven: Sequence[int]) -> tuple[
         by_drive[:, i] = (values(other, state) - now) / LARGE
     still = np.zeros((system.nq + system.nu, len(driven)))
     rates = by_drive[system._observation.columns["rates"][0]][equations.free]
-    return rates, sensed(system, Along(now, by_drive, still))
+    return rates, sensed(system, ChangedRow(now, by_drive, still))

@@ -93,14 +93,16 @@ class ClosedEquations(Equations):
     def freedom(self) -> int:
         return len(self.free) - self.rank
 
-    @property
-    def tangent_tables(self) -> tuple[Any, ...]:
-        return self.constants, self._w, self._closures.constants[1], self._rows_w
+    def closure_loads(self, state: State) -> tuple[Real, Real]:
+        """The rows' loads (G,), and those of closures (C,6) that they make, on body_b about frame B, World axes."""
+        found = self._closures.motion(state.t, pack(state))
+        return self._closures.row_loads, found.closures
 
-    @property
-    def row_loads(self) -> Real:
-        """(G,) loads of the rows where `rates` was asked for last."""
-        return self._closures.row_loads
+    def with_row_loads(self, load: Real) -> tuple[Any, ...]:
+        """`tangent_tables` and those of the closures, with these loads (G,) of the rows."""
+        self._rows_w.row["load"][:] = 0.0
+        self._rows_w.row["load"][:, 0] = load
+        return self.constants, self._w, self._closures.constants[1], self._rows_w
 
     def row_rates(self, state: State) -> Real:
         """J (G,n): rates of the rows by the free speeds."""

@@ -27,7 +27,7 @@ LARGE = 2.0**20
 """Change of an acceleration whose effect is linear: beside it the rounding of all others is nothing."""
 
 
-class Observed(NamedTuple):
+class ObservedTangent(NamedTuple):
     """A row (E,) of what sensors read, laid out as `Observation.columns`, and its derivatives: by the state
     [xi; du] (E,2f) of a linear model, by generalised forces along the n free speeds (E,n)."""
 
@@ -44,24 +44,24 @@ class _Raw(NamedTuple):
     by_load: Real
 
 
-def observed(equations: Equations, at: Variations) -> Observed:
+def observed(equations: Equations, at: Variations) -> ObservedTangent:
     """At the state of these variations; DynamicsError where there are no accelerations."""
     state, found = at.state, _free(equations, at.state)
     Y, by_force = moving(equations, at), _by_force(equations, state)
     by_state = found.by_y @ Y
     rows, E = found.by_load.shape[1], len(found.value)
     if not rows:
-        return Observed(found.value, by_state, by_force)
+        return ObservedTangent(found.value, by_state, by_force)
     assert isinstance(equations, ClosedEquations)  # it has closures
     K, by_load = found.by_load[E:], found.by_load[:E]
     inverse = _inverse(K, equations.rank)
     loads = -inverse @ by_state[E:]
     if equations.rank < rows:
-        held = equations.row_loads
-        other = _raw(equations, state, held + inverse @ held).by_y[E:] - found.by_y[E:]  # dK K^+ f
+        held, closures = equations.closure_loads(state)
+        other = _raw(equations, state, held + inverse @ held, closures).by_y[E:] - found.by_y[E:]  # dK K^+ f
         loads += (np.eye(rows) - inverse @ K) @ other @ Y
     pushed = -inverse @ equations.row_rates(state) @ np.linalg.inv(equations.mass(state))
-    return Observed(found.value, by_state[:E] + by_load @ loads, by_force + by_load @ pushed)
+    return ObservedTangent(found.value, by_state[:E] + by_load @ loads, by_force + by_load @ pushed)
 
 
 def values(equations: Equations, state: State) -> Real:
@@ -72,18 +72,18 @@ def values(equations: Equations, state: State) -> Real:
 def _free(equations: Equations, state: State) -> _Raw:
     """At a state, under the closure loads that there are."""
     if not isinstance(equations, ClosedEquations):
-        return _raw(equations, state, np.zeros(0))
-    equations.rates(state)  # which finds the loads of the rows
-    return _raw(equations, state, equations.row_loads)
+        return _raw(equations, state, np.zeros(0), np.zeros(0))
+    return _raw(equations, state, *equations.closure_loads(state))
 
 
-def _raw(equations: Equations, state: State, load: Real) -> _Raw:
+def _raw(equations: Equations, state: State, load: Real, closures: Real) -> _Raw:
+    """At a state under loads of the rows (G,), with the loads of closures (C,6) that are theirs."""
     system, y, rows = equations.system, pack(state), len(load)
     observation: Observation = system._observation
     out, E = outputs_tangent(observation.out), observation.width
-    J, closures = np.empty((E + rows, len(y) + rows)), np.zeros((len(system.scene.closures), 6))
+    J = np.empty((E + rows, len(y) + rows))
     if isinstance(equations, ClosedEquations):
-        status = closed_observed_jacobian(state.t, y, load, J, closures, *equations.tangent_tables, out)
+        status = closed_observed_jacobian(state.t, y, J, *equations.with_row_loads(load), out)
     else:
         status = observed_jacobian(state.t, y, J, *equations.tangent_tables, out)
     equations.check(status)

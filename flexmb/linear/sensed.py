@@ -35,7 +35,7 @@ _UNITS = {
 }  # fmt: skip
 
 
-class Along(NamedTuple):
+class ChangedRow(NamedTuple):
     """A row of what sensors read, its change (E,k) along k directions, and that of [q, u] (nq+nu,k)."""
 
     value: Real
@@ -43,7 +43,7 @@ class Along(NamedTuple):
     of_state: Real
 
 
-def sensed(system: System, at: Along) -> Real:
+def sensed(system: System, at: ChangedRow) -> Real:
     """(S,k) change of what all sensors say, in the order of the scene."""
     rows = [np.zeros((0, at.change.shape[1])), *(_change(system, each, at) for each in system.scene.sensors)]
     return np.concatenate(rows)
@@ -76,7 +76,7 @@ def _units(system: System, sensor: Sensor) -> list[str]:
     return ["s"]
 
 
-def _change(system: System, sensor: Sensor, at: Along) -> Real:
+def _change(system: System, sensor: Sensor, at: ChangedRow) -> Real:
     """(width,k) of one sensor."""
     names, k = system._observation.names, at.change.shape[1]
     match sensor:
@@ -101,7 +101,7 @@ def _change(system: System, sensor: Sensor, at: Along) -> Real:
     return np.zeros((2, k))
 
 
-def _part(system: System, at: Along, name: str, i: int) -> tuple[Real, Real]:
+def _part(system: System, at: ChangedRow, name: str, i: int) -> tuple[Real, Real]:
     """Value and change of item i of a part of the row."""
     place, shape = system._observation.columns[name]
     return at.value[place].reshape(shape)[i], at.change[place].reshape(*shape, at.change.shape[1])[i]
@@ -156,6 +156,6 @@ def of_sensors(equations: Equations, at: Variations) -> OfSensors:
     """At the state of these variations; DynamicsError where there are no accelerations."""
     system, found = equations.system, observed(equations, at)
     still = np.zeros((system.nq + system.nu, found.by_force.shape[1]))
-    by_state = sensed(system, Along(found.value, found.by_state, moving(equations, at)))
-    by_force = sensed(system, Along(found.value, found.by_force, still))
+    by_state = sensed(system, ChangedRow(found.value, found.by_state, moving(equations, at)))
+    by_force = sensed(system, ChangedRow(found.value, found.by_force, still))
     return OfSensors([*sensor_names(system)], by_state, by_force)

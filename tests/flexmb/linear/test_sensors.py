@@ -122,6 +122,23 @@ def test_a_controller_that_reads_a_load_through_a_filter() -> None:
     assert model.C[row] == pytest.approx([0.0, 0.0, -3.0], abs=1e-9) and model.D[row, 0] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(("make", "hinge"), [(tree, "elbow"), (four_bar, "pin")])
+def test_the_loop_is_that_of_the_open_model_closed_by_hand(make: Any, hinge: str) -> None:
+    """A motor v = -3 x of a lag x' = -2 x + y, y a force across the hinge that it drives."""
+    law = fm.StateSpace(name="law", inputs=(f"load {hinge}[3]",), A=((-2.0,),), B=((1.0,),), C=((-3.0,),))
+    scene = make()
+    driven = scene.with_values({f"{hinge}.rotation.torque_Nm": fm.ControlSignal(source="law")})
+    found = fm.linearize(msgspec.structs.replace(driven, controllers=(law,)))
+    model = fm.linearize(scene)
+    j = [name for name, _ in model.inputs].index(f"{hinge}.rotation")
+    y = [name for name, _ in model.outputs].index(f"load {hinge}[3]")
+    b, c, d = model.B[:, [j]], model.C[[y]], model.D[y, j]
+    A = np.block([[model.A, -3.0 * b], [c, np.array([[-2.0 - 3.0 * d]])]])
+    assert np.max(np.abs(found.A - A)) <= 1e-9 * np.max(np.abs(A))
+    assert np.max(np.abs(found.B - np.vstack([model.B, model.D[[y]]]))) <= 1e-9 * np.max(np.abs(model.B))
+    assert np.max(np.abs(found.C[y] - np.r_[c[0], -3.0 * d])) <= 1e-9 * np.max(np.abs(c)) and abs(d) > 1e-3
+
+
 def test_markers_at_one_place_have_no_distance_to_differentiate() -> None:
     scene = rotor()
     same = msgspec.structs.replace(scene.markers[0], name="same")

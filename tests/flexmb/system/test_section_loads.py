@@ -183,6 +183,36 @@ def test_stresses_of_a_bent_pulled_and_twisted_beam() -> None:
     np.testing.assert_allclose(found.torsion_stress(2.7e10, 0.02), 2.7e10 * 0.02 * twist / GJ, rtol=bent)
 
 
+def strip(width: float, x: float, height: float = 0.005) -> fm.BeamStation:
+    area = width * height
+    return beam_section(E=E, G=2.7e10, A=area, Iy=area * width**2 / 12, Iz=area * height**2 / 12, rho=RHO, x=x)
+
+
+def test_a_tapered_beam_with_a_load_at_its_tip_and_with_a_mass_there_that_spins() -> None:
+    """Deflection: the integral of F (L - x)^2 / (E I). Tension: what the part beyond x and the tip mass want, w^2 r."""
+    stations = [strip(0.02 * (1.0 - 0.25 * x), x) for x in np.linspace(0.0, LENGTH, 9)]
+    beam = {"length": LENGTH, "elements": 24, "section": stations, "modes": fm.Modes(count=2, static=True)}
+    x, force, rate, mass = np.linspace(0.0, LENGTH, 20001), 1e-3, 5.0, 0.3
+    area = 0.02 * (1.0 - 0.25 * x) * 0.005
+    bent = fm.compile(
+        fm.SceneBuilder("bent").beam("beam", **beam).weld("clamp", "ground", "beam").marker("end", "beam", node="tip")
+        .force("push", "beam", node="tip", direction=(0, 1, 0), function=fm.Constant(value=force)).scene()
+    )  # fmt: skip
+    rest = fm.equilibrium(bent)
+    deflection = np.trapezoid(force * (LENGTH - x) ** 2 / (E * area * 0.005**2 / 12), x)
+    assert bent.evaluate(0.0, rest.q, rest.u).markers["end"].position[1] == pytest.approx(deflection, rel=1e-6)
+    at = np.array([0, 5000, 10000])
+    stress = bent.section_loads(rest, "beam", x[at]).normal_stress(E, y=0.0025, z=0.0)
+    np.testing.assert_allclose(stress, -force * (LENGTH - x[at]) * 0.0025 / (area[at] * 0.005**2 / 12), rtol=1e-5)
+    spun = fm.compile(
+        fm.SceneBuilder("spun").beam("beam", level="stiffened", **beam).revolute("hub", "ground", "beam")
+        .rigid_body("end", mass=mass, inertia=(1e-9, 1e-9, 1e-9)).weld("end", "beam", "end", parent_node="tip").scene()
+    )  # fmt: skip
+    tension = spun.section_loads(fm.steady_spin(spun, "hub", rate).state, "beam", x[at]).axial
+    beyond = [np.trapezoid((RHO * area * rate**2 * x)[i:], x[i:]) for i in at]
+    np.testing.assert_allclose(tension, np.array(beyond) + mass * rate**2 * LENGTH, rtol=1e-5)
+
+
 def test_loads_of_a_free_vibration_converge() -> None:
     """A cantilever let go from its deflection under a tip force F: at first its root has the moment F L, the shear F.
 
