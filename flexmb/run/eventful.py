@@ -18,7 +18,7 @@ from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import EndRun, Impact
+from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
@@ -28,7 +28,11 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
-MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
+# Chattering: so many events in a row between which nothing moves further than the error that is allowed, within this
+# part of a run. They only tell an endless sequence from some events that fall together: the intervals of an endless one
+# shrink by a factor, or to roundings of time, so that it passes any such limit.
+MANY, SHORT = 50, 1e-6
+HARDLY = 16.0  # roundings of time: what follows so soon advances no time
 
 
 def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
@@ -52,7 +56,8 @@ class EventfulRun:
         self._algorithm, self._stabilise = algorithm, stabilise
         self._events = _by_what_they_watch(whole)
         self._happened: list[EventRecord] = []
-        self._paused_at: list[float] = []
+        self._idle: list[float] = []
+        """Times of the last events, between which nothing moved."""
         self._whole: Trajectory | None = None
 
     @property
@@ -71,8 +76,9 @@ class EventfulRun:
                 return self._ended(raw), raw
             y, controlled = self._apart(raw.y)
             arrived = self._arriving(found, watched, levels, y)
-            if not any(isinstance(action, Impact) and action.rests for event in arrived for action in event.actions):
-                self._paused_at.append(raw.t)  # rebounds before a rest come to an end by themselves
+            if self._moved(begin, raw):
+                self._idle.clear()
+            self._idle.append(raw.t)
             for event in arrived:
                 self._happened += self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
@@ -225,10 +231,17 @@ class EventfulRun:
                 sides[i] = came
         return sides
 
+    def _moved(self, begin: Beginning, raw: Raw) -> bool:
+        """Whether speeds at the ends of a piece, or time, lead further than the error that is allowed."""
+        speeds = slice(self.system.nq, self.system.nq + self.system.nu)
+        fastest = max(np.max(np.abs(y[speeds]), initial=0.0) for y in (begin.y, raw.y))
+        lasted = raw.t - begin.state.t
+        return bool(fastest * lasted > self._settings.atol and lasted > HARDLY * np.spacing(abs(raw.t)))
+
     def _chatters(self) -> bool:
-        if len(self._paused_at) < MANY:
+        if len(self._idle) < MANY:
             return False
-        return self._paused_at[-1] - self._paused_at[-MANY] < SHORT * (self._times[-1] - self._times[0])
+        return self._idle[-1] - self._idle[-MANY] < SHORT * (self._times[-1] - self._times[0])
 
     def _last(self, raw: Raw, ends: bool) -> Raw:
         """The state after the last event is an output too."""
@@ -242,6 +255,9 @@ class EventfulRun:
             found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
         if ends:
             found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
+        elif last.status is Status.CHATTERING:
+            names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-MANY:])
+            found = replace(found, message=f"{found.message}; the last were {' and '.join(names)}")
         cost = {name: 0 for name in vars(found.statistics)}
         self._join(replace(found, statistics=replace(found.statistics, **cost)))
         return last

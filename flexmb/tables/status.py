@@ -77,7 +77,8 @@ _ADVICE = {
     ),
     Status.CHATTERING: (
         "events follow each other faster and faster without end: let an `Impact` come to rest (`rests`) or become a "
-        "`Latch`, or take a stiff spring with a damper in place of the stop"
+        "`Latch`, or take a stiff spring with a damper in place of the stop; where it may rest already, a load pulls at "
+        "rest and presses in motion: let it change smoothly"
     ),
     Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",
