@@ -31,7 +31,7 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
+from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.lu import lu_factorise, lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
@@ -358,7 +358,7 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                     step = Interval(t, t + far, last)
                     if watch is not None:
                         ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
-                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                        status, t_at = pause_in_leap(problem, watch, step, ends, samples, run)
                         if status != OK:
                             return status, t_at
                     store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
