@@ -20,7 +20,7 @@ from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.run.within_leaps import AT_SINGULAR_POSITIONS, goes_on, longest_leap, placed
+from flexmb.run.within_leaps import ends_within, goes_on, longest_leap, placed
 from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
@@ -152,6 +152,9 @@ class EventfulRun:
         if early < stop - t and self._is_singular(piece.raw, stop, early):
             piece = self._run_to(stop - early, again, watching, due)
             piece = piece._replace(early=early if piece.raw.t == stop - early else piece.early)
+        elif stop == self._times[-1]:
+            beyond = ends_within(self.system, piece.raw, stop)
+            piece = self._run_to(stop, again, watching, due, beyond) if beyond else piece
         if piece.early:
             self._passed |= {event.name for event in piece.found}
             self._until = piece.raw.t + 2.5 * piece.early
@@ -159,8 +162,9 @@ class EventfulRun:
         return piece
 
     def _run_to(
-        self, stop: float, begin: Beginning, watching: Callable[[Integration], Watch | None], due: Sequence[SceneEvent]
-    ) -> _Piece:
+        self, stop: float, begin: Beginning, watching: Callable[[Integration], Watch | None],
+        due: Sequence[SceneEvent], beyond: float = 0.0,
+    ) -> _Piece:  # fmt: skip
         t = begin.state.t
         start = max(t, self._times[0]) if begin.memory is not None else t
         is_last = stop == self._times[-1]
@@ -168,7 +172,7 @@ class EventfulRun:
         times, early = np.unique([start, *wanted, stop]), 0.0
         with self._integration() as solve:
             levels = watching(solve)
-            raw = integrate(self.system, solve, begin, times, self._left(), levels)
+            raw = integrate(self.system, solve, begin, times, self._left(), levels, not is_last, beyond)
             found = self._found(raw, levels, due if raw.t == stop else ())
             if levels is not None and not all(isinstance(each, EndRun) for event in found for each in event.actions):
                 raw, early = placed(raw, levels, times, self._further, self._speeds)
@@ -181,7 +185,7 @@ class EventfulRun:
         """Whether a singular position is so near (s) to a time that is due that nothing goes on from there."""
         if raw.status is Status.OK:
             return raw.t == due and not goes_on(raw, near, self._further, self._speeds)
-        return raw.status in AT_SINGULAR_POSITIONS and due - raw.t <= near
+        return ends_within(self.system, raw, due) > 0.0
 
     def _further(self, raw: Raw, t: float) -> Raw:
         """On to a time (s), whatever comes to its level."""

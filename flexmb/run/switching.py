@@ -51,10 +51,10 @@ def timing_of(system: System) -> Timing:
     return found
 
 
-def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool) -> Real:
-    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`."""
+def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool, breaks: bool = False) -> Real:
+    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`. breaks: whether one is its end."""
     found = timing_of(system)
-    is_switch = t_end in found.switches
+    is_switch = breaks or t_end in found.switches
     if equal_steps:
         return np.array([*found.between(t_start, t_end), *[t_end] * is_switch, inf])
     return np.array([*found.between(t_start, t_end), t_end, *[t_end] * is_switch])

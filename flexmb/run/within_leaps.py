@@ -14,6 +14,7 @@ import numpy as np
 
 from flexmb.integrate.watch import Watch
 from flexmb.run.propagate import Raw
+from flexmb.run.switching import timing_of
 from flexmb.system.tree_system import System
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -46,6 +47,13 @@ def placed(raw: Raw, levels: Watch, times: Real, further: Further, speeds: slice
         return raw, 0.0
     before = raw.states[times[: len(raw.states)] <= start]
     return raw._replace(states=before, y=levels.before.copy(), t=start), raw.t - start
+
+
+def ends_within(system: System, raw: Raw, t: float) -> float:
+    """How long (s) leaps last near a time that a run did not come to, for a singular position; 0 where they do not, or
+    where the scene's profiles end before."""
+    longest = longest_leap(system, raw) if raw.status in AT_SINGULAR_POSITIONS and system.scene.closures else 0.0
+    return longest if t - raw.t <= longest <= timing_of(system).end - t and longest < np.inf else 0.0
 
 
 def longest_leap(system: System, raw: Raw) -> float:
