@@ -56,8 +56,8 @@ _ADVICE = {
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "
-        "mechanism is too slow, or started too close, for its speed to say along which branch it goes on; start "
-        "elsewhere, or give a body flexibility"
+        "mechanism is too slow, or started too close, for its speed to say along which branch it goes on, or a function "
+        "switches or a controller samples just there; start elsewhere, move that instant, or give a body flexibility"
     ),
     Status.CLOSURE_OPEN: (
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
