@@ -57,7 +57,7 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     size = _sizes(half, len(places))
     moved, _, rank, _ = np.linalg.lstsq((half / size).T, change / size, rcond=DEPENDENT)
     left = np.abs(half.T @ moved - change) / size
-    moving = np.sqrt(state.u @ factors.multiply(state.u))
+    moving = float(np.sqrt(state.u @ factors.multiply(state.u)))
     _refuse_unreached(left, _unavoidable(moved, moving, change[len(places) :] / size[len(places) :]), state)
     impulses = np.linalg.lstsq(half / size, moved, rcond=DEPENDENT)[0] / size
     u = state.u + factors.solve(along.T @ impulses)

@@ -164,7 +164,7 @@ def integrate(
     ends = segment_ends(system, begin.state.t, times[-1] + beyond, method.fixed, breaks)
     counts = np.zeros(COUNTS, np.int64)
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
-    memory = method.memory(len(y)) if begin.memory is None else begin.memory
+    memory: Memory | None = method.memory(len(y)) if begin.memory is None else begin.memory
     out = np.empty((len(times), len(y)))
     if watch is not None and np.any(watch.entry < 0):
         assert solve.feedback is not None  # somebody watches signals

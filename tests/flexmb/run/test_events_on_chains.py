@@ -157,7 +157,7 @@ def turning(event: fm.SceneEvent) -> fm.Scene:
 @pytest.mark.parametrize("level", [0.0, 1e-5, -1e-5, 1e-4, -1e-4])
 @pytest.mark.parametrize("method", METHODS)
 def test_events_at_a_singular_position_happen_at_their_instant_or_told_before_it(method: Any, level: float) -> None:
-    """What changes, latches or turns over does so within a leap; as near the position as 1e-5, where the leap starts."""
+    """What changes, latches or turns over does so within a leap; as near as 1e-5 to the position, where it starts."""
     actions = (SLIGHT, fm.Latch(coordinate=FOOT), fm.Impact(coordinate=FOOT, restitution=0.5))
     for action, after in zip(actions, (-np.pi, 0.0, 0.5 * np.pi), strict=True):
         scene = turning(on(FOOT, level, action))
