@@ -226,6 +226,12 @@ class Closures:
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
         return {closure.name: self._gap(i, "value") for i, closure in enumerate(self.scene)}
 
+    def passing_time(self, t: float, y: Real) -> float:
+        """The least time (s) in which a closure moves as far as it is large; inf at rest."""
+        dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
+        moving = self._own.closure[self._own.closure["speed"] > 0.0]
+        return float(np.min(moving["size"] / moving["speed"], initial=np.inf))
+
     def _gap(self, i: int, key: str) -> tuple[float, float]:
         c = self.constants[1]
         rows = slice(c.closure["row_start"][i], c.closure["row_stop"][i])

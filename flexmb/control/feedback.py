@@ -129,11 +129,13 @@ class Feedback:
         self._only_at(begin)
 
     def accelerations(self, begin: Starting) -> Real:
-        """(nu,) at one state, under what controllers say there."""
+        """(nu,) at one state, under what controllers say there; DynamicsError where there are none."""
         y, nq, nu = self._only_at(begin), self._plant.nq, self._plant.nu
         slope = np.empty(len(y))
-        loop.rhs(begin.state.t, y, slope, self.running, self.running)
+        loop.project(begin.state.t, y, self.running)  # by which closures learn where they are
+        status = loop.rhs(begin.state.t, y, slope, self.running, self.running)
         self.raise_trouble()
+        self._plant._check(status, int(self._tables[1].fault[0]))
         return slope[nq : nq + nu]
 
     def _only_at(self, begin: Starting) -> Real:

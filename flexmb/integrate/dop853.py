@@ -31,9 +31,9 @@ from flexmb.integrate.control import (
 )
 from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, D
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
+from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets, pause
+from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -181,7 +181,7 @@ def pause_within(problem, watch, step, leapt, y, s, samples, run):
     """y at the first level that a step, or a leap, comes to: (CROSSED, the time); (OK, .) where it comes to none."""
     ends, trial = Ends(y, s.k[0], s.y_new, s.k[END]), np.empty(y.shape[0])
     if leapt:
-        return pause(problem, watch, step, ends, in_leap, OK, samples, run)
+        return pause_in_leap(problem, watch, step, ends, samples, run)
     status, some = meets(problem, watch, step, ends)
     if status == OK and some:
         status = interpolant(problem, step, y, s, trial, run[1])

@@ -38,7 +38,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
+from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.settling import prepare_settling, settle
@@ -266,7 +266,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             if accepted:
                 if watch is not None:
                     if leapt:
-                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+                        status, t_at = pause_in_leap(problem, watch, step, ends, samples, run)
                     else:
                         status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
                     if status != OK:

@@ -7,7 +7,8 @@ methods then come closer by shorter steps until the problem itself can leap, fro
 from __future__ import annotations
 
 from flexmb.integrate.control import EVALUATIONS, SAMPLES, copy
-from flexmb.jit.kernel import helper
+from flexmb.integrate.watch import CROSSED, pause
+from flexmb.jit.kernel import helper, sweep
 from flexmb.tables.status import BRANCH_UNKNOWN, CLOSURE_OPEN, CLOSURE_SINGULAR, OK
 
 EVALUATED = 8  # about as often a leap evaluates equations of motion
@@ -45,6 +46,16 @@ def in_leap(problem, step, ends, s, t, result, run):
     """The state within a leap, as `flexmb.integrate.watch` asks for it."""
     cubic(step, ends.y, ends.dy, ends.y_new, ends.dy_new, t, result)
     return OK
+
+
+@sweep
+def pause_in_leap(problem, watch, step, ends, samples, run):
+    """As `flexmb.integrate.watch.pause`; of a leap that comes to a level, watch keeps its times and where it starts."""
+    copy(ends.y, watch.before)
+    status, t = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+    if status == CROSSED:
+        watch.leap[0], watch.leap[1] = step.start, step.end
+    return status, t
 
 
 @helper

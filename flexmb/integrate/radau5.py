@@ -29,7 +29,7 @@ from flexmb.integrate.control import (
 from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
-from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
+from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.lu import lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
 from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
@@ -179,7 +179,7 @@ def leap_over(problem, watch, t, last, ends, samples, run):
     if far > 0.0:
         step = Interval(t, t + far, last)
         if watch is not None:
-            status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+            status, t_at = pause_in_leap(problem, watch, step, ends, samples, run)
             if status != OK:
                 return status, t_at
         store_leapt(step, ends.y, ends.dy, ends.y_new, ends.dy_new, samples[0], samples[1], counts)

@@ -20,7 +20,7 @@ from flexmb.integrate.control import (
     stretch,
 )
 from flexmb.integrate.integrator import Integrator
-from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
+from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.memory import DONE, STRETCH, begin, keep_place
 from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel, written_out
@@ -82,7 +82,7 @@ def _detour(problem, watch, trouble, step, y, scratch, output, run):
             leapt = Interval(t, t + far, last)
             if watch is not None:
                 ends = Ends(y, k[0], trial, k[1])
-                status, t_at = pause(problem, watch, leapt, ends, in_leap, OK, output, run)
+                status, t_at = pause_in_leap(problem, watch, leapt, ends, output, run)
                 if status != OK:
                     return status, t_at
             store_leapt(leapt, y, k[0], trial, k[1], times, out, counts)

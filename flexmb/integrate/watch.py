@@ -41,7 +41,8 @@ class Watch(NamedTuple):
     within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at
     which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level,
     its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are
-    watched.
+    watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before (n,): y at
+    its start.
     look(t, y, signal, constants) finds all signals and returns a status code.
     """
 
@@ -57,6 +58,8 @@ class Watch(NamedTuple):
     after: Index
     reach: Index
     signal: Real
+    leap: Real
+    before: Real
     look: Pointer
 
 
@@ -337,13 +340,14 @@ def _no_signals(t, y, signal, constants):
 
 def watch(
     entries: Sequence[int], levels: Sequence[float], directions: Sequence[int], sides: Sequence[int],
-    came: Sequence[int], still: Sequence[float],
+    came: Sequence[int], still: Sequence[float], size: int,
 ) -> Watch:  # fmt: skip
-    """Of lists of equal lengths; its signals are found by `with_signals`."""
+    """Of lists of equal lengths, for a state of `size` numbers; who has signals gives it a `signal` and a `look`."""
     count = len(entries)
     whole = [np.array(each, np.int64) for each in (entries, directions, sides, came)]
     return Watch(
         whole[0], np.array(levels, float), *whole[1:], np.array(still, float), np.zeros(count, np.int64),
         np.zeros(count), np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(0),
+        np.full(2, math.nan), np.zeros(size),
         pointer(_no_signals, STATUS, REAL, VECTOR, VECTOR, AnyBundle._numba_type_),
     )  # fmt: skip

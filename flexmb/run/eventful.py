@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from dataclasses import replace
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 from msgspec import structs
@@ -18,7 +20,8 @@ from flexmb.run.propagate import Integration, Raw, integrate, integration
 from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.trajectory import Trajectory
-from flexmb.scene.events import EndRun, Impact
+from flexmb.run.within_leaps import ends_within, goes_on, longest_leap, placed
+from flexmb.scene.events import EndRun
 from flexmb.scene.schema import SceneEvent
 from flexmb.scene.tree import watchable
 from flexmb.system.algorithm import Algorithm
@@ -28,7 +31,11 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
-MANY, SHORT = 50, 1e-6  # so many events within this part of a run are chattering
+# Chattering: so many events in a row between which nothing moves further than the error that is allowed, within this
+# part of a run. They only tell an endless sequence from some events that fall together: the intervals of an endless one
+# shrink by a factor, or to roundings of time, so that it passes any such limit.
+MANY, SHORT = 50, 1e-6
+HARDLY = 16.0  # roundings of time: what follows so soon advances no time
 
 
 def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
@@ -37,6 +44,19 @@ def _by_what_they_watch(system: System) -> tuple[SceneEvent, ...]:
         return ()
     names = watchable(system.scene)
     return tuple(structs.replace(event, watch=names.get(event.watch, event.watch)) for event in system.scene.events)
+
+
+class _Piece(NamedTuple):
+    """From one event to the next: how it ended, what was watched, its trajectory, what is found at its end.
+
+    early (s): how long before the instant of what is found it ended.
+    """
+
+    raw: Raw
+    levels: Watch | None
+    part: Trajectory
+    found: list[SceneEvent]
+    early: float
 
 
 class EventfulRun:
@@ -52,7 +72,10 @@ class EventfulRun:
         self._algorithm, self._stabilise = algorithm, stabilise
         self._events = _by_what_they_watch(whole)
         self._happened: list[EventRecord] = []
-        self._paused_at: list[float] = []
+        self._idle: list[float] = []
+        """Times of the last events, between which nothing moved."""
+        self._passed, self._until = set[str](), -np.inf
+        """Names of events that happened before their instant, and the time (s) up to which they are not watched."""
         self._whole: Trajectory | None = None
 
     @property
@@ -65,16 +88,17 @@ class EventfulRun:
         watched = self._watched
         sides, came = self._sides(watched, begin.y), [0] * len(watched)
         while True:
-            raw, stop, levels = self._piece(begin, watched, sides, came)
-            found = self._found(raw, stop, watched, levels)
-            if not found:
+            piece = self._piece(begin, watched, sides, came)
+            raw, levels = piece.raw, piece.levels
+            if not (piece.found or self._is_armed_again(raw)):
                 return self._ended(raw), raw
             y, controlled = self._apart(raw.y)
-            arrived = self._arriving(found, watched, levels, y)
-            if not any(isinstance(action, Impact) and action.rests for event in arrived for action in event.actions):
-                self._paused_at.append(raw.t)  # rebounds before a rest come to an end by themselves
+            arrived = piece.found if piece.early else self._arriving(piece.found, watched, levels, y)
+            if piece.found:
+                self._count_idle(begin, raw)
             for event in arrived:
-                self._happened += self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
+                records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
+                self._happened += [replace(record, early=piece.early) for record in records]
             raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
             ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
             if ends or self._chatters() or raw.t >= self._times[-1]:
@@ -91,12 +115,16 @@ class EventfulRun:
 
     @property
     def _watched(self) -> list[SceneEvent]:
-        return [event for event in self._events if event.watch != "time"]
+        return [event for event in self._armed if event.watch != "time"]
+
+    @property
+    def _armed(self) -> list[SceneEvent]:
+        return [event for event in self._events if event.name not in self._passed]
 
     def _accelerations(self, raw: Raw, t: float, y: Real) -> Real:
         """Under what controllers say where a piece ended, with another motion y = [q, u, work] there."""
         there = raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
-        with integration(self.system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+        with self._integration() as solve:
             assert solve.feedback is not None  # of a scene with stops to rest on
             return solve.feedback.accelerations(self._going_on(there))
 
@@ -112,22 +140,73 @@ class EventfulRun:
 
     def _piece(
         self, begin: Beginning, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int]
-    ) -> tuple[Raw, float, Watch | None]:
+    ) -> _Piece:
         """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
-        t, system = begin.state.t, self._situation.system
+        t, again = begin.state.t, begin._replace(y=begin.y.copy())
+        timed = [event for event in self._armed if event.watch == "time" and t < event.level < self._times[-1]]
+        stop = min([*(event.level for event in timed), *[self._until] * (t < self._until), self._times[-1]])
+        due = [event for event in timed if event.level == stop]
+        watching = partial(self._watch, watched, sides, came)
+        piece = self._run_to(stop, begin, watching, due)
+        early = longest_leap(self.system, piece.raw) if due and self.system.scene.closures else np.inf
+        if early < stop - t and self._is_singular(piece.raw, stop, early):
+            piece = self._run_to(stop - early, again, watching, due)
+            piece = piece._replace(early=early if piece.raw.t == stop - early else piece.early)
+        elif stop == self._times[-1]:
+            beyond = ends_within(self.system, piece.raw, stop)
+            piece = self._run_to(stop, again, watching, due, beyond) if beyond else piece
+        if piece.early:
+            self._passed |= {event.name for event in piece.found}
+            self._until = piece.raw.t + 2.5 * piece.early
+        self._join(piece.part)
+        return piece
+
+    def _run_to(
+        self, stop: float, begin: Beginning, watching: Callable[[Integration], Watch | None],
+        due: Sequence[SceneEvent], beyond: float = 0.0,
+    ) -> _Piece:  # fmt: skip
+        t = begin.state.t
         start = max(t, self._times[0]) if begin.memory is not None else t
-        due = [event.level for event in self._events if event.watch == "time" and t < event.level < self._times[-1]]
-        stop = min([*due, self._times[-1]])
         is_last = stop == self._times[-1]
         wanted = self._times[(self._times >= start) & ((self._times < stop) | is_last)]
-        times = np.unique([start, *wanted, stop])
-        with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
-            levels = self._watch(watched, sides, came, solve)
-            raw = integrate(system, solve, begin, times, self._left(), levels)
+        times, early = np.unique([start, *wanted, stop]), 0.0
+        with self._integration() as solve:
+            levels = watching(solve)
+            raw = integrate(self.system, solve, begin, times, self._left(), levels, not is_last, beyond)
+            found = self._found(raw, levels, due if raw.t == stop else ())
+            if levels is not None and not all(isinstance(each, EndRun) for event in found for each in event.actions):
+                raw, early = placed(raw, levels, times, self._further, self._speeds)
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
-            self._join(observed(system, times[: len(raw.states)][kept], shown, self._algorithm, solve))
-        return raw, stop, levels
+            part = observed(self.system, times[: len(raw.states)][kept], shown, self._algorithm, solve)
+        return _Piece(raw, levels, part, found if part.status is Status.OK else [], early)
+
+    def _is_singular(self, raw: Raw, due: float, near: float) -> bool:
+        """Whether a singular position is so near (s) to a time that is due that nothing goes on from there."""
+        if raw.status is Status.OK:
+            return raw.t == due and not goes_on(raw, near, self._further, self._speeds)
+        return ends_within(self.system, raw, due) > 0.0
+
+    def _further(self, raw: Raw, t: float) -> Raw:
+        """On to a time (s), whatever comes to its level."""
+        begin = self._going_on(raw._replace(y=raw.y.copy()))
+        with self._integration() as solve:
+            nothing = watch((), (), (), (), (), (), self._size(solve))
+            return integrate(self.system, solve, begin, np.array([raw.t, t]), self._left(), nothing)
+
+    def _integration(self) -> AbstractContextManager[Integration]:
+        return integration(self.system, self._algorithm, self._stabilise, self._settings.integrator)
+
+    @property
+    def _speeds(self) -> slice:
+        return slice(self.system.nq, self.system.nq + self.system.nu)
+
+    def _is_armed_again(self, raw: Raw) -> bool:
+        """Whether a piece ended where events are watched again that happened before their instant."""
+        if raw.status is Status.OK and not raw.interrupted and raw.t == self._until < self._times[-1]:
+            self._passed.clear()
+            return True
+        return False
 
     def _left(self) -> Settings:
         """The settings with as many steps as the pieces before have left."""
@@ -136,16 +215,12 @@ class EventfulRun:
         done = self._whole.statistics.accepted_steps + self._whole.statistics.rejected_steps
         return replace(self._settings, max_steps=max(self._settings.max_steps - done, 0))
 
-    def _found(self, raw: Raw, stop: float, watched: Sequence[SceneEvent], levels: Watch | None) -> list[SceneEvent]:
-        """What happens where a piece ended, in the order of the scene."""
-        assert self._whole is not None
-        if raw.status is not Status.OK or self._whole.status is not Status.OK or raw.interrupted:
+    def _found(self, raw: Raw, levels: Watch | None, due: Sequence[SceneEvent]) -> list[SceneEvent]:
+        """What happens where a piece ended, in the order of the scene: what came to its level, and what is due."""
+        if raw.status is not Status.OK or raw.interrupted:
             return []
-        crossed = [watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
-        return [
-            event for event in self._events
-            if event in crossed or (event.watch == "time" and raw.t == stop == event.level < self._times[-1])
-        ]  # fmt: skip
+        crossed = [self._watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
+        return [event for event in self._events if event in crossed or event in due]
 
     def _arriving(
         self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
@@ -185,7 +260,13 @@ class EventfulRun:
                 entries.append(self._situation.places[event.watch])
                 still.append(0.0)
         directions = [DIRECTIONS[event.crossing] for event in watched]
-        return watch(entries, [event.level for event in watched], directions, sides, came, still)
+        levels = [event.level for event in watched]
+        return watch(entries, levels, directions, sides, came, still, self._size(solve))
+
+    def _size(self, solve: Integration) -> int:
+        """Of what is integrated, [q, u, work] or [q, u, x, work]."""
+        controlled = 0 if solve.feedback is None else len(solve.feedback.state_names)
+        return self.system.nq + self.system.nu + controlled + 1
 
     def _sides(self, watched: Sequence[SceneEvent], y: Real) -> list[int]:
         """On which side of its level everything is; 0 at it. Those of signals are seen in the first step."""
@@ -225,10 +306,18 @@ class EventfulRun:
                 sides[i] = came
         return sides
 
+    def _count_idle(self, begin: Beginning, raw: Raw) -> None:
+        """Whether, in a piece that an event ends, neither speeds at its ends nor time lead anywhere."""
+        fastest = max(np.max(np.abs(u), initial=0.0) for u in (begin.state.u, raw.y[self._speeds]))
+        lasted = raw.t - begin.state.t
+        if fastest * lasted > self._settings.atol and lasted > HARDLY * np.spacing(abs(raw.t)):
+            self._idle.clear()
+        self._idle.append(raw.t)
+
     def _chatters(self) -> bool:
-        if len(self._paused_at) < MANY:
+        if len(self._idle) < MANY:
             return False
-        return self._paused_at[-1] - self._paused_at[-MANY] < SHORT * (self._times[-1] - self._times[0])
+        return self._idle[-1] - self._idle[-MANY] < SHORT * (self._times[-1] - self._times[0])
 
     def _last(self, raw: Raw, ends: bool) -> Raw:
         """The state after the last event is an output too."""
@@ -236,12 +325,15 @@ class EventfulRun:
         if not ends and raw.t < self._times[-1]:
             last = last._replace(status=Status.CHATTERING)
         system = self.system
-        with integration(system, self._algorithm, self._stabilise, self._settings.integrator) as solve:
+        with self._integration() as solve:
             if solve.feedback is not None:
                 solve.feedback.look(self._going_on(raw))
             found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
         if ends:
             found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
+        elif last.status is Status.CHATTERING:
+            names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-MANY:])
+            found = replace(found, message=f"{found.message}; the last were {' and '.join(names)}")
         cost = {name: 0 for name in vars(found.statistics)}
         self._join(replace(found, statistics=replace(found.statistics, **cost)))
         return last

@@ -23,8 +23,7 @@ from flexmb.typing import Real
 if TYPE_CHECKING:
     from flexmb.closure.impulses import RowMotion
 
-AT_REST = 2.0**-40  # of the speeds before
-REACHED = 1e-6  # of the largest speed: what is left of a change that closures do not allow is more
+ROUNDING = 2.0**-52
 
 
 class Struck(NamedTuple):
@@ -56,13 +55,15 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     factors = system.factorise(state)
     half = factors.half_solve(along.T)
     size = _sizes(half, len(places))
-    moved = np.linalg.lstsq((half / size).T, change / size, rcond=DEPENDENT)[0]
-    _refuse_unreached(half.T @ moved - change, state)
+    moved, _, rank, _ = np.linalg.lstsq((half / size).T, change / size, rcond=DEPENDENT)
+    left = np.abs(half.T @ moved - change) / size
+    moving = float(np.sqrt(state.u @ factors.multiply(state.u)))
+    _refuse_unreached(left, _unavoidable(moved, moving, change[len(places) :] / size[len(places) :]), state)
     impulses = np.linalg.lstsq(half / size, moved, rcond=DEPENDENT)[0] / size
     u = state.u + factors.solve(along.T @ impulses)
     u[places] = state.u[places] + change[: len(places)]
-    if np.max(np.abs(u), initial=0.0) <= AT_REST * np.max(np.abs(state.u), initial=0.0):
-        u[:] = 0.0  # a mechanism that is stopped altogether: of rounding alone closures would seem to open
+    if rank == system.nu and not np.any(u[places]):
+        u[:] = 0.0  # no freedom is left: of rounding alone closures would seem to open
     held = impulses[: len(places)]
     closures = {} if rows is None else _by_name(system, rows.wrenches(impulses[len(places) :]))
     return Struck(
@@ -90,9 +91,19 @@ def _by_name(system: System, wrenches: Real) -> dict[str, Real]:
     return {closure.name: wrench for closure, wrench in zip(system.scene.closures, wrenches, strict=True)}
 
 
-def _refuse_unreached(left: Real, state: State) -> None:
+def _unavoidable(moved: Real, moving: float, opening: Real) -> float:
+    """What is left of a change that closures allow, as all here in roots of energy; moving: the speeds before.
+
+    Rounding; motions that count as dependent, which do not take part, and move by twice the speeds at most; and by what
+    closures open anyway, which redundant ones need not agree about.
+    """
+    rounding = (len(moved) + len(opening)) * ROUNDING * float(np.linalg.norm(moved))
+    return rounding + 2.0 * DEPENDENT * moving + float(np.linalg.norm(opening))
+
+
+def _refuse_unreached(left: Real, unavoidable: float, state: State) -> None:
     """DynamicsError where closures and drives leave too little freedom for what an event asks for."""
-    if not np.max(np.abs(left), initial=0.0) <= REACHED * np.max(np.abs(state.u), initial=1e-300):
+    if not np.max(left, initial=0.0) <= unavoidable:
         raise DynamicsError(
             f"at t = {state.t:g} s an event asks for a speed that closures and prescribed motions do not allow: the "
             "coordinate has no freedom of its own there; prescribe less, or act on what is free"

@@ -27,7 +27,7 @@ from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
 from flexmb.system.tree_system import System
 from flexmb.tables.arrays import Constants
-from flexmb.tables.status import Status
+from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
 
 if TYPE_CHECKING:
@@ -38,8 +38,8 @@ if TYPE_CHECKING:
 class Raw(NamedTuple):
     """The result of an integrator: states (T, nq+nu+1) at the samples reached, why and when it stopped, its cost.
 
-    y (n,): the last good state; memory, controllers: how it can be taken up there; paused: whether it stopped at a
-    level.
+    y (n,): the last good state; memory, controllers: how it can be taken up there, None where it leapt over its end;
+    paused: whether it stopped at a level.
     """
 
     states: Real
@@ -51,7 +51,7 @@ class Raw(NamedTuple):
     run_s: float
     interrupted: bool
     y: Real
-    memory: Memory
+    memory: Memory | None
     paused: bool = False
     controllers: LoopMemory | None = None
 
@@ -152,13 +152,19 @@ def integration(
 
 
 def integrate(
-    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None
-) -> Raw:
-    """Run over the whole time, after what has to be compiled for it."""
+    system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
+    breaks: bool = False, beyond: float = 0.0,
+) -> Raw:  # fmt: skip
+    """Run over the whole time, after what has to be compiled for it.
+
+    breaks: something is due at its end, where even a method of equal steps has to end one, and every method a leap.
+    beyond (s): how much further it may go, to leap over where it ends.
+    """
     method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
-    ends, counts = segment_ends(system, begin.state.t, times[-1], method.fixed), np.zeros(COUNTS, np.int64)
+    ends = segment_ends(system, begin.state.t, times[-1] + beyond, method.fixed, breaks)
+    counts = np.zeros(COUNTS, np.int64)
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
-    memory = method.memory(len(y)) if begin.memory is None else begin.memory
+    memory: Memory | None = method.memory(len(y)) if begin.memory is None else begin.memory
     out = np.empty((len(times), len(y)))
     if watch is not None and np.any(watch.entry < 0):
         assert solve.feedback is not None  # somebody watches signals
@@ -169,8 +175,10 @@ def integrate(
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
-    controllers = solve.ended()
+    controllers, paused = solve.ended(), status == CROSSED
+    if t > times[-1] and (paused or status == OK):
+        t, y, memory, paused, status = times[-1], out[-1].copy(), None, False, OK
     return Raw(
-        out[: counts[SAMPLES]], Status.OK if status == CROSSED else Status(status), solve.fault, t, counts.tolist(),
-        begun - start, end - begun, interrupted, y, memory, status == CROSSED, controllers,
+        out[: counts[SAMPLES]], Status.OK if paused else Status(status), solve.fault, t, counts.tolist(),
+        begun - start, end - begun, interrupted, y, memory, paused, controllers,
     )  # fmt: skip

@@ -24,6 +24,7 @@ from flexmb.run.restart import Restart
 from flexmb.run.samples import refuse_too_many, sample_times
 from flexmb.run.switching import refuse_times
 from flexmb.run.trajectory import Trajectory
+from flexmb.run.within_leaps import ends_within
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.schema import Scene
 from flexmb.system import algorithms
@@ -114,9 +115,17 @@ def simulate(
         if start is not None and start.status != Status.OK:
             return observed(system, times, _not_begun(begin, start, chosen), algorithm, solve)
         if not system.scene.events:
+            again = begin._replace(y=begin.y.copy())
             raw = integrate(system, solve, begin, times, chosen)
-            trajectory = replace(observed(system, times, raw, algorithm, solve), made_by=made_by)
-    if system.scene.events:
+            trajectory = observed(system, times, raw, algorithm, solve)
+    if not system.scene.events:
+        beyond = ends_within(system, raw, times[-1])
+        if beyond:
+            with integration(system, algorithm, stabilise, chosen.integrator) as solve:
+                raw = integrate(system, solve, again, times, chosen, beyond=beyond)
+                trajectory = observed(system, times, raw, algorithm, solve)
+        trajectory = replace(trajectory, made_by=made_by)
+    else:
         run = EventfulRun(system, times, chosen, algorithm, stabilise)
         trajectory, raw = run(begin)
         system = run.system
@@ -186,7 +195,7 @@ def _not_begun(begin: Beginning, start: Precision, settings: Settings) -> Raw:
 
 
 def _restart(system: System, raw: Raw, method: Method) -> Restart | None:
-    """Of a run that did not fail."""
-    if raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
+    """Of a run that did not fail, nor leap over its end."""
+    if raw.memory is not None and raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
         return Restart(method, system.scene, raw.t, raw.memory, raw.controllers)
     return None

@@ -33,7 +33,8 @@ class EventRecord:
 
     impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
     (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
-    (6,) [N m s; N s] on body_b about frame B, World axes; the least, where redundant closures leave it open.
+    (6,) [N m s; N s] on body_b about frame B, World axes; the least, where redundant closures leave it open. early (s):
+    by how much it happened before its instant, not zero only where that is at a singular position of a closed chain.
     """
 
     name: str
@@ -43,6 +44,7 @@ class EventRecord:
     before: State
     after: State
     closures: dict[str, Real] = field(default_factory=dict)
+    early: float = 0.0
 
 
 class Situation:
@@ -66,7 +68,7 @@ class Situation:
         for action in event.actions:
             if isinstance(action, Impact) and action.rests:
                 push = -int(np.sign(before[self._rate_place(action.coordinate)]))
-                if self._is_spent(action.coordinate, push, y, accelerations(t, y)):
+                if self._is_spent(action.coordinate, push, t, y, accelerations):
                     rest = partial(self._rest, event, action.coordinate, push)
                     found.append(self._recorded(f"{event.name}: at rest", t, y, [rest]))
         return found
@@ -78,11 +80,15 @@ class Situation:
             do(t, y, impulses, closures)
         return EventRecord(name, t, impulses, float(y[-1]) - work, before, self._state(t, y), closures)
 
-    def _is_spent(self, name: str, push: int, y: Real, accelerations: Real) -> bool:
+    def _is_spent(self, name: str, push: int, t: float, y: Real, accelerations: Accelerations) -> bool:
         """Whether a rebound leads no further from a stop, against what presses on it, than the error that is allowed.
+
+        What presses is that on a body at rest there: loads that change with the rebound are no longer what they were.
         """
-        place = self._rate_place(name)
-        pressed, rebound = -push * accelerations[place - self.system.nq], push * y[place]
+        place, at_rest = self._rate_place(name), y.copy()
+        rebound = push * y[place]
+        self._strike(t, at_rest, name, 0.0, {}, {})
+        pressed = -push * accelerations(t, at_rest)[place - self.system.nq]
         allowed = self._settings.atol + self._settings.rtol * abs(y[self.places[name]])
         return bool(pressed > 0.0 and rebound**2 <= 2.0 * pressed * allowed)
 

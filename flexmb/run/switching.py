@@ -10,28 +10,45 @@ import numpy as np
 from flexmb.scene.check import check_run
 from flexmb.scene.check.walk import values
 from flexmb.scene.convert import ROOT
-from flexmb.scene.functions import Pulse, SmoothStep, SpinUp, Table
+from flexmb.scene.functions import Pulse, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene
+from flexmb.scene.tree import watches_signals
 from flexmb.system.tree_system import System
 from flexmb.typing import Real
+
+MOST_TURNS = 1_000_000  # of a sine in a run: nobody makes so many steps
 
 
 class Timing(NamedTuple):
     """switches (s), increasing: where a function jumps or is no longer smooth; from `start` to `end` (s) all are
-    defined."""
+    defined. sines, and knots (s) of tables: where functions turn."""
 
     switches: tuple[float, ...]
     start: float
     end: float
+    sines: tuple[Sine, ...]
+    knots: tuple[float, ...]
 
     def between(self, t_start: float, t_end: float) -> list[float]:
         """Switches in (t_start, t_end): no step may cross one (s)."""
         return [time for time in self.switches if t_start < time < t_end]
 
+    def turns(self, t_start: float, t_end: float) -> list[float]:
+        """Times in (t_start, t_end) between which functions hardly turn more than once: extremes of sines, knots."""
+        found = {time for time in self.knots if t_start < time < t_end}
+        for sine in self.sines:
+            half, phase = np.pi / abs(sine.angular_frequency_rad_s), sine.phase_rad / sine.angular_frequency_rad_s
+            first, last = np.ceil((t_start + phase) / half - 0.5), np.floor((t_end + phase) / half - 0.5)
+            if last - first <= MOST_TURNS:
+                extremes = (np.arange(first, last + 1.0) + 0.5) * half - phase
+                found.update(extremes[(extremes > t_start) & (extremes < t_end)].tolist())
+        return sorted(found)
+
 
 def timing(scene: Scene) -> Timing:
     """Of all functions of a scene."""
     switches, start, end = set[float](), -inf, inf
+    sines, knots = list[Sine](), set[float]()
     for _, _, function in values(ROOT, scene):
         match function:
             case Pulse(start_s=start, duration_s=duration) | SmoothStep(start_s=start, duration_s=duration):
@@ -40,7 +57,10 @@ def timing(scene: Scene) -> Timing:
                 switches.add(duration)
             case Table(times_s=times):
                 start, end = max(start, times[0]), min(end, times[-1])
-    return Timing(tuple(sorted(switches)), start, end)
+                knots.update(times)
+            case Sine(amplitude=amplitude, angular_frequency_rad_s=frequency) if amplitude and frequency:
+                sines.append(function)
+    return Timing(tuple(sorted(switches)), start, end, tuple(sines), tuple(knots))
 
 
 def timing_of(system: System) -> Timing:
@@ -51,13 +71,19 @@ def timing_of(system: System) -> Timing:
     return found
 
 
-def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool) -> Real:
-    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`."""
+def segment_ends(system: System, t_start: float, t_end: float, equal_steps: bool, breaks: bool = False) -> Real:
+    """The clock's ends of segments of a run: see `flexmb.integrate.problem.Clock`. breaks: whether one is its end.
+
+    Where events watch signals, these are also where functions turn: steps resolve what moves, and a load on something
+    at rest moves nothing.
+    """
     found = timing_of(system)
-    is_switch = t_end in found.switches
+    ends, is_switch = found.between(t_start, t_end), breaks or t_end in found.switches
     if equal_steps:
-        return np.array([*found.between(t_start, t_end), *[t_end] * is_switch, inf])
-    return np.array([*found.between(t_start, t_end), t_end, *[t_end] * is_switch])
+        return np.array([*ends, *[t_end] * is_switch, inf])
+    if watches_signals(system.scene):
+        ends = sorted({*ends, *found.turns(t_start, t_end)})
+    return np.array([*ends, t_end, *[t_end] * is_switch])
 
 
 def refuse_times(system: System, t_start: float, t_end: float) -> None:

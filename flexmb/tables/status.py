@@ -52,13 +52,14 @@ _ADVICE = {
     ),
     Status.OUT_OF_RANGE: (
         "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
-        "look for an instability (an unstiffened beam spun above its first frequency, equal steps that are too long), or "
-        "divide the body into segments"
+        "look for an instability (an unstiffened beam spun above its first frequency, equal steps that are too long), "
+        "or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "
-        "mechanism is too slow, or started too close, for its speed to say along which branch it goes on; start "
-        "elsewhere, or give a body flexibility"
+        "mechanism is too slow, or started too close, for its speed to say along which branch it goes on, or a "
+        "function switches or a controller samples just there; start elsewhere, move that instant, or give a body "
+        "flexibility"
     ),
     Status.CLOSURE_OPEN: (
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
@@ -79,7 +80,8 @@ _ADVICE = {
     ),
     Status.CHATTERING: (
         "events follow each other faster and faster without end: let an `Impact` come to rest (`rests`) or become a "
-        "`Latch`, or take a stiff spring with a damper in place of the stop"
+        "`Latch`, or take a stiff spring with a damper in place of the stop; where it may rest already, a load pulls "
+        "at rest and presses in motion: let it change smoothly"
     ),
     Status.INTERRUPTED: "interrupted from the keyboard",
     Status.MAX_STEPS: "the step limit was reached: raise max_steps, loosen rtol and atol, or lengthen the fixed step",

@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from flexmb.scene.check.control import named, one_number, widths_of
-from flexmb.scene.check.walk import sound
+from flexmb.scene.check.walk import entries, sound
 from flexmb.scene.events import Change, Impact, Latch, Release
 from flexmb.scene.problems import Defect, Place, closest
 from flexmb.scene.schema import Scene, SceneEvent
+from flexmb.scene.stops import leaves, leaving, load_of, resting, stop_sensor
 from flexmb.scene.tree import scalar_paths, watchable
 from flexmb.scene.values import PathError, with_values
 
@@ -27,6 +28,29 @@ def events(scene: Scene) -> Iterator[Defect]:
         if not event.actions:
             yield Defect(str(place.key("actions")), "nothing happens", "give at least one action, or leave it out")
         yield from _actions(scene, place, event, paths)
+        if sum(isinstance(action, Impact) and action.rests for action in event.actions) > 1:
+            what = "more than one stop is to rest on: their loads would have the same name"
+            yield Defect(str(place.key("actions")), what, "give each stop an event of its own")
+    yield from _names_of_stops(scene)
+
+
+def _names_of_stops(scene: Scene) -> Iterator[Defect]:
+    """What a run calls the loads of stops, and leaving them, means nothing else; a run that is taken up has them."""
+    loads = {load_of(event): (event, stop_sensor(event, action)) for event, action in resting(scene)}
+    for collection in ("sensors", "controllers") if loads else ():
+        for place, item in entries(scene, collection):
+            event, sensor = loads.get(item.name, (None, item))
+            if item != sensor:
+                assert event is not None  # whose stop it is
+                what = f'"{item.name}" is the load of the stop of event "{event.name}", which a run adds'
+                yield Defect(str(place.key("name")), what, "rename one of the two")
+    going = {leaving(event): (event, action.coordinate) for event, action in resting(scene)}
+    for place, each in entries(scene, "events") if going else ():
+        if each.name in going:
+            event, coordinate = going[each.name]
+            if each not in [leaves(event, coordinate, push) for push in (1, -1)]:
+                what = f'"{each.name}" is what a run calls it when something leaves the stop of event "{event.name}"'
+                yield Defect(str(place.key("name")), what, "rename one of the two")
 
 
 def _signal(

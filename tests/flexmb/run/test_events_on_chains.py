@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import msgspec
 import numpy as np
 import pytest
@@ -137,6 +139,53 @@ def test_a_level_within_a_leap_is_found_there(level, settings):
     assert run.finished and [event.name for event in run.events] == ["end"]
     assert run.t[-1] == pytest.approx(0.5 - level / np.pi, abs=1e-9)
     assert run.q[-1, 0] == pytest.approx(run.q[-1, 2], abs=1e-9)  # parallel
+
+
+METHODS: dict[str, dict[str, Any]] = {
+    "dop853": {}, "rk4": {"step": 1e-3}, "radau5": {"rtol": 1e-8}, "exponential": {"rtol": 1e-8},
+}  # fmt: skip
+SLIGHT = fm.Change(path="foot 0.rotation.damping_Nms_rad", value=0.0)  # changes nothing
+FOOT = "foot 0.rotation"
+LONGEST = 2.0**-9 * 0.5  # s of a leap: in half a second no corner moves as far as the mechanism is large
+
+
+def turning(event: fm.SceneEvent) -> fm.Scene:
+    """A parallelogram that turns evenly, pi/2 - pi t."""
+    return msgspec.structs.replace(windows(1, np.pi, gravity=0.0), events=(event,))
+
+
+@pytest.mark.parametrize("level", [0.0, 1e-5, -1e-5, 1e-4, -1e-4])
+@pytest.mark.parametrize("method", METHODS)
+def test_events_at_a_singular_position_happen_at_their_instant_or_told_before_it(method: Any, level: float) -> None:
+    """What changes, latches or turns over does so within a leap; as near as 1e-5 to the position, where it starts."""
+    actions = (SLIGHT, fm.Latch(coordinate=FOOT), fm.Impact(coordinate=FOOT, restitution=0.5))
+    for action, after in zip(actions, (-np.pi, 0.0, 0.5 * np.pi), strict=True):
+        scene = turning(on(FOOT, level, action))
+        run = fm.simulate(scene, 1.0, method, samples=41, **METHODS[method])
+        (event,) = run.events
+        instant = 0.5 - level / np.pi
+        assert run.finished and event.t + event.early == pytest.approx(instant, abs=1e-9)
+        assert event.early == 0.0 if abs(level) > 5e-5 else 0.0 < event.early < LONGEST
+        assert event.after.u[0] == pytest.approx(after, abs=1e-6)
+        angle = 0.5 * np.pi - np.pi * np.minimum(run.t, event.t) + after * np.maximum(run.t - event.t, 0.0)
+        assert run.q[:, 0] == pytest.approx(angle, abs=1e-7) and run.q[:, 2] == pytest.approx(angle, abs=1e-7)
+        assert np.abs(run.energy_drift).max() < 1e-8 * run.energy_scale
+
+
+@pytest.mark.parametrize("due", [0.5, 0.5 + 1e-5, 0.5 - 1e-5, 0.5 + 1e-4, 0.5 - 1e-4, 0.49])
+@pytest.mark.parametrize("method", ["dop853", "rk4"])
+def test_times_at_a_singular_position_are_met(method: Any, due: float) -> None:
+    """As an event's, or as the end of a run, also of one with events."""
+    run = fm.simulate(turning(on("time", due, SLIGHT)), 1.0, method, samples=11, **METHODS[method])
+    (event,) = run.events
+    assert run.finished and 0.0 <= event.early < LONGEST and event.t + event.early == pytest.approx(due, abs=1e-15)
+    assert event.early == 0.0 if abs(due - 0.5) > 5e-5 else event.early > 0.0
+    assert np.abs(run.q[:, 0] - 0.5 * np.pi + np.pi * run.t).max() < 1e-8
+    for scene in (windows(1, np.pi, gravity=0.0), turning(on(FOOT, 1.0, SLIGHT))):
+        short = fm.simulate(scene, due, method, samples=11, **METHODS[method])
+        assert short.finished and short.stopped_at == short.t[-1] == due
+        assert np.abs(short.q[:, 0] - 0.5 * np.pi + np.pi * short.t).max() < 1e-8
+        assert short.restart is None or short.restart.since <= due
 
 
 @pytest.mark.parametrize("level", [0.1, 2e-3, -2e-3, -0.1])
