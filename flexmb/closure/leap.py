@@ -16,8 +16,8 @@ the mechanism. What comes before the position and what comes after it are on one
   before and after are opposite. On branches that are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so
   that a c of 2^-40 or more is noticed.
 
-Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or
-the run ends with the status it had.
+Else there is no leap, and as long as the position is within `LEAP` steps may come closer (cw.closer): they pass by what
+is no singular position after all, or the run ends with the status it had.
 """
 
 import math
@@ -25,7 +25,7 @@ from math import inf
 
 import numpy as np
 
-from flexmb.closure.branch import TO_LEAP, TURNED, along, passing_time, recall, remember
+from flexmb.closure.branch import TO_LEAP, TURNED, along, covered, passing_time, recall, remember
 from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
@@ -146,9 +146,22 @@ def _length(t, end, y, dy, trial, s):
     if _tree(t + probe, trial, s) != OK:
         return 0.0
     last, blurred = _vanish(probe, cc, cw)
-    cw.closer[0] = 1 if last > 0.0 else 0
+    cw.closer[0] = 1 if last > 0.0 or _is_near(cc, cw) else 0
     h = min(2.0 * last, end - t)
     return 0.0 if blurred or h < (1.0 + BEYOND) * last else h
+
+
+@helper
+def _is_near(cc, cw):
+    """Whether a singular position is within `LEAP`, ahead or passed by: seen by what the probe covers of the distance.
+
+    Of one that is nearer than the probe is long, pivots do not tell: they may rise again before it ends.
+    """
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            if covered(cc, cw, g, a) > PROBE / LEAP:
+                return True
+    return False
 
 
 @helper
