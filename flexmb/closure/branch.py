@@ -13,6 +13,9 @@ to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `A
 What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
 come closer than `TO_LEAP` only where there was no leap.
 
+Distances are in sizes of the mechanism. How far it moves in a step is the step over `passing_time`, in which ports move
+by one size; how much of the distance to a singular position that is, `covered`, is seen by how rows change.
+
 Errors of a step are powers of what it covers of the distance to a singular position, be it one that the mechanism only
 passes. Methods that estimate their errors shorten their steps there; of others, whose steps are equal, those fail that
 are too long for the distance (`unresolved`), or are noticed where they are not to be shortened (`notice`).
@@ -31,11 +34,14 @@ TURNED = 0.5
 TO_LEAP = 2.0**-12
 # There branches differ by 2^-40 in the gap of a closure: 16 times what closed closures are left open by.
 AT_CROSSING = 2.0**-20
+# Beyond this distance no leap goes: twice 2^-10.
+AWAY = 2.0**-9
 # What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
 ROUND_OFF = 2.0**-40
-# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. Not derived: random
-# mechanisms with masses six decades apart pass with it (tests/flexmb/closure/near_singular.py).
-FASTEST = 2.0**10
+# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. It is a sine of what
+# turns, in that response, which falls by all of it in a radian; speeds that are added up make that half. What falls faster
+# has been put right, and so divides by ever shorter steps that are tried.
+FASTEST = 2.0
 # Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
 # 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
 RESOLVED = 2.0**-4
@@ -170,6 +176,20 @@ def unresolved(t, cc, cw):
             if not covered(cc, cw, g, a) <= most:
                 return cw.chosen[cc.group[g].row_start + a]
     return -1
+
+
+@helper
+def leave(t, cc, cw):
+    """Have steps keep their distance again once they have left a position that there was no leap over. Needs the same.
+    """
+    if cw.closer[0] == 0:
+        return
+    for g in range(cc.group.shape[0]):
+        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
+        for a in range(cw.rank[g]):
+            if not covered(cc, cw, g, a) * AWAY <= moved:
+                return
+    cw.closer[0] = 0
 
 
 @helper

@@ -123,7 +123,7 @@ class ClosureWorkspace:
     noticed: Real  # (3,) of the worst of them by how much it is too long, its end (s), the closure; -1 for none
     closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
     vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
-    demand: Real  # (G,) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along the rows of Q
+    demand: Real  # (4,G) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along rows of Q, by node
     time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
     failure: Index  # (2,) status of the last projection, and where
@@ -186,7 +186,7 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         noticed=np.array([1.0, 0.0, -1.0]),
         closer=np.zeros(1, np.int64),
         vanishing=np.zeros(rows),
-        demand=np.zeros(rows),
+        demand=np.zeros((4, rows)),
         time=np.full(2, -np.inf),
         gain=np.zeros(2),
         failure=np.zeros(2, np.int64),

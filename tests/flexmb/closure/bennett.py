@@ -11,6 +11,7 @@ e = 0 two branches cross, on each of which one joint alone turns; with any other
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,21 +77,28 @@ class Bennett:
             total, slope = np.arctan2(sine, -(1.0 - e) * np.cos(d)), -(1.0 - e) * np.sin(d) / sine
         return np.array([total + d, total - d, -total - d]), np.array([slope + one, slope - one, -slope - one])
 
-    def energies(self, d: Array) -> tuple[Array, Array]:
-        """Kinetic energy for a unit rate of A - B, and that of gravity (J), each (n,)."""
+    def links(self, d: Array) -> Iterator[tuple[Array, Rotation, Array, Array]]:
+        """Of every link, and of the axis behind the last, where it begins, its axes and, for a unit rate of A - B, its
+        velocities (angular, of the beginning); of that axis before it is turned about."""
         R, place = Rotation.identity(len(d)), np.zeros((len(d), 3))
         omega, velocity = np.zeros_like(place), np.zeros_like(place)
-        kinetic, weight = np.zeros_like(d), np.zeros_like(d)
-        for k, (angle, rate) in enumerate(zip(*self.angles(d), strict=True)):
+        for angle, rate, length, twist in zip(*self.angles(d), self.lengths, self.twists, strict=True):
             R = R * Rotation.from_rotvec(angle[:, None] * [0.0, 0.0, 1.0])
             omega = omega + rate[:, None] * R.apply([0.0, 0.0, 1.0])
-            arm, turning = R.apply(self.com[k]), R.inv().apply(omega)
-            v = velocity + np.cross(omega, arm)
-            kinetic += 0.5 * self.mass[k] * np.sum(v**2, axis=1) + 0.5 * turning**2 @ self.inertia[k]
-            weight -= self.mass[k] * (place + arm) @ self.gravity
-            link = R.apply([self.lengths[k], 0.0, 0.0])
+            yield place, R, omega, velocity
+            link = R.apply([length, 0.0, 0.0])
             place, velocity = place + link, velocity + np.cross(omega, link)
-            R = R * Rotation.from_euler("x", self.twists[k])
+            R = R * Rotation.from_euler("x", twist)
+        yield place, R, omega, velocity
+
+    def energies(self, d: Array) -> tuple[Array, Array]:
+        """Kinetic energy for a unit rate of A - B, and that of gravity (J), each (n,)."""
+        kinetic, weight = np.zeros_like(d), np.zeros_like(d)
+        for mass, com, inertia, link in zip(self.mass, self.com, self.inertia, self.links(d), strict=False):
+            place, R, omega, velocity = link
+            arm, turning = R.apply(com), R.inv().apply(omega)
+            kinetic += 0.5 * mass * np.sum((velocity + np.cross(omega, arm)) ** 2, axis=1) + 0.5 * turning**2 @ inertia
+            weight -= mass * (place + arm) @ self.gravity
         return kinetic, weight
 
     @property

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -80,9 +82,26 @@ def test_a_random_row_is_right_or_lost(seed):
     assert not [each for each in found.values() if each.startswith("WRONG")], found
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_bennetts_reference_closes(seed):
+    """All the way round the axis behind the last link is the fourth one, on the ground, and at rest."""
+    linkage = random_bennett(np.random.default_rng(seed))
+    place, R, _, velocity = list(linkage.links(np.linspace(0.0, 2.0 * np.pi, 50)))[-1]
+    assert np.max(np.abs(place - [-linkage.a, 0.0, 0.0])) < 1e-14
+    assert np.max(np.abs(velocity)) < 1e-14
+    axis = [0.0, np.sin(linkage.alpha), np.cos(linkage.alpha)]
+    assert np.max(np.abs(R.apply([0.0, 0.0, 1.0]) - axis)) < 1e-14
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_random_bennett_is_right_or_lost(seed):
+    found = bennett_outcomes(seed, ("dop853", "looser", "rk4"))
+    assert not [each for each in found.values() if each.startswith("WRONG")], found
+
+
 @pytest.mark.slow
 def test_random_rows_are_right_or_lost():
-    """The campaign: no run is wrong and says OK, and few of those that adapt their steps are lost."""
+    """The campaign: no run is wrong and says OK, and few are lost."""
     counts: dict[str, dict[str, int]] = {each: {} for each in SETTINGS}
     wrong = []
     for seed in range(300):
@@ -110,6 +129,38 @@ def test_equal_steps_resolve_what_they_pass_near(longer, step):
     assert tight.finished and run.finished, run.message
     assert np.max(np.abs(run.energy_drift)) < 1e-3 * step / 1e-2
     assert np.max(np.abs(run.q - tight.q)) < 1e-1 * step / 1e-2
+
+
+GIVEN = {
+    "rk4": {"method": "rk4", "stabilise": 20.0}, "generalised_alpha": {"method": "generalised_alpha"},
+    "dop853": {"stabilise": 20.0, "rtol": 1e-3, "atol": 1e-4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", GIVEN)
+@pytest.mark.parametrize("longer", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_steps_that_are_not_shortened_are_noticed(longer, settings):
+    """The same: a run that finishes is right, or warns of the closure and says so at its end."""
+    system = flexmb.compile(m.four_bar(m.FourBar(0.4, 1.0, 0.4, 1.0 + longer), crank=1.0, rate=6.0, gravity=0.0))
+    tight = flexmb.simulate(system, 2.0, samples=9)
+    for step in (1e-2, 1e-3):
+        given = GIVEN[settings] | ({} if settings == "dop853" else {"step": step})
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            run = flexmb.simulate(system, 2.0, samples=9, **given)
+        assert run.finished or run.status in LOST, run.message
+        noticed = [str(each.message) for each in told if issubclass(each.category, flexmb.SceneWarning)]
+        assert all('closure "loop"' in each and each.split(": ", 1)[1] in run.message for each in noticed)
+        if run.finished and not noticed:
+            assert np.max(np.abs(run.q - tight.q)) < 0.1
+
+
+@pytest.mark.parametrize("settings", GIVEN)
+def test_nothing_is_noticed_far_from_singular_positions(settings):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", flexmb.SceneWarning)
+        given = GIVEN[settings] | ({} if settings == "dop853" else {"step": 1e-2})
+        assert flexmb.simulate(m.four_bar(), 3.0, samples=2, **given).finished
 
 
 SPATIAL = {"dop853": {}, "looser": {"rtol": 1e-3, "atol": 1e-4}, "coarse rk4": {"method": "rk4", "step": 1e-2}}
