@@ -120,7 +120,7 @@ class ClosureWorkspace:
     state: Real  # (nq+nu+1,) that state
     resolved: Real  # (1,) of the distance to a singular position that a step may cover; 0 where errors choose steps
     notices: Index  # (1,) what is looked at of steps that are not to be shortened, `flexmb.closure.branch`
-    noticed: Real  # (3,) of the worst of them by how much it is too long, its end (s), the closure; -1 for none
+    noticed: Real  # (3,) of the worst that is twice too long: how many times, its end (s), the closure; -1 for none
     closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
     vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
     demand: Real  # (4,G) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along rows of Q, by node
@@ -183,7 +183,7 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         state=np.zeros(coordinates + nu + 1),
         resolved=np.zeros(1),
         notices=np.zeros(1, np.int64),
-        noticed=np.array([1.0, 0.0, -1.0]),
+        noticed=np.array([2.0, 0.0, -1.0]),
         closer=np.zeros(1, np.int64),
         vanishing=np.zeros(rows),
         demand=np.zeros((4, rows)),

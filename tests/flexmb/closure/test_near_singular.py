@@ -13,13 +13,15 @@ from tests.flexmb.closure import mechanisms as m
 from tests.flexmb.closure.bennett import random_bennett
 from tests.flexmb.closure.near_singular import random_row
 
-LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR)
+# The last of a row of many, whose rows vanish nearly together, by loose tolerances: corrections do not converge there.
+LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN)
 # By settings: how they integrate, and the error (rad) that a run on the right branch keeps to in two seconds.
 SETTINGS = {
     "dop853": ({}, 1e-6), "loose": ({"rtol": 1e-6, "atol": 1e-8}, 1e-2), "looser": ({"rtol": 1e-3, "atol": 1e-4}, 0.3),
     "stabilised": ({"stabilise": 20.0}, 1e-4), "composite": ({"algorithm": "composite"}, 1e-6),
     "fine rk4": ({"method": "rk4", "step": 1e-3}, 1e-3), "rk4": ({"method": "rk4", "step": 3e-3}, 1e-2),
     "coarse rk4": ({"method": "rk4", "step": 1e-2}, 0.1), "coarser rk4": ({"method": "rk4", "step": 3e-2}, 0.3),
+    "stabilised rk4": ({"stabilise": 20.0, "method": "rk4", "step": 3e-3}, 1e-2),
 }  # fmt: skip
 TRUSTED = 1e-3  # change of the reference's energy beyond which it says nothing
 TIMES = np.linspace(0.0, 2.0, 9)
@@ -100,20 +102,30 @@ def test_a_random_bennett_is_right_or_lost(seed):
 
 
 @pytest.mark.slow
-def test_random_rows_are_right_or_lost():
-    """The campaign: no run is wrong and says OK, and few are lost."""
+@pytest.mark.filterwarnings("ignore:.*singular position:flexmb.SceneWarning")
+@pytest.mark.parametrize(("of", "count"), [(outcomes, 300), (bennett_outcomes, 100)], ids=["rows", "Bennett"])
+def test_random_mechanisms_are_right_or_lost(of, count):
+    """The campaign: no run is wrong and says OK, and few are lost, but of those whose gaps and steps are given.
+
+    In 156 rows (of seeds 0 to 198) with a reference that is trusted, all runs were right but two: one of "looser"
+    (CLOSURE_OPEN), one of "stabilised" (CLOSURE_SINGULAR). Of "stabilised rk4" one in thirty said BRANCH_UNKNOWN. In 30
+    linkages of Bennett's all were right. Thresholds, by what became of 33 rows when they were moved either way:
+    `UNSEEN` / 16 lost five runs of 99, times 16 made two wrong; crossings feign up to 2 of it, near misses have 0.2 and
+    more. `FASTEST` / 8 lost one, times 512 none; pivots of crossings fall by 0.5 at most.
+    """
     counts: dict[str, dict[str, int]] = {each: {} for each in SETTINGS}
     wrong = []
-    for seed in range(300):
-        for settings, found in outcomes(seed, tuple(SETTINGS)).items():
+    for seed in range(count):
+        for settings, found in of(seed, tuple(SETTINGS)).items():
             counts[settings][found] = counts[settings].get(found, 0) + 1
             if found.startswith("WRONG"):
                 wrong.append(f"{seed} {settings}: {found}")
     for settings, each in counts.items():
         print(settings, each)
     assert not wrong, wrong
-    for settings in ("dop853", "loose", "composite"):
-        assert counts[settings]["right"] > 0.95 * sum(counts[settings].values())
+    for settings, each in counts.items():
+        if settings != "stabilised rk4":
+            assert each["right"] > 0.95 * sum(each.values())
 
 
 @pytest.mark.parametrize("step", [1e-2, 3e-3, 1e-3])
@@ -140,7 +152,10 @@ GIVEN = {
 @pytest.mark.parametrize("settings", GIVEN)
 @pytest.mark.parametrize("longer", [1e-2, 1e-3, 1e-4, 1e-6])
 def test_steps_that_are_not_shortened_are_noticed(longer, settings):
-    """The same: a run that finishes is right, or warns of the closure and says so at its end."""
+    """The same: a run that finishes is right, or warns of the closure and says so at its end.
+
+    By "rk4" with stabilisation energies of 11 J grew by up to 350 J, and branches were wrong, with no word of it.
+    """
     system = flexmb.compile(m.four_bar(m.FourBar(0.4, 1.0, 0.4, 1.0 + longer), crank=1.0, rate=6.0, gravity=0.0))
     tight = flexmb.simulate(system, 2.0, samples=9)
     for step in (1e-2, 1e-3):
@@ -148,7 +163,7 @@ def test_steps_that_are_not_shortened_are_noticed(longer, settings):
         with warnings.catch_warnings(record=True) as told:
             warnings.simplefilter("always")
             run = flexmb.simulate(system, 2.0, samples=9, **given)
-        assert run.finished or run.status in LOST, run.message
+        assert run.finished or run.status in (*LOST, Status.NOT_CONVERGED), run.message
         noticed = [str(each.message) for each in told if issubclass(each.category, flexmb.SceneWarning)]
         assert all('closure "loop"' in each and each.split(": ", 1)[1] in run.message for each in noticed)
         if run.finished and not noticed:
