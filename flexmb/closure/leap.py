@@ -23,7 +23,6 @@ Else there is no leap, and as long as the position is within `LEAP` steps may co
 is no singular position after all, or the run ends with the status it had.
 """
 
-import math
 from math import inf
 
 import numpy as np
@@ -35,6 +34,7 @@ from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
 from flexmb.integrate.control import Interval
 from flexmb.integrate.leap import cubic
+from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, store_slope
@@ -56,11 +56,9 @@ APART = 3.0
 # Of the distance before it, the least beyond the position where the run's end or a segment's cuts a leap short.
 BEYOND = 0.25
 # c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
-# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. Of random
-# mechanisms (tests/flexmb/closure/near_singular.py) crossings feign an eighth of it.
+# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. How far
+# it may be moved either way is told by the campaign in tests/flexmb/closure/test_near_singular.py.
 UNSEEN = 2.0**-42
-# Of a leap from either end: the inner nodes of Lobatto's rule, of weights 1, 5, 5, 1 over 12. Nodes are numbered 0 to 3.
-INNER = 0.5 - math.sqrt(0.05)
 # By which the trapezoidal rule converges: Euler's, then its own twice.
 APPROACHES = 3
 
@@ -95,6 +93,18 @@ def leap(end, y, dy, y_new, dy_new, s):
             return h
     recall(cw)
     return 0.0
+
+
+@kernel
+def beside(t, y, dy, s):
+    """dy at y beside a singular position, on whichever side, y being closed to rounding first; returns a status code.
+
+    For controllers, whose part in a leap is known once it has been made: where it ended, y is the last good state now.
+    """
+    status = _slope(t, y, dy, s)
+    if status == OK and t == s.cw.time[0]:
+        remember(t, y, s.cc, s.cw)
+    return status
 
 
 @sweep
@@ -211,14 +221,14 @@ def _lands(t, h, y, dy, y_new, dy_new, s):
             return False
     inner, slope, total = np.empty(y.shape[0]), np.empty(y.shape[0]), np.empty(y.shape[0])
     for i in range(y.shape[0]):
-        total[i] = (dy[i] + dy_new[i]) / 12.0
+        total[i] = EDGE_WEIGHT * (dy[i] + dy_new[i])
     for node, x in ((1, INNER), (2, 1.0 - INNER)):
         cubic(Interval(t, t + h, t + h), y, dy, y_new, dy_new, t + x * h, inner)
         if _slope(t + x * h, inner, slope, s) != OK:
             return False
         _keep_demands(node, s.cc, s.cw)
         for i in range(y.shape[0]):
-            total[i] += 5.0 / 12.0 * slope[i]
+            total[i] += INNER_WEIGHT * slope[i]
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * total[i]
     if _slope(t + h, y_new, dy_new, s) != OK:
@@ -250,8 +260,8 @@ def _same_branch(h, cc, cw):
                 least = min(abs(cw.demand[0, place]), abs(cw.demand[3, place]))
                 usual = closure.speed**2 / closure.size + cw.size[r] * least
                 moment = passing_time(cc, cw, g)
-                beside = min(ahead, abs(h - ahead), abs(INNER * h - ahead), abs((1.0 - INNER) * h - ahead)) / moment
-                if not cw.size[r] * abs(_jump(cw, place)) * beside**3 <= 8.0 * UNSEEN * usual:
+                nearest = min(ahead, abs(h - ahead), abs(INNER * h - ahead), abs((1.0 - INNER) * h - ahead)) / moment
+                if not cw.size[r] * abs(_jump(cw, place)) * nearest**3 <= 8.0 * UNSEEN * usual:
                     return False
     return True
 
@@ -260,8 +270,8 @@ def _same_branch(h, cc, cw):
 def _jump(cw, place):
     """By how much more accelerations along a row change between the inner nodes than beside them: 0 of a parabola."""
     d = cw.demand
-    beside = 0.5 * (d[1, place] - d[0, place] + d[3, place] - d[2, place]) / INNER
-    return d[2, place] - d[1, place] - (1.0 - 2.0 * INNER) * beside
+    outside = 0.5 * (d[1, place] - d[0, place] + d[3, place] - d[2, place]) / INNER
+    return d[2, place] - d[1, place] - (1.0 - 2.0 * INNER) * outside
 
 
 @helper

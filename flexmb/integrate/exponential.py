@@ -23,7 +23,6 @@ from flexmb.integrate.control import (
     CALM,
     FACTORISATIONS,
     REJECTED,
-    SAMPLES,
     Interval,
     copy,
     derivative,
@@ -36,6 +35,7 @@ from flexmb.integrate.control import (
     step_end,
     step_factor,
 )
+from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
@@ -194,38 +194,15 @@ def attempt(problem, step, y, s, accuracy, counts):
 
 
 @helper
-def state_at(problem, step, y, s, t, accuracy, result):
-    """The state inside a step, by the exact flow under the same polynomial, projected."""
+def state_at(problem, step, ends, s, t, result, run):
+    """The state inside a step, by the exact flow under the same polynomial, projected; see `flexmb.integrate.watch`."""
+    accuracy, _ = run
     theta = (t - step.start) / (step.end - step.start)
     at_fraction(s.flow, s.v, s.X, s.x, theta, result, s.term, s.product)
-    for i in range(y.shape[0]):
-        result[i] = y[i] + s.flow.scale[i] * result[i]
+    for i in range(result.shape[0]):
+        result[i] = ends.y[i] + s.flow.scale[i] * result[i]
     settle(problem, t, RATE / (step.end - step.start), result, s, accuracy)
-
-
-@helper
-def inside(problem, step, ends, s, t, result, run):
-    """The same as `flexmb.integrate.watch` asks for it."""
-    accuracy, _ = run
-    state_at(problem, step, ends.y, s, t, accuracy, result)
     return OK
-
-
-@helper
-def store_samples(problem, step, y, s, samples, accuracy, counts):
-    """Store the samples in the step, its end included; inside by the exact flow under the same polynomial, projected.
-
-    samples: (times, states).
-    """
-    times, out = samples
-    sample = counts[SAMPLES]
-    while sample < times.shape[0] and times[sample] <= step.end:
-        if times[sample] == step.end:
-            copy(s.y_new, out[sample])
-        else:
-            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
-        sample += 1
-    counts[SAMPLES] = sample
 
 
 @helper
@@ -251,6 +228,7 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
+    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
     t = begin(problem, times, y, s.y_new, memory, out, counts)
     h, error_before, kept = memory.numbers[STEP], memory.numbers[ERROR_BEFORE], False
     rejected, linear, trouble = memory.numbers[RETRIED] != 0.0, False, STEP_TOO_SMALL
@@ -287,16 +265,15 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             accepted = status == OK and error < 1.0
             if accepted:
                 if watch is not None:
-                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
                     if leapt:
                         status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
                     else:
-                        status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                        status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
                     if status != OK:
                         return status, t_at
                 if leapt:
                     store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
-                store_samples(problem, step, y, s, (times, out), accuracy, counts)
+                store_samples(problem, step, ends, state_at, s, samples, run)
                 factor = step_factor(error, error_before, _ERROR_EXPONENT, rejected)
                 h = next_step(h, length, factor, t_new == end)
                 t, error_before = t_new, error

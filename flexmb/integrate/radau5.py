@@ -2,22 +2,19 @@
 
 Hairer, Wanner, Solving Ordinary Differential Equations II (1996), IV.8. L-stable: a mode that is too fast for the step
 dies out instead of limiting it. The three stages come from simplified Newton iterations with one real and one complex
-factorisation; Jacobian and factors are kept as long as they serve.
+factorisation (`flexmb.integrate.radau5_stages`); Jacobian and factors are kept as long as they serve.
 """
 
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.integrate.control import (
     ACCEPTED,
-    FACTORISATIONS,
     REJECTED,
     SAFETY,
-    SAMPLES,
     SHRINK,
     Interval,
     copy,
@@ -29,145 +26,26 @@ from flexmb.integrate.control import (
     scaled_norm,
     step_end,
 )
+from flexmb.integrate.dense_output import store_samples
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.jacobians import linearisation
 from flexmb.integrate.leap import in_leap, leap, may_leap, store_leapt
-from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.lu import lu_solve
 from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIED, STEP, STEP_BEFORE, begin, keep
-from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, E, P
+from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
+from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
 from flexmb.integrate.watch import Ends, pause
 from flexmb.jit.kernel import helper, kernel
-from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
+from flexmb.tables.status import NOT_CONVERGED, OK, STEP_TOO_SMALL
 
-_ITERATIONS = 7  # of Newton's method, at most
 _GROW = 8.0  # strongest growth of a step
 _KEEP = 1.2  # a growth below this is not worth new factors
 _SAME = 1e-9  # relative difference of steps that share factors
-_SLOW = 1e-3  # a contraction above this asks for a new Jacobian
+_SLOW, _POOR = 1e-3, 0.03  # a contraction above this asks for a new Jacobian, after three iterations or more; after two
+_CONTRACTION = 0.15  # of Newton's method, which steps aim at where it bounds them
+_CUT = 0.7  # a step for which it failed becomes shorter by this at least
 _ERROR_EXPONENT = 4.0  # the error estimate is O(h^4)
-
-
-class RadauStages(NamedTuple):
-    """Arrays of a step: slope f at its start; stages Z, those of the step before, slopes F (3,n); factors; unknowns w,
-    v and corrections dw, dv, decoupled.
-    """
-
-    f: np.ndarray
-    J: np.ndarray
-    real: np.ndarray
-    paired: np.ndarray
-    real_pivots: np.ndarray
-    paired_pivots: np.ndarray
-    Z: np.ndarray
-    Z_before: np.ndarray
-    F: np.ndarray
-    w: np.ndarray
-    v: np.ndarray
-    dw: np.ndarray
-    dv: np.ndarray
-    y_new: np.ndarray
-    f_new: np.ndarray
-    error: np.ndarray
-    trial: np.ndarray
-    change: np.ndarray
-
-
-@helper
-def factorise(s, h, counts):
-    """Factors of REAL/h - J and COMPLEX/h - J; returns whether both are regular."""
-    n = s.J.shape[0]
-    for i in range(n):
-        for j in range(n):
-            s.real[i, j] = -s.J[i, j]
-            s.paired[i, j] = -s.J[i, j]
-        s.real[i, i] += REAL / h
-        s.paired[i, i] += COMPLEX / h
-    counts[FACTORISATIONS] += 1
-    return lu_factorise(s.real, s.real_pivots) and lu_factorise(s.paired, s.paired_pivots)
-
-
-@helper
-def evaluate_polynomial(Z, x, result):
-    """result (n,) = collocation polynomial at the fraction x of the step, less the state at its start."""
-    for i in range(result.shape[0]):
-        value = 0.0
-        for k in range(2, -1, -1):
-            value = (value + P[0, k] * Z[0, i] + P[1, k] * Z[1, i] + P[2, k] * Z[2, i]) * x
-        result[i] = value
-
-
-@helper
-def correct(s, h):
-    """One Newton correction (dw real, dv complex) of the decoupled stages (w, v)."""
-    F = s.F
-    for i in range(s.w.shape[0]):
-        s.dw[i] = W_REAL[0] * F[0, i] + W_REAL[1] * F[1, i] + W_REAL[2] * F[2, i] - REAL / h * s.w[i]
-        s.dv[i] = W_COMPLEX[0] * F[0, i] + W_COMPLEX[1] * F[1, i] + W_COMPLEX[2] * F[2, i] - COMPLEX / h * s.v[i]
-    lu_solve(s.real, s.real_pivots, s.dw)
-    lu_solve(s.paired, s.paired_pivots, s.dv)
-    for i in range(s.w.shape[0]):
-        s.w[i] += s.dw[i]
-        s.v[i] += s.dv[i]
-
-
-@helper
-def to_stages(w, v, Z):
-    """Z (3,n) from its decoupled form."""
-    for s in range(3):
-        for i in range(w.shape[0]):
-            Z[s, i] = V_REAL[s] * w[i] + 2.0 * (V_COMPLEX[s] * v[i]).real
-
-
-@helper
-def to_decoupled(Z, w, v):
-    """The decoupled form of Z (3,n)."""
-    for i in range(w.shape[0]):
-        w[i] = W_REAL[0] * Z[0, i] + W_REAL[1] * Z[1, i] + W_REAL[2] * Z[2, i]
-        v[i] = W_COMPLEX[0] * Z[0, i] + W_COMPLEX[1] * Z[1, i] + W_COMPLEX[2] * Z[2, i]
-
-
-@helper
-def stage_norm(dZ, y, accuracy):
-    """Root mean square of the scaled norms of three stages (3,n)."""
-    total = 0.0
-    for s in range(3):
-        total += scaled_norm(dZ[s], y, accuracy) ** 2
-    return math.sqrt(total / 3.0)
-
-
-@helper
-def newton(problem, step, y, s, accuracy, counts):
-    """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
-
-    Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
-    there in time.
-    """
-    h = step.end - step.start
-    tolerance = max(10.0 * 2.0**-52 / accuracy.rtol, min(0.03, math.sqrt(accuracy.rtol)))
-    to_decoupled(s.Z, s.w, s.v)
-    rate, before = 0.0, 0.0
-    for iteration in range(1, _ITERATIONS + 1):
-        for stage in range(3):
-            for i in range(y.shape[0]):
-                s.trial[i] = y[i] + s.Z[stage, i]
-            status = derivative(problem, min(step.start + C[stage] * h, step.last), s.trial, s.F[stage], counts)
-            if status != OK:
-                return status, iteration, rate
-        correct(s, h)
-        to_stages(s.dw, s.dv, s.F)
-        size = stage_norm(s.F, y, accuracy)
-        to_stages(s.w, s.v, s.Z)
-        if not math.isfinite(size):
-            return NONFINITE, iteration, rate
-        if iteration > 1:
-            rate = size / before
-            if rate >= 1.0 or rate ** (_ITERATIONS - iteration) / (1.0 - rate) * size > tolerance:
-                return NOT_CONVERGED, iteration, rate
-        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size < tolerance):
-            return OK, iteration, rate
-        before = size
-    return NOT_CONVERGED, _ITERATIONS, rate
 
 
 @helper
@@ -189,16 +67,6 @@ def new_over_old(h, h_before, error, error_before):
     if h_before > 0.0:
         factor *= min(1.0, h / h_before * (error_before / error) ** (1.0 / _ERROR_EXPONENT))
     return factor
-
-
-@helper
-def guess(before, h_before, h, Z):
-    """First guess of the stages: the polynomial of the step before, continued; zero without one."""
-    for stage in range(3):
-        if h_before > 0.0:
-            evaluate_polynomial(before, 1.0 + C[stage] * h / h_before, Z[stage])
-        for i in range(Z.shape[1]):
-            Z[stage, i] = Z[stage, i] - before[2, i] if h_before > 0.0 else 0.0
 
 
 @helper
@@ -226,34 +94,14 @@ def attempt(problem, step, y, s, filter_again, accuracy, counts):
 
 
 @helper
-def state_at(problem, step, y, s, t, accuracy, result):
-    """The state inside a step, by the collocation polynomial, projected."""
-    evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
-    for i in range(y.shape[0]):
-        result[i] += y[i]
-    settle(problem, t, REAL / (step.end - step.start), result, s, accuracy)
-
-
-@helper
-def inside(problem, step, ends, s, t, result, run):
-    """The same as `flexmb.integrate.watch` asks for it."""
+def state_at(problem, step, ends, s, t, result, run):
+    """The state inside a step, by the collocation polynomial, projected; see `flexmb.integrate.watch`."""
     accuracy, _ = run
-    state_at(problem, step, ends.y, s, t, accuracy, result)
+    evaluate_polynomial(s.Z, (t - step.start) / (step.end - step.start), result)
+    for i in range(result.shape[0]):
+        result[i] += ends.y[i]
+    settle(problem, t, REAL / (step.end - step.start), result, s, accuracy)
     return OK
-
-
-@helper
-def store_samples(problem, step, y, s, samples, accuracy, counts):
-    """Store the samples in the step, its end included; samples: (times, states)."""
-    times, out = samples
-    sample = counts[SAMPLES]
-    while sample < times.shape[0] and times[sample] <= step.end:
-        if times[sample] == step.end:
-            copy(s.y_new, out[sample])
-        else:
-            state_at(problem, step, y, s, times[sample], accuracy, out[sample])
-        sample += 1
-    counts[SAMPLES] = sample
 
 
 @helper
@@ -292,14 +140,13 @@ def recall(memory, s, counts):
 
 
 @helper
-def scratch(n):
-    """For n components."""
-    return RadauStages(
-        np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
-        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
-        np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
-        np.empty(n), np.empty(n),
-    )  # fmt: skip
+def by_contraction(rate):
+    """New step over old that brings the contraction of Newton's method to what steps aim at.
+
+    Where stiff forces turn with the motion, as in closed chains, they turn within a step as well, which the Jacobian of
+    its start does not know. That bounds the step, where errors alone would ask for one that fails.
+    """
+    return math.sqrt(_CONTRACTION / rate) if rate > 0.0 else _GROW
 
 
 @helper
@@ -309,15 +156,49 @@ def after_acceptance(h, length, cut, factor, rejected, worn):
     return next_step(h, length, 1.0 if 1.0 <= factor < _KEEP and not worn else factor, cut)
 
 
+@helper
+def after_rejection(length, status, factor, rate, fresh):
+    """(Step, whether with a new Jacobian) after a trial of this length that was not accepted."""
+    if status == OK:
+        return length * max(SHRINK, min(1.0, factor)), False
+    if status == NOT_CONVERGED and not fresh:
+        return length, True  # the Jacobian may be too old, not the step too long
+    if status == NOT_CONVERGED and rate > 0.0:
+        return length * max(SHRINK, min(_CUT, by_contraction(rate))), False
+    return length * retreat(status), not fresh
+
+
+@helper
+def leap_over(problem, watch, t, last, ends, samples, run):
+    """The place at t where steps fail is passed, and sampled: (OK, the time beyond it), or t where it cannot be yet.
+
+    What ends the run there is returned with its time.
+    """
+    _, counts = run
+    far = leap(problem, last, ends.y, ends.dy, ends.y_new, ends.dy_new, counts)
+    if far > 0.0:
+        step = Interval(t, t + far, last)
+        if watch is not None:
+            status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
+            if status != OK:
+                return status, t_at
+        store_leapt(step, ends.y, ends.dy, ends.y_new, ends.dy_new, samples[0], samples[1], counts)
+        copy(ends.y_new, ends.y)
+        copy(ends.dy_new, ends.dy)
+        counts[ACCEPTED] += 1
+    return OK, t + far
+
+
 @kernel
 def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
     """Integrate y' = f(t, y) as told by `Integrator`; problem: a `StiffProblem`.
 
     The retreat from a failing right-hand side is that of `dop853`, and so are leaps. Where Newton's method does not
-    converge, an old Jacobian is renewed, then the step is halved.
+    converge, an old Jacobian is renewed, then the step is shortened by how far it is from converging.
     """
     times, segment_ends = clock
     s = scratch(y.shape[0])
+    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
     t = begin(problem, times, y, s.y_new, memory, out, counts)
     h, kept = memory.numbers[STEP], False
     h_factored, h_before, error_before, renew, fresh, rejected = recall(memory, s, counts)
@@ -353,34 +234,25 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 )
             trouble = reason(status)
             if may_leap(status):
-                far = leap(problem, last, y, s.f, s.y_new, s.f_new, counts)
-                if far > 0.0:
-                    step = Interval(t, t + far, last)
-                    if watch is not None:
-                        ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
-                        status, t_at = pause(problem, watch, step, ends, in_leap, OK, samples, run)
-                        if status != OK:
-                            return status, t_at
-                    store_leapt(step, y, s.f, s.y_new, s.f_new, times, out, counts)
-                    # beyond it everything begins anew
-                    t, h, h_factored, h_before, error_before = t + far, far, 0.0, 0.0, 0.0
+                passed, t_at = leap_over(problem, watch, t, last, ends, samples, run)
+                if passed != OK:
+                    return passed, t_at
+                if t_at > t:  # beyond it everything begins anew
+                    t, h, h_factored, h_before, error_before = t_at, t_at - t, 0.0, 0.0, 0.0
                     renew, fresh, rejected = True, False, False
-                    copy(s.y_new, y)
-                    copy(s.f_new, s.f)
-                    counts[ACCEPTED] += 1
                     continue
             factor = 1.0
             if status == OK:
-                caution = SAFETY * (2.0 * _ITERATIONS + 1.0) / (2.0 * _ITERATIONS + iterations)
+                caution = SAFETY * (2.0 * ITERATIONS + 1.0) / (2.0 * ITERATIONS + iterations)
                 factor = caution * new_over_old(length, h_before, error, error_before)
             if status == OK and error < 1.0:
                 if watch is not None:
-                    ends, samples, run = Ends(y, s.f, s.y_new, s.f_new), (times, out), (accuracy, counts)
-                    status, t_at = pause(problem, watch, step, ends, inside, s, samples, run)
+                    status, t_at = pause(problem, watch, step, ends, state_at, s, samples, run)
                     if status != OK:
                         return status, t_at
-                store_samples(problem, step, y, s, (times, out), accuracy, counts)
-                renew = iterations > 2 and rate > _SLOW
+                store_samples(problem, step, ends, state_at, s, samples, run)
+                renew = rate > (_SLOW if iterations > 2 else _POOR)
+                factor = min(factor, by_contraction(rate))
                 h = after_acceptance(h, length, t_new == end, factor, rejected, renew)
                 t, h_before, error_before = t_new, length, max(1e-2, error)
                 copy(s.y_new, y)
@@ -390,14 +262,9 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
                 counts[ACCEPTED] += 1
                 fresh, rejected = False, False
             else:
-                if status == OK:
-                    h = length * max(SHRINK, min(1.0, factor))
-                elif status == NOT_CONVERGED and not fresh:
-                    h, renew = length, True  # the Jacobian may be too old, not the step too long
-                else:
-                    h, renew = length * retreat(status), not fresh
+                h, renew = after_rejection(length, status, factor, rate, fresh)
                 counts[REJECTED] += 1
-                rejected = True
+                rejected = rejected or h < length
         h_factored, h_before, error_before = 0.0, 0.0, 0.0  # nothing is known across a segment's end
         renew, fresh, rejected, trouble = True, False, False, STEP_TOO_SMALL
     if not kept:

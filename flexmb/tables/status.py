@@ -52,7 +52,8 @@ _ADVICE = {
     ),
     Status.OUT_OF_RANGE: (
         "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
-        "look for an instability (an unstiffened beam spun above its first frequency), or divide the body into segments"
+        "look for an instability (an unstiffened beam spun above its first frequency, equal steps that are too long), or "
+        "divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "
@@ -61,7 +62,8 @@ _ADVICE = {
     ),
     Status.CLOSURE_OPEN: (
         "closure {body} cannot be kept closed: the closures and prescribed motions contradict each other there; the "
-        "mechanism is locked, started at a singular configuration, or is driven beyond its reach"
+        "mechanism is locked, started at a singular configuration, or is driven beyond its reach; a method of equal "
+        'steps may only have stepped too far: use a shorter step, or "dop853"'
     ),
     Status.BRANCH_UNKNOWN: (
         "closure {body} went close to a singular position in too long a step: branches of the motion nearly meet "

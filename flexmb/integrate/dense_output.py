@@ -1,0 +1,25 @@
+"""Samples within a step, by the dense output of the method that made it."""
+
+from __future__ import annotations
+
+from flexmb.integrate.control import SAMPLES, copy
+from flexmb.jit.kernel import helper
+
+
+@helper
+def store_samples(problem, step, ends, state_at, s, samples, run):
+    """Store the samples in a step, its end included.
+
+    `state_at` is the method's, as `flexmb.integrate.watch` asks for it, and finds a state without fail. samples:
+    (times, states); run: accuracy and counts.
+    """
+    times, out = samples
+    _, counts = run
+    sample = counts[SAMPLES]
+    while sample < times.shape[0] and times[sample] <= step.end:
+        if times[sample] == step.end:
+            copy(ends.y_new, out[sample])
+        else:
+            state_at(problem, step, ends, s, times[sample], out[sample], run)
+        sample += 1
+    counts[SAMPLES] = sample

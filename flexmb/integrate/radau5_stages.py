@@ -1,0 +1,162 @@
+"""The stages of a step by Radau IIA of order 5: decoupled, and solved for by simplified Newton iterations.
+
+Hairer, Wanner, Solving Ordinary Differential Equations II (1996), IV.8: one real and one complex factorisation.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.integrate.control import FACTORISATIONS, derivative, scaled_norm
+from flexmb.integrate.lu import lu_factorise, lu_solve
+from flexmb.integrate.radau5_tableau import COMPLEX, REAL, V_COMPLEX, V_REAL, W_COMPLEX, W_REAL, C, P
+from flexmb.jit.kernel import helper
+from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK
+
+ITERATIONS = 7  # of Newton's method, at most
+
+
+class RadauStages(NamedTuple):
+    """Arrays of a step: slope f at its start; stages Z, those of the step before, slopes F (3,n); factors; unknowns w,
+    v and corrections dw, dv, decoupled.
+    """
+
+    f: np.ndarray
+    J: np.ndarray
+    real: np.ndarray
+    paired: np.ndarray
+    real_pivots: np.ndarray
+    paired_pivots: np.ndarray
+    Z: np.ndarray
+    Z_before: np.ndarray
+    F: np.ndarray
+    w: np.ndarray
+    v: np.ndarray
+    dw: np.ndarray
+    dv: np.ndarray
+    y_new: np.ndarray
+    f_new: np.ndarray
+    error: np.ndarray
+    trial: np.ndarray
+    change: np.ndarray
+
+
+@helper
+def factorise(s, h, counts):
+    """Factors of REAL/h - J and COMPLEX/h - J; returns whether both are regular."""
+    n = s.J.shape[0]
+    for i in range(n):
+        for j in range(n):
+            s.real[i, j] = -s.J[i, j]
+            s.paired[i, j] = -s.J[i, j]
+        s.real[i, i] += REAL / h
+        s.paired[i, i] += COMPLEX / h
+    counts[FACTORISATIONS] += 1
+    return lu_factorise(s.real, s.real_pivots) and lu_factorise(s.paired, s.paired_pivots)
+
+
+@helper
+def evaluate_polynomial(Z, x, result):
+    """result (n,) = collocation polynomial at the fraction x of the step, less the state at its start."""
+    for i in range(result.shape[0]):
+        value = 0.0
+        for k in range(2, -1, -1):
+            value = (value + P[0, k] * Z[0, i] + P[1, k] * Z[1, i] + P[2, k] * Z[2, i]) * x
+        result[i] = value
+
+
+@helper
+def correct(s, h):
+    """One Newton correction (dw real, dv complex) of the decoupled stages (w, v)."""
+    F = s.F
+    for i in range(s.w.shape[0]):
+        s.dw[i] = W_REAL[0] * F[0, i] + W_REAL[1] * F[1, i] + W_REAL[2] * F[2, i] - REAL / h * s.w[i]
+        s.dv[i] = W_COMPLEX[0] * F[0, i] + W_COMPLEX[1] * F[1, i] + W_COMPLEX[2] * F[2, i] - COMPLEX / h * s.v[i]
+    lu_solve(s.real, s.real_pivots, s.dw)
+    lu_solve(s.paired, s.paired_pivots, s.dv)
+    for i in range(s.w.shape[0]):
+        s.w[i] += s.dw[i]
+        s.v[i] += s.dv[i]
+
+
+@helper
+def to_stages(w, v, Z):
+    """Z (3,n) from its decoupled form."""
+    for s in range(3):
+        for i in range(w.shape[0]):
+            Z[s, i] = V_REAL[s] * w[i] + 2.0 * (V_COMPLEX[s] * v[i]).real
+
+
+@helper
+def to_decoupled(Z, w, v):
+    """The decoupled form of Z (3,n)."""
+    for i in range(w.shape[0]):
+        w[i] = W_REAL[0] * Z[0, i] + W_REAL[1] * Z[1, i] + W_REAL[2] * Z[2, i]
+        v[i] = W_COMPLEX[0] * Z[0, i] + W_COMPLEX[1] * Z[1, i] + W_COMPLEX[2] * Z[2, i]
+
+
+@helper
+def stage_norm(dZ, y, accuracy):
+    """Root mean square of the scaled norms of three stages (3,n)."""
+    total = 0.0
+    for s in range(3):
+        total += scaled_norm(dZ[s], y, accuracy) ** 2
+    return math.sqrt(total / 3.0)
+
+
+@helper
+def newton(problem, step, y, s, accuracy, counts):
+    """Solve for the stages Z, which hold a first guess. Returns (status, iterations, last contraction).
+
+    Ends where the next correction would be below a fraction of the tolerance, with NOT_CONVERGED where it would not get
+    there in time.
+    """
+    h = step.end - step.start
+    tolerance = max(10.0 * 2.0**-52 / accuracy.rtol, min(0.03, math.sqrt(accuracy.rtol)))
+    to_decoupled(s.Z, s.w, s.v)
+    rate, before = 0.0, 0.0
+    for iteration in range(1, ITERATIONS + 1):
+        for stage in range(3):
+            for i in range(y.shape[0]):
+                s.trial[i] = y[i] + s.Z[stage, i]
+            status = derivative(problem, min(step.start + C[stage] * h, step.last), s.trial, s.F[stage], counts)
+            if status != OK:
+                return status, iteration, rate
+        correct(s, h)
+        to_stages(s.dw, s.dv, s.F)
+        size = stage_norm(s.F, y, accuracy)
+        to_stages(s.w, s.v, s.Z)
+        if not math.isfinite(size):
+            return NONFINITE, iteration, rate
+        if iteration > 1:
+            rate = size / before
+            if rate >= 1.0 or rate ** (ITERATIONS - iteration) / (1.0 - rate) * size > tolerance:
+                return NOT_CONVERGED, iteration, rate
+        if size == 0.0 or (iteration > 1 and rate / (1.0 - rate) * size < tolerance):
+            return OK, iteration, rate
+        before = size
+    return NOT_CONVERGED, ITERATIONS, rate
+
+
+@helper
+def guess(before, h_before, h, Z):
+    """First guess of the stages: the polynomial of the step before, continued; zero without one."""
+    for stage in range(3):
+        if h_before > 0.0:
+            evaluate_polynomial(before, 1.0 + C[stage] * h / h_before, Z[stage])
+        for i in range(Z.shape[1]):
+            Z[stage, i] = Z[stage, i] - before[2, i] if h_before > 0.0 else 0.0
+
+
+@helper
+def scratch(n):
+    """For n components."""
+    return RadauStages(
+        np.empty(n), np.empty((n, n)), np.empty((n, n)), np.empty((n, n), np.complex128), np.empty(n, np.int64),
+        np.empty(n, np.int64), np.empty((3, n)), np.empty((3, n)), np.empty((3, n)), np.empty(n),
+        np.empty(n, np.complex128), np.empty(n), np.empty(n, np.complex128), np.empty(n), np.empty(n), np.empty(n),
+        np.empty(n), np.empty(n),
+    )  # fmt: skip
