@@ -13,14 +13,18 @@ to 2^-44. So no step goes where a pivot falls so fast that it vanishes within `A
 What leads on, `flexmb.closure.leap`, starts from the last good state, which is kept here, and from further away: steps
 come closer than `TO_LEAP` only where there was no leap.
 
+Distances are in sizes of the mechanism. How far it moves in a step is the step over `passing_time`, in which ports move
+by one size; how much of the distance to a singular position that is, `covered`, is seen by how rows change.
+
 Errors of a step are powers of what it covers of the distance to a singular position, be it one that the mechanism only
 passes. Methods that estimate their errors shorten their steps there; of others, whose steps are equal, those fail that
-are too long for the distance (`unresolved`).
+are too long for the distance (`unresolved`), or are noticed where they are not to be shortened (`notice`).
 """
 
-from math import inf
+from math import inf, sqrt
 
 from flexmb.closure.factor import entry
+from flexmb.closure.rows import largest_gap
 from flexmb.jit.kernel import helper
 
 # Cosine of the angle by which a row of Q may turn in a step. A near miss turns it by a right angle in all, and no step
@@ -30,11 +34,14 @@ TURNED = 0.5
 TO_LEAP = 2.0**-12
 # There branches differ by 2^-40 in the gap of a closure: 16 times what closed closures are left open by.
 AT_CROSSING = 2.0**-20
+# Beyond this distance no leap goes: twice 2^-10.
+AWAY = 2.0**-9
 # What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
 ROUND_OFF = 2.0**-40
-# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. Not derived: random
-# mechanisms with masses six decades apart pass with it (tests/flexmb/closure/near_singular.py).
-FASTEST = 2.0**10
+# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. It is a sine of what
+# turns, in that response, which falls by all of it in a radian; speeds that are added up make that half. What falls faster
+# has been put right, and so divides by ever shorter steps that are tried.
+FASTEST = 2.0
 # Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
 # 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
 RESOLVED = 2.0**-4
@@ -43,15 +50,29 @@ RESOLVED = 2.0**-4
 NEARBY = 2.0
 # Of the distance no step covers more, however far its mechanism moves: the row could vanish within two of them.
 HALF = 0.5
+# What is noticed of steps that are not to be shortened: how far closures are open, and how long they are.
+NOTHING, GAPS, GAPS_AND_LENGTHS = range(3)
+# Root of the gap of a stabilised closure, beside the distance to a singular position, at whose square in the gap branches
+# differ: speeds that are added up make the distance pass for several times what it is.
+CLEAR = 2.0**-5
 
 
-def watch_steps(chain):
-    """Let steps fail that are too long near a singular position: of a method whose errors do not shorten them.
+def watch_steps(chain, shorter):
+    """Of a method whose errors do not shorten its steps: let those fail that are too long near a singular position.
 
-    Not where closures are stabilised: there steps are those that the user gave, also where these make gaps grow.
+    Not where steps are those that the user gave, whatever they lead to: `shorter` is false, or closures are stabilised.
+    There such steps are noticed.
     """
-    if chain.cw.gain[0] == 0.0:
+    if shorter and chain.cw.gain[0] == 0.0:
         chain.cw.resolved[0] = RESOLVED
+    else:
+        chain.cw.notices[0] = GAPS_AND_LENGTHS
+
+
+def noticed(chain):
+    """End (s) and closure of the step that was most too long for a singular position that it came near; or None."""
+    _, t, closure = chain.cw.noticed
+    return None if closure < 0.0 else (float(t), int(closure))
 
 
 @helper
@@ -124,24 +145,72 @@ def turned_over(cc, cw):
 
 
 @helper
-def unresolved(t, cc, cw):
-    """The first chosen row of which the step has changed too much, or -1: near a singular position. Needs the same.
+def covered(cc, cw, g, a):
+    """Part of the distance to where row a of group g vanishes that the step has covered.
 
-    What is left of a row is a vector that vanishes at the position, R[a, a] times row a of Q. In terms of its length
-    the step changes it by what it covers of the distance, whether the mechanism goes there or only passes.
+    What is left of a row is a vector that vanishes at a singular position, R[a, a] times row a of Q. In terms of its
+    length the step changes it by that part, whether the mechanism goes there or only passes.
     """
+    start, own, stop = cc.group[g].column_start, cc.group[g].own_stop, cc.group[g].column_stop
+    total, at = 0.0, cc.group[g].half + a * (stop - start)
+    before, now = cw.former_pivot[cc.group[g].row_start + a], cw.factor[entry(cc, g, a, a)]
+    for j in range(at, at + own - start):
+        total += (now * cw.basis[j] - before * cw.former[j]) ** 2
+    return sqrt(total) / min(before, now)
+
+
+@helper
+def may_cover(moved, resolved):
+    """Part of the distance that a step may cover in which the mechanism has moved by so many of its sizes."""
+    return min(max(resolved, NEARBY * moved), HALF)
+
+
+@helper
+def unresolved(t, cc, cw):
+    """The first chosen row near whose vanishing the step is too long, or -1. Needs the same."""
     if cw.resolved[0] == 0.0:
         return -1
     for g in range(cc.group.shape[0]):
-        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
-        most = min(max(cw.resolved[0], NEARBY * moved), HALF)
+        most = may_cover((t - cw.time[0]) / passing_time(cc, cw, g), cw.resolved[0])
         for a in range(cw.rank[g]):
-            place = cc.group[g].row_start + a
-            before, now = cw.former_pivot[place], cw.factor[entry(cc, g, a, a)]
-            changed = (now - before) ** 2 + 2.0 * before * now * (1.0 - along(cc, cw, g, a))
-            if not changed <= (most * min(before, now)) ** 2:
-                return cw.chosen[place]
+            if not covered(cc, cw, g, a) <= most:
+                return cw.chosen[cc.group[g].row_start + a]
     return -1
+
+
+@helper
+def leave(t, cc, cw):
+    """Have steps keep their distance again once they have left a position that there was no leap over. Needs the same.
+    """
+    if cw.closer[0] == 0:
+        return
+    for g in range(cc.group.shape[0]):
+        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
+        for a in range(cw.rank[g]):
+            if not covered(cc, cw, g, a) * AWAY <= moved:
+                return
+    cw.closer[0] = 0
+
+
+@helper
+def notice(t, cc, cw):
+    """Keep in cw.noticed that a step is taken that is too long near a singular position. Needs the same, and rows.
+
+    Or that closures which are stabilised are open there so far that they could be on either of two branches.
+    """
+    if cw.notices[0] == NOTHING:
+        return
+    gap = largest_gap(cc, cw)[0]
+    for g in range(cc.group.shape[0]):
+        moved = (t - cw.time[0]) / passing_time(cc, cw, g)
+        for a in range(cw.rank[g]):
+            part = covered(cc, cw, g, a)
+            excess = part / may_cover(moved, RESOLVED) if cw.notices[0] == GAPS_AND_LENGTHS else 0.0
+            if moved > 0.0:
+                excess = max(excess, sqrt(gap) / (CLEAR * moved) * part)
+            if excess > cw.noticed[0]:
+                cw.noticed[0], cw.noticed[1] = excess, t
+                cw.noticed[2] = cc.row[cw.chosen[cc.group[g].row_start + a]].closure
 
 
 @helper

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics
+from flexmb.closure.branch import GAPS, NOTHING
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.tables import ROTATION, Closed, ClosureConstants, ClosureWorkspace, Recursion, workspace
 from flexmb.jain.places import Matrices, matrices
@@ -91,6 +92,7 @@ class Closures:
         w, route = self._tree(), self._route(algorithm)
         own = workspace(cc, c, len(w.q))
         own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
+        own.notices[0] = GAPS if rate > 0.0 else NOTHING
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
     def _route(self, algorithm: str) -> Recursion | Response | Matrices:

@@ -3,28 +3,31 @@
 At a singular position pivots of B P = Q R vanish and branches of the motion cross. A mechanism that moves goes on along
 the branch whose direction it has: loads are bounded, so its speeds cannot jump to those of another branch. On either
 side accelerations are smooth; only at the position itself, and for what strays from the branch near it, no stage of an
-integrator can be evaluated. So a run comes close by ordinary steps and then takes one step by Lobatto's rule of order
-6, with nodes at both ends and at `INNER` from either, none of which is near the position. States there are by the
-trapezoidal rule, which errs by the cube of the leap over twelve, 2^-30 of a size from the furthest; what remains of
-that after the one pass is 2^-39, and 2^-44 from half as far. A leap goes from between `NEAREST` and `LEAP` sizes of
-the mechanism. What comes before the position and what comes after it are on one branch where
+integrator can be evaluated. So a run comes close by ordinary steps and then leaps:
 
-- every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
-  over, while all other rows are where they were; and
-- the accelerations that the closures demand along these rows go on smoothly: they change in proportion to the length
-  of the leap. A mechanism that only passes near a singular position turns there, within the leap, and its accelerations
-  before and after are opposite. On branches that are hyperbolas x y = c they differ by 4 c/d^3 at a distance of d, so
-  that a c of 2^-40 or more is noticed.
+1. `_length`: a short probe along the velocity shows how fast pivots fall, hence how far the position is. A leap goes
+   from between `NEAREST` and `LEAP` sizes of the mechanism, over twice the distance.
+2. `_lands`: one step by Lobatto's rule of order 6, with nodes at both ends and at `INNER` from either, none of which is
+   near the position. States there are by the trapezoidal rule, which errs by the cube of the leap over twelve, 2^-30 of
+   a size from the furthest; what remains of that after the one pass is 2^-39, and 2^-44 from half as far.
+3. `_same_branch`: what comes before the position and what comes after it are on one branch where
 
-Else there is no leap, and steps may come closer (cw.closer): they pass by what is no singular position after all, or
-the run ends with the status it had.
+   - every pivot that was to vanish has the size on the other side that its fall predicted, and its row of Q is turned
+     over, while all other rows are where they were; and
+   - the accelerations that the closures demand along these rows go on smoothly: between the inner nodes they change as
+     they do between these and the ends. A mechanism that only passes near a singular position turns there, within the
+     leap, and its accelerations before and after are opposite. On branches that are hyperbolas x y = c they jump by
+     4 c/d^3 at a distance of d.
+
+Else there is no leap, and as long as the position is within `LEAP` steps may come closer (cw.closer): they pass by what
+is no singular position after all, or the run ends with the status it had.
 """
 
 from math import inf
 
 import numpy as np
 
-from flexmb.closure.branch import TO_LEAP, TURNED, along, passing_time, recall, remember
+from flexmb.closure.branch import TO_LEAP, TURNED, along, covered, passing_time, recall, remember
 from flexmb.closure.factor import choose_rows, entry, factorise
 from flexmb.closure.forces import accelerate, free_tree, row_loads
 from flexmb.closure.projection import OPEN, close
@@ -52,11 +55,9 @@ PROBE = 2.0**-14
 APART = 3.0
 # Of the distance before it, the least beyond the position where the run's end or a segment's cuts a leap short.
 BEYOND = 0.25
-# Change of accelerations over what is usual, times the part of their size that ports move in a leap. Smooth motions
-# have 1 or a few; that 8 refuses no leap is measured (tests/flexmb/closure/near_singular.py).
-ROUGH = 8.0
 # c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
-# bodies added up, and closures far from the origin.
+# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. How far
+# it may be moved either way is told by the campaign in tests/flexmb/closure/test_near_singular.py.
 UNSEEN = 2.0**-42
 # By which the trapezoidal rule converges: Euler's, then its own twice.
 APPROACHES = 3
@@ -137,7 +138,7 @@ def _tree(t, y, s):
 def _length(t, end, y, dy, trial, s):
     """How far to leap: twice to where the last of the pivots vanishes that vanish soon, or to `end`; 0 for none.
 
-    Leaves in cw.vanishing (s) when each chosen row does, inf for those that do not soon, and in cw.demand what the
+    Leaves in cw.vanishing (s) when each chosen row does, inf for those that do not soon, and in cw.demand[0] what the
     closures demand along them now.
     """
     cc, cw = s.cc, s.cw
@@ -146,19 +147,31 @@ def _length(t, end, y, dy, trial, s):
     probe = inf
     for g in range(cc.group.shape[0]):
         probe = min(probe, PROBE * passing_time(cc, cw, g))
-        for a in range(cw.rank[g]):
-            cw.demand[cc.group[g].row_start + a] = _demand(cc, cw, g, a)
     if not probe < inf:
         return 0.0
+    _keep_demands(0, cc, cw)
     for i in range(y.shape[0]):
         trial[i] = y[i] + probe * dy[i]
     project_tree(t + probe, trial, s.c)
     if _tree(t + probe, trial, s) != OK:
         return 0.0
-    last, blurred = _vanish(probe, cc, cw)
-    cw.closer[0] = 1 if last > 0.0 else 0
+    last, too_near = _vanish(probe, cc, cw)
+    cw.closer[0] = 1 if last > 0.0 or _is_near(cc, cw) else 0
     h = min(2.0 * last, end - t)
-    return 0.0 if blurred or h < (1.0 + BEYOND) * last else h
+    return 0.0 if too_near or h < (1.0 + BEYOND) * last else h
+
+
+@helper
+def _is_near(cc, cw):
+    """Whether a singular position is within half of `LEAP`, by what the probe covers of the distance.
+
+    Pivots do not tell of a near miss: they may rise again before the probe ends.
+    """
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            if covered(cc, cw, g, a) > 2.0 * PROBE / LEAP:
+                return True
+    return False
 
 
 @helper
@@ -167,7 +180,7 @@ def _vanish(probe, cc, cw):
 
     Rows that vanish not much later are among them: a leap must not end near another singular position.
     """
-    last, blurred = 0.0, False
+    last, too_near = 0.0, False
     for g in range(cc.group.shape[0]):
         moment = passing_time(cc, cw, g)
         for a in range(cw.rank[g]):
@@ -179,7 +192,7 @@ def _vanish(probe, cc, cw):
             cw.vanishing[place] = ahead
             if ahead < LEAP * moment:
                 last = max(last, ahead)
-                blurred = blurred or ahead < NEAREST * moment
+                too_near = too_near or ahead < NEAREST * moment
     before = 0.0
     while before < last:
         before = last
@@ -191,12 +204,15 @@ def _vanish(probe, cc, cw):
         for place in range(cc.group[g].row_start, cc.group[g].row_start + cw.rank[g]):
             if cw.vanishing[place] > last:
                 cw.vanishing[place] = inf
-    return last, blurred
+    return last, too_near
 
 
 @helper
 def _lands(t, h, y, dy, y_new, dy_new, s):
-    """Whether there is a y_new on the same branch: by the trapezoidal rule, then by Lobatto's."""
+    """Whether there is a y_new on the same branch: by the trapezoidal rule, then by Lobatto's.
+
+    Leaves in cw.demand what the closures demand at all four nodes.
+    """
     for approach in range(APPROACHES):
         for i in range(y.shape[0]):
             slope = dy[i] if approach == 0 else 0.5 * (dy[i] + dy_new[i])
@@ -206,21 +222,27 @@ def _lands(t, h, y, dy, y_new, dy_new, s):
     inner, slope, total = np.empty(y.shape[0]), np.empty(y.shape[0]), np.empty(y.shape[0])
     for i in range(y.shape[0]):
         total[i] = EDGE_WEIGHT * (dy[i] + dy_new[i])
-    for x in (INNER, 1.0 - INNER):
+    for node, x in ((1, INNER), (2, 1.0 - INNER)):
         cubic(Interval(t, t + h, t + h), y, dy, y_new, dy_new, t + x * h, inner)
         if _slope(t + x * h, inner, slope, s) != OK:
             return False
+        _keep_demands(node, s.cc, s.cw)
         for i in range(y.shape[0]):
             total[i] += INNER_WEIGHT * slope[i]
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * total[i]
     if _slope(t + h, y_new, dy_new, s) != OK:
         return False
+    _keep_demands(3, s.cc, s.cw)
     return largest_gap(s.cc, s.cw)[0] <= OPEN and _same_branch(h, s.cc, s.cw)
 
 
 @helper
 def _same_branch(h, cc, cw):
+    """Whether rows are turned over that were to vanish in the leap of h (s), as the third point above says.
+
+    The jump of accelerations is compared with what gaps feign at the node that is nearest to where the row vanishes.
+    """
     for g in range(cc.group.shape[0]):
         for a in range(cw.rank[g]):
             place = cc.group[g].row_start + a
@@ -235,12 +257,32 @@ def _same_branch(h, cc, cw):
                 if not (-turned >= TURNED and 0.5 * expected <= found <= 2.0 * expected):
                     return False
                 closure = cw.closure[cc.row[r].closure]
-                before, after = cw.demand[place], -_demand(cc, cw, g, a)  # Q points the other way
-                usual = closure.speed**2 / closure.size + cw.size[r] * min(abs(before), abs(after))
-                far = h / passing_time(cc, cw, g)
-                if not cw.size[r] * abs(after - before) <= (ROUGH * far + 32.0 * UNSEEN / far**3) * usual:
+                least = min(abs(cw.demand[0, place]), abs(cw.demand[3, place]))
+                usual = closure.speed**2 / closure.size + cw.size[r] * least
+                moment = passing_time(cc, cw, g)
+                nearest = min(ahead, abs(h - ahead), abs(INNER * h - ahead), abs((1.0 - INNER) * h - ahead)) / moment
+                if not cw.size[r] * abs(_jump(cw, place)) * nearest**3 <= 8.0 * UNSEEN * usual:
                     return False
     return True
+
+
+@helper
+def _jump(cw, place):
+    """By how much more accelerations along a row change between the inner nodes than beside them: 0 of a parabola."""
+    d = cw.demand
+    outside = 0.5 * (d[1, place] - d[0, place] + d[3, place] - d[2, place]) / INNER
+    return d[2, place] - d[1, place] - (1.0 - 2.0 * INNER) * outside
+
+
+@helper
+def _keep_demands(node, cc, cw):
+    """What the closures demand along the rows of Q, as it was at the first node: beyond its position a row is reversed.
+    """
+    for g in range(cc.group.shape[0]):
+        for a in range(cw.rank[g]):
+            demand = _demand(cc, cw, g, a)
+            place = cc.group[g].row_start + a
+            cw.demand[node, place] = -demand if node > 0 and along(cc, cw, g, a) < 0.0 else demand
 
 
 @helper

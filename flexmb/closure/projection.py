@@ -6,7 +6,7 @@ likewise with J u. Prescribed coordinates stay. Only independent rows are correc
 
 import numpy as np
 
-from flexmb.closure.branch import has_started, is_further, recall, remember
+from flexmb.closure.branch import has_started, is_further, leave, notice, recall, remember
 from flexmb.closure.factor import solve, sum_rows
 from flexmb.closure.forces import choose, factorised, free_tree, locate, on_branch, respond
 from flexmb.closure.rows import fastest_opening, largest_gap
@@ -68,6 +68,9 @@ def _choose_further(t, s):
         status = factorised(s.w, s.cc, s.cw)
     if status == OK:
         status = on_branch(t, s.w, s.cc, s.cw)
+    if status == OK and has_started(s.cw):
+        leave(t, s.cc, s.cw)
+        notice(t, s.cc, s.cw)
     if status == OK:
         status = choose(s.w, s.cc, s.cw)
     return status

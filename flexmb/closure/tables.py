@@ -119,9 +119,11 @@ class ClosureWorkspace:
     former_rows: Index  # (G,) `chosen` there
     state: Real  # (nq+nu+1,) that state
     resolved: Real  # (1,) of the distance to a singular position that a step may cover; 0 where errors choose steps
+    notices: Index  # (1,) what is looked at of steps that are not to be shortened, `flexmb.closure.branch`
+    noticed: Real  # (3,) of the worst that is twice too long: how many times, its end (s), the closure; -1 for none
     closer: Index  # (1,) whether steps may come closer to where a pivot vanishes than leaps start from
     vanishing: Real  # (G,) s, by place in `chosen`: when pivots vanish, `flexmb.closure.leap`
-    demand: Real  # (G,) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along the rows of Q
+    demand: Real  # (4,G) m/s^2 over sqrt(kg) of rows' responses, likewise: accelerations along rows of Q, by node
     time: Real  # (2,) of that state, -inf before the first; and from which on `failure` holds
     gain: Real  # (2,) stabilisation: g'' + gain[0] g' + gain[1] g = 0
     failure: Index  # (2,) status of the last projection, and where
@@ -180,9 +182,11 @@ def workspace(c: ClosureConstants, tree: Constants, coordinates: int) -> Closure
         former_rows=np.arange(rows),
         state=np.zeros(coordinates + nu + 1),
         resolved=np.zeros(1),
+        notices=np.zeros(1, np.int64),
+        noticed=np.array([2.0, 0.0, -1.0]),
         closer=np.zeros(1, np.int64),
         vanishing=np.zeros(rows),
-        demand=np.zeros(rows),
+        demand=np.zeros((4, rows)),
         time=np.full(2, -np.inf),
         gain=np.zeros(2),
         failure=np.zeros(2, np.int64),

@@ -91,14 +91,16 @@ class Leaping(NamedTuple):
     """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails.
 
     beside(t, y, dy, constants) finds slopes where `leap` does, for what is around the problem; a status code.
-    watch_steps(constants) prepares it for a method that does not estimate errors: steps fail that are too long to
-    resolve what they meet.
+    watch_steps(constants, shorter) prepares it for a method that does not estimate errors: steps fail that are too long
+    to resolve what they meet, if it can take `shorter` ones. noticed(constants): where such steps were taken all the
+    same, and what they met, if there were any: (time at the end of the worst, number of what it met).
     """
 
     back: Any
     leap: Any
     beside: Any
-    watch_steps: Callable[[Any], None]
+    watch_steps: Callable[[Any, bool], None]
+    noticed: Callable[[Any], tuple[float, int] | None]
 
 
 class Linear(NamedTuple):

@@ -83,8 +83,9 @@ class Integration:
                 self.feedback.with_retraction(self._linear.move)
         else:
             self._problem = problem(*motion, route.leaping)
-            if integrator.fixed and route.leaping is not None:
-                route.leaping.watch_steps(constants)
+        self._leaping, self._constants = route.leaping, constants
+        if integrator.fixed and route.leaping is not None:
+            route.leaping.watch_steps(constants, not integrator.linearises)
         self.batch: Sampler | None = None
         """Observes many samples at once."""
         self._batched = algorithm.observing is not None and not system.scene.closures
@@ -122,6 +123,11 @@ class Integration:
         known = self.feedback.remember()
         self.feedback.replay()
         return known
+
+    @property
+    def noticed(self) -> tuple[float, int] | None:
+        """Of a run that went on all the same, where its steps were most too long, and for what: see `Leaping`."""
+        return None if self._leaping is None else self._leaping.noticed(self._constants)
 
     @property
     def fault(self) -> int:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
 from flexmb.closure.assembly import consistent
-from flexmb.closure.branch import watch_steps
+from flexmb.closure.branch import noticed, watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.jacobian import chain_tangent
@@ -203,7 +203,7 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        leaping = Leaping(back, leap, beside, watch_steps)
+        leaping = Leaping(back, leap, beside, watch_steps, noticed)
         return Route(tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear)
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:

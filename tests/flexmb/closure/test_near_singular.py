@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
 import flexmb
 from flexmb.tables.status import Status
 from tests.flexmb.closure import mechanisms as m
+from tests.flexmb.closure.bennett import random_bennett
 from tests.flexmb.closure.near_singular import random_row
 
-LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR)
+# The last of a row of many, whose rows vanish nearly together, by loose tolerances: corrections do not converge there.
+LOST = (Status.BRANCH_UNKNOWN, Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN)
 # By settings: how they integrate, and the error (rad) that a run on the right branch keeps to in two seconds.
 SETTINGS = {
     "dop853": ({}, 1e-6), "loose": ({"rtol": 1e-6, "atol": 1e-8}, 1e-2), "looser": ({"rtol": 1e-3, "atol": 1e-4}, 0.3),
     "stabilised": ({"stabilise": 20.0}, 1e-4), "composite": ({"algorithm": "composite"}, 1e-6),
     "fine rk4": ({"method": "rk4", "step": 1e-3}, 1e-3), "rk4": ({"method": "rk4", "step": 3e-3}, 1e-2),
     "coarse rk4": ({"method": "rk4", "step": 1e-2}, 0.1), "coarser rk4": ({"method": "rk4", "step": 3e-2}, 0.3),
+    "stabilised rk4": ({"stabilise": 20.0, "method": "rk4", "step": 3e-3}, 1e-2),
 }  # fmt: skip
 TRUSTED = 1e-3  # change of the reference's energy beyond which it says nothing
 TIMES = np.linspace(0.0, 2.0, 9)
@@ -34,16 +39,42 @@ def outcomes(seed: int, settings: tuple[str, ...]) -> dict[str, str]:
     for each in settings:
         given, tolerance = SETTINGS[each]
         run = flexmb.simulate(system, TIMES[-1], samples=TIMES, **given)
-        if not run.finished:
-            found[each] = str(run.status) if run.status in LOST else f"WRONG {run.status}"
-            continue
-        off = np.max(np.abs(np.exp(1j * run.q[:, feet]) - np.exp(1j * angles[:, : len(feet)])))
         bound = tolerance + 300.0 * drift
         if "rk4" in each:  # a step too coarse for the motion anywhere shows in its energy, and spoils its time
-            lost = np.max(np.abs(run.energy_drift)) / row.kinetic
-            bound += 20.0 * min(lost, 0.2) * float(np.max(np.abs(row.rates)))
-        found[each] = "right" if off < bound else f"WRONG by {off:.1e}, drift {np.max(np.abs(run.energy_drift)):.1e}"
+            bound += 20.0 * lost_energy(run, row.kinetic) * float(np.max(np.abs(row.rates)))
+        found[each] = judged(run, run.q[:, feet], angles[: len(run.t), : len(feet)], bound)
     return found
+
+
+def bennett_outcomes(seed: int, settings: tuple[str, ...]) -> dict[str, str]:
+    """The same of Bennett's linkage, two of whose rows are independent, over five near misses or crossings."""
+    linkage = random_bennett(np.random.default_rng(seed))
+    times, angles = linkage.motion(5.2, 14)
+    system, found = flexmb.compile(linkage.scene()), {}
+    fastest = float(np.max(np.abs(np.diff(angles, axis=0) / np.diff(times)[:, None])))
+    for each in settings:
+        given, tolerance = SETTINGS[each]
+        if "step" in given:
+            given = given | {"step": given["step"] * 6.0 / fastest}
+        run = flexmb.simulate(system, times[-1], samples=times, **given)
+        bound = tolerance * max(fastest * times[-1], 1.0)
+        if "rk4" in each:
+            bound += 10.0 * lost_energy(run, linkage.kinetic) * fastest * times[-1]
+        found[each] = judged(run, run.q, angles[: len(run.t)], bound)
+    return found
+
+
+def lost_energy(run: flexmb.Trajectory, kinetic: float) -> float:
+    """The largest change of energy beside the kinetic one at the start, a fifth at most."""
+    return min(float(np.max(np.abs(run.energy_drift), initial=0.0)) / kinetic, 0.2)
+
+
+def judged(run: flexmb.Trajectory, found: np.ndarray, expected: np.ndarray, bound: float) -> str:
+    """What became of a run whose angles (rad) are to be within a bound of those expected."""
+    if not run.finished:
+        return str(run.status) if run.status in LOST else f"WRONG {run.status}"
+    off = np.max(np.abs(np.exp(1j * found) - np.exp(1j * expected)))
+    return "right" if off < bound else f"WRONG by {off:.1e}, drift {np.max(np.abs(run.energy_drift)):.1e}"
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -53,21 +84,48 @@ def test_a_random_row_is_right_or_lost(seed):
     assert not [each for each in found.values() if each.startswith("WRONG")], found
 
 
+@pytest.mark.parametrize("seed", range(4))
+def test_bennetts_reference_closes(seed):
+    """All the way round the axis behind the last link is the fourth one, on the ground, and at rest."""
+    linkage = random_bennett(np.random.default_rng(seed))
+    place, R, _, velocity = list(linkage.links(np.linspace(0.0, 2.0 * np.pi, 50)))[-1]
+    assert np.max(np.abs(place - [-linkage.a, 0.0, 0.0])) < 1e-14
+    assert np.max(np.abs(velocity)) < 1e-14
+    axis = [0.0, np.sin(linkage.alpha), np.cos(linkage.alpha)]
+    assert np.max(np.abs(R.apply([0.0, 0.0, 1.0]) - axis)) < 1e-14
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_a_random_bennett_is_right_or_lost(seed):
+    found = bennett_outcomes(seed, ("dop853", "looser", "rk4"))
+    assert not [each for each in found.values() if each.startswith("WRONG")], found
+
+
 @pytest.mark.slow
-def test_random_rows_are_right_or_lost():
-    """The campaign: no run is wrong and says OK, and few of those that adapt their steps are lost."""
+@pytest.mark.filterwarnings("ignore:.*singular position:flexmb.SceneWarning")
+@pytest.mark.parametrize(("of", "count"), [(outcomes, 300), (bennett_outcomes, 100)], ids=["rows", "Bennett"])
+def test_random_mechanisms_are_right_or_lost(of, count):
+    """The campaign: no run is wrong and says OK, and few are lost, but of those whose gaps and steps are given.
+
+    In 156 rows (of seeds 0 to 198) with a reference that is trusted, all runs were right but two: one of "looser"
+    (CLOSURE_OPEN), one of "stabilised" (CLOSURE_SINGULAR). Of "stabilised rk4" one in thirty said BRANCH_UNKNOWN. In 30
+    linkages of Bennett's all were right. Thresholds, by what became of 33 rows when they were moved either way:
+    `UNSEEN` / 16 lost five runs of 99, times 16 made two wrong; crossings feign up to 2 of it, near misses have 0.2 and
+    more. `FASTEST` / 8 lost one, times 512 none; pivots of crossings fall by 0.5 at most.
+    """
     counts: dict[str, dict[str, int]] = {each: {} for each in SETTINGS}
     wrong = []
-    for seed in range(300):
-        for settings, found in outcomes(seed, tuple(SETTINGS)).items():
+    for seed in range(count):
+        for settings, found in of(seed, tuple(SETTINGS)).items():
             counts[settings][found] = counts[settings].get(found, 0) + 1
             if found.startswith("WRONG"):
                 wrong.append(f"{seed} {settings}: {found}")
     for settings, each in counts.items():
         print(settings, each)
     assert not wrong, wrong
-    for settings in ("dop853", "loose", "composite"):
-        assert counts[settings]["right"] > 0.95 * sum(counts[settings].values())
+    for settings, each in counts.items():
+        if settings != "stabilised rk4":
+            assert each["right"] > 0.95 * sum(each.values())
 
 
 @pytest.mark.parametrize("step", [1e-2, 3e-3, 1e-3])
@@ -83,6 +141,41 @@ def test_equal_steps_resolve_what_they_pass_near(longer, step):
     assert tight.finished and run.finished, run.message
     assert np.max(np.abs(run.energy_drift)) < 1e-3 * step / 1e-2
     assert np.max(np.abs(run.q - tight.q)) < 1e-1 * step / 1e-2
+
+
+GIVEN = {
+    "rk4": {"method": "rk4", "stabilise": 20.0}, "generalised_alpha": {"method": "generalised_alpha"},
+    "dop853": {"stabilise": 20.0, "rtol": 1e-3, "atol": 1e-4},
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("settings", GIVEN)
+@pytest.mark.parametrize("longer", [1e-2, 1e-3, 1e-4, 1e-6])
+def test_steps_that_are_not_shortened_are_noticed(longer, settings):
+    """The same: a run that finishes is right, or warns of the closure and says so at its end.
+
+    By "rk4" with stabilisation energies of 11 J grew by up to 350 J, and branches were wrong, with no word of it.
+    """
+    system = flexmb.compile(m.four_bar(m.FourBar(0.4, 1.0, 0.4, 1.0 + longer), crank=1.0, rate=6.0, gravity=0.0))
+    tight = flexmb.simulate(system, 2.0, samples=9)
+    for step in (1e-2, 1e-3):
+        given = GIVEN[settings] | ({} if settings == "dop853" else {"step": step})
+        with warnings.catch_warnings(record=True) as told:
+            warnings.simplefilter("always")
+            run = flexmb.simulate(system, 2.0, samples=9, **given)
+        assert run.finished or run.status in (*LOST, Status.NOT_CONVERGED), run.message
+        noticed = [str(each.message) for each in told if issubclass(each.category, flexmb.SceneWarning)]
+        assert all('closure "loop"' in each and each.split(": ", 1)[1] in run.message for each in noticed)
+        if run.finished and not noticed:
+            assert np.max(np.abs(run.q - tight.q)) < 0.1
+
+
+@pytest.mark.parametrize("settings", GIVEN)
+def test_nothing_is_noticed_far_from_singular_positions(settings):
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", flexmb.SceneWarning)
+        given = GIVEN[settings] | ({} if settings == "dop853" else {"step": 1e-2})
+        assert flexmb.simulate(m.four_bar(), 3.0, samples=2, **given).finished
 
 
 SPATIAL = {"dop853": {}, "looser": {"rtol": 1e-3, "atol": 1e-4}, "coarse rk4": {"method": "rk4", "step": 1e-2}}
