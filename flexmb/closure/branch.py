@@ -38,9 +38,9 @@ AT_CROSSING = 2.0**-20
 AWAY = 2.0**-9
 # What rounding may change a pivot by: 1e-12 of the responses of its ports, `flexmb.closure.sizes`.
 ROUND_OFF = 2.0**-40
-# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. It is a sine of what
-# turns, in that response, which falls by all of it in a radian; speeds that are added up make that half. What falls faster
-# has been put right, and so divides by ever shorter steps that are tried.
+# Fall of a pivot, as part of its ports' response, while they move as far as the mechanism is large. A pivot is a sine
+# of what turns, in that response, and falls by all of it in a radian; speeds that are added up make that half. What
+# falls faster has been put right by a projection, whatever the step.
 FASTEST = 2.0
 # Of the distance to a singular position what a step of fixed length may cover. It errs by the fifth power of this part,
 # 1e-6, times what is small in Runge's rule: 1e-8, and passing takes some 100 such steps.
@@ -52,8 +52,8 @@ NEARBY = 2.0
 HALF = 0.5
 # What is noticed of steps that are not to be shortened: how far closures are open, and how long they are.
 NOTHING, GAPS, GAPS_AND_LENGTHS = range(3)
-# Root of the gap of a stabilised closure, beside the distance to a singular position, at whose square in the gap branches
-# differ: speeds that are added up make the distance pass for several times what it is.
+# Root of the gap of a stabilised closure, over the distance to a singular position: branches differ by the square of
+# the distance in the gap, and speeds that are added up make the distance pass for several times what it is.
 CLEAR = 2.0**-5
 
 

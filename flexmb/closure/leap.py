@@ -56,8 +56,8 @@ APART = 3.0
 # Of the distance before it, the least beyond the position where the run's end or a segment's cuts a leap short.
 BEYOND = 0.25
 # c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
-# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. How far
-# it may be moved either way is told by the campaign in tests/flexmb/closure/test_near_singular.py.
+# bodies added up, and closures far from the origin. Smooth accelerations jump by the cube of the leap: far less. The
+# campaign in tests/flexmb/closure/test_near_singular.py tells how far it may be moved either way.
 UNSEEN = 2.0**-42
 # By which the trapezoidal rule converges: Euler's, then its own twice.
 APPROACHES = 3

@@ -20,7 +20,8 @@ from tests.cases.test_overconstrained import FAMILY, closed_form
 
 # Settings, and the error (m) of markers that a run keeps to.
 SETTINGS = {
-    "dop853": ({}, 1e-7), "looser": ({"rtol": 1e-5, "atol": 1e-7}, 1e-2), "composite": ({"algorithm": "composite"}, 1e-7),
+    "dop853": ({}, 1e-7), "looser": ({"rtol": 1e-5, "atol": 1e-7}, 1e-2),
+    "composite": ({"algorithm": "composite"}, 1e-7),
     "rk4": ({"method": "rk4", "step": 1e-3}, 1e-6), "coarse rk4": ({"method": "rk4", "step": 1e-2}, 1e-2),
 }  # fmt: skip
 
