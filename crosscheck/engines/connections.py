@@ -24,6 +24,7 @@ from flexmb.scene.connectors import (
     HingeFriction,
     HingeSpring,
     SpringDamper,
+    actuator,
     by_stem,
 )
 from flexmb.scene.schema import Marker, Scene
@@ -96,8 +97,8 @@ def connections(scene: Scene, chain: tuple[Link, ...]) -> tuple[Connection, ...]
     return tuple(Connection(scene, chain, each) for each in scene.connectors if isinstance(each, BetweenNodes))
 
 
-def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float], Along]]]:
-    """(name, hinge, point mass or wheel, number of its coordinate, load by value and rate) of each along a hinge."""
+def along_hinges(scene: Scene) -> list[tuple[str, str, int, Callable[[float, float, float], Along]]]:
+    """Of each along a hinge: name, hinge (point mass, wheel), number of the coordinate, load by time, value, rate."""
     found = []
     for connector in scene.connectors:
         if isinstance(connector, AlongHinge):
@@ -211,23 +212,27 @@ def _inverse_jacobian(theta: Real) -> Real:
     return np.asarray(np.eye(3) - 0.5 * turn + b * turn @ turn)
 
 
-def _along(connector: AlongHinge) -> Callable[[float, float], Along]:
+def _along(connector: AlongHinge) -> Callable[[float, float, float], Along]:
     stems = by_stem(connector)
     if isinstance(connector, HingeFriction):
-        return lambda q, v: _friction(stems, v)
+        return lambda t, q, v: _friction(stems, v)
     assert isinstance(connector, HingeSpring)
     law = law_of(stems)
     lower, upper = (-inf if stems["lower"] is None else stems["lower"]), (
         inf if stems["upper"] is None else stems["upper"]
     )
     k, e = stems["stop_stiffness"], stems["stop_dissipation"]
+    push = actuator(connector)
+    pushed_by = push and profile(push)
 
-    def load(q: float, v: float) -> Along:
+    def load(t: float, q: float, v: float) -> Along:
         elastic, energy = law(q - stems["rest"])
         deep, side = (q - upper, 1.0) if q > upper else (lower - q, -1.0) if q < lower else (0.0, 1.0)
         pushed = side * k * deep * max(0.0, 1.0 + e * side * v)
         lost = stems["damping"] * v + pushed - side * k * deep
-        return Along(-(elastic + side * k * deep + lost), energy + 0.5 * k * deep**2, -lost * v)
+        driven = pushed_by(t).value if pushed_by else 0.0
+        load = driven - (elastic + side * k * deep + lost)
+        return Along(load, energy + 0.5 * k * deep**2, (driven - lost) * v)
 
     return load
 

@@ -11,7 +11,7 @@ from flexmb.building.links import BodyLink, Port, port
 from flexmb.building.numbering import Numbering
 from flexmb.scene import schema as s
 from flexmb.scene.bodies import IDENTITY
-from flexmb.scene.connectors import BetweenNodes, HingeFriction, HingeSpring, by_stem
+from flexmb.scene.connectors import BetweenNodes, HingeFriction, HingeSpring, actuator, by_stem
 from flexmb.scene.quaternions import rotation_matrix
 from flexmb.scene.tree import GROUND, coordinate_of
 from flexmb.tables import arrays as a
@@ -91,7 +91,7 @@ def connector_arrays(
         "connector": records,
         "end": sides,
         "bushing": matrices,
-        "hinge_spring": _hinge_springs(scene, springs, numbering, laws),
+        "hinge_spring": _hinge_springs(scene, springs, numbering, laws, number),
         "friction": _frictions(scene, frictions, numbering),
         "law": np.array(laws, float).reshape(-1, 8),
     }
@@ -107,7 +107,13 @@ def _speed(scene: s.Scene, connector: HingeSpring | HingeFriction, numbering: Nu
     return numbering.u[item.name].start + place
 
 
-def _hinge_springs(scene: s.Scene, springs: list[HingeSpring], numbering: Numbering, laws: Rows) -> a.Record:
+def _hinge_springs(
+    scene: s.Scene,
+    springs: list[HingeSpring],
+    numbering: Numbering,
+    laws: Rows,
+    number: Callable[[s.Function | None], int],
+) -> a.Record:
     out = np.zeros(len(springs), a.HINGE_SPRING)
     for row, spring in zip(out, springs, strict=True):
         law = by_stem(spring)
@@ -116,6 +122,7 @@ def _hinge_springs(scene: s.Scene, springs: list[HingeSpring], numbering: Number
             row[name] = law[name]
         row["lower"] = -NO_STOP if law["lower"] is None else law["lower"]
         row["upper"] = NO_STOP if law["upper"] is None else law["upper"]
+        row["function"] = number(actuator(spring))
     return out
 
 

@@ -44,10 +44,14 @@ def mass(
         console.print(_table(system.scene.name, rows))
 
 
+_AXES = "Of the scene in World axes, of bodies in their own frames; inertia about the mass centre."
+
+
 def _table(scene: str, rows: list[tuple[str, MassProperties]]) -> Table:
     table = Table(title=f"\nMass properties of {scene}", title_justify="left", box=None, padding=(0, 2, 0, 0))
+    table.caption, table.caption_justify = _AXES, "left"
     table.add_column("with what it carries")
-    for heading in ("mass kg", "centre m", "inertia kg m²"):
+    for heading in ("mass kg", "centre m", "inertia kg m², xx, yy, zz, xy, xz, yz"):
         table.add_column(heading, justify="left")
     for name, found in rows:
         J = found.inertia_in_body

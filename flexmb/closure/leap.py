@@ -20,7 +20,6 @@ Else there is no leap, and steps may come closer (cw.closer): they pass by what 
 the run ends with the status it had.
 """
 
-import math
 from math import inf
 
 import numpy as np
@@ -32,6 +31,7 @@ from flexmb.closure.projection import OPEN, close
 from flexmb.closure.rows import largest_gap
 from flexmb.integrate.control import Interval
 from flexmb.integrate.leap import cubic
+from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
 from flexmb.jain.balance import power
 from flexmb.jit.kernel import helper, kernel, sweep
 from flexmb.motion.coordinates import load_state, store_slope
@@ -58,8 +58,6 @@ ROUGH = 8.0
 # c of hyperbolas x y = c that gaps of closures may feign: `TIGHT` times 2^8, for ports whose speed is that of a few
 # bodies added up, and closures far from the origin.
 UNSEEN = 2.0**-42
-# Of a leap from either end: the inner nodes of Lobatto's rule, of weights 1, 5, 5, 1 over 12.
-INNER = 0.5 - math.sqrt(0.05)
 # By which the trapezoidal rule converges: Euler's, then its own twice.
 APPROACHES = 3
 
@@ -94,6 +92,18 @@ def leap(end, y, dy, y_new, dy_new, s):
             return h
     recall(cw)
     return 0.0
+
+
+@kernel
+def beside(t, y, dy, s):
+    """dy at y beside a singular position, on whichever side, y being closed to rounding first; returns a status code.
+
+    For controllers, whose part in a leap is known once it has been made: where it ended, y is the last good state now.
+    """
+    status = _slope(t, y, dy, s)
+    if status == OK and t == s.cw.time[0]:
+        remember(t, y, s.cc, s.cw)
+    return status
 
 
 @sweep
@@ -195,13 +205,13 @@ def _lands(t, h, y, dy, y_new, dy_new, s):
             return False
     inner, slope, total = np.empty(y.shape[0]), np.empty(y.shape[0]), np.empty(y.shape[0])
     for i in range(y.shape[0]):
-        total[i] = (dy[i] + dy_new[i]) / 12.0
+        total[i] = EDGE_WEIGHT * (dy[i] + dy_new[i])
     for x in (INNER, 1.0 - INNER):
         cubic(Interval(t, t + h, t + h), y, dy, y_new, dy_new, t + x * h, inner)
         if _slope(t + x * h, inner, slope, s) != OK:
             return False
         for i in range(y.shape[0]):
-            total[i] += 5.0 / 12.0 * slope[i]
+            total[i] += INNER_WEIGHT * slope[i]
     for i in range(y.shape[0]):
         y_new[i] = y[i] + h * total[i]
     if _slope(t + h, y_new, dy_new, s) != OK:

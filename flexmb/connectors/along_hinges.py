@@ -1,4 +1,4 @@
-"""Connectors along scalar coordinates: nonlinear springs with stops, and dry friction.
+"""Connectors along scalar coordinates: nonlinear springs with stops and actuators, and dry friction.
 
 A stop at depth d, pressed in at the rate d', pushes back by k d (1 + e d'), Hunt and Crossley (1975), and never pulls:
 the load starts from zero however fast it is met. Friction follows Hess and Soom (1990), smooth through zero:
@@ -11,7 +11,7 @@ from flexmb.jit.features import has
 from flexmb.jit.kernel import helper
 from flexmb.jit.lanes import select
 from flexmb.spatial.scalar import sqrt
-from flexmb.tables.features import FRICTION, HINGE_SPRINGS
+from flexmb.tables.features import FRICTION, HINGE_ACTUATORS, HINGE_SPRINGS
 
 
 @helper
@@ -48,6 +48,11 @@ def _spring(c, w, i):
     w.hinge_spring[i].load = -(elastic + k * beyond + lost)
     w.hinge_spring[i].energy = energy + 0.5 * k * beyond * beyond
     w.hinge_spring[i].power = -lost * v
+    if has(c, HINGE_ACTUATORS):
+        f = c.hinge_spring[i].function
+        if f >= 0:
+            w.hinge_spring[i].load += w.function[f, 0]
+            w.hinge_spring[i].power += w.function[f, 0] * v
 
 
 @helper
@@ -72,7 +77,7 @@ def stored_along_hinges(c, w):
 
 @helper
 def power_along_hinges(c, w):
-    """Power (W) of dampers, stops and friction at the last evaluation."""
+    """Power (W) of dampers, stops, actuators and friction at the last evaluation."""
     total = 0.0
     for i in range(c.hinge_spring.shape[0]):
         total += w.hinge_spring[i].power

@@ -73,6 +73,7 @@ class Feedback:
         if route.leaping is not None:
             where[a.BACK], _ = addresses(route.leaping.back, REAL, VECTOR, constants)
             where[a.LEAP], _ = addresses(route.leaping.leap, REAL, REAL, *[VECTOR] * 4, constants)
+            where[a.BESIDE], _ = addresses(route.leaping.beside, STATUS, REAL, VECTOR, VECTOR, constants)
         self._where, self._held = where, self._buffers()
         self._called = self._callbacks()
         self._loads, self._drives = self._outputs.loads, self._outputs.drives
@@ -169,9 +170,10 @@ class Feedback:
                 raise trouble
 
     @property
-    def reads_at_once(self) -> bool:
-        """Whether a continuous controller reads what depends on forces of the same instant."""
-        return self._wiring.reads_at_once
+    def continuous_states(self) -> list[int]:
+        """Places in `Loop.state` of the continuous controllers' states x, in their order."""
+        rows = [row for row in self._wiring.controller if not row["sampled"]]
+        return [int(row["state"]) + j for row in rows for j in range(int(row["states"]))]
 
     @property
     def driven(self) -> list[int]:
@@ -310,7 +312,7 @@ class Feedback:
             slack=np.array([apart]), held=held, following=np.zeros(1, np.int64),
             replaying=np.zeros(1, np.int64), now=np.zeros(1), y=np.zeros(n), dy=np.zeros(n),
             stuck=np.zeros(1, np.int64), good=np.zeros(len(w.initial)), before=np.zeros(n),
-            slope_before=np.zeros(n), after=np.zeros(n), slope_after=np.zeros(n), mean=np.zeros(len(w.drive)),
+            slope_before=np.zeros(n), after=np.zeros(n), slope_after=np.zeros(n), driven=np.zeros((4, len(w.drive))),
             rates=out.rates, markers=out.markers, loads=self._loads, drives=self._drives, doubt=self._doubt,
             **self._held,
         )  # fmt: skip

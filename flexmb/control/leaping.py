@@ -1,27 +1,45 @@
 """The closed loop across a singular position of a closed chain: the motion leaps (`flexmb.closure.leap`), and with it
 what controllers know.
 
-The motion leaps under what is driven before the leap. Then states of controllers are integrated in small steps along
-the cubic between both ends, and speeds are corrected by what the drives were on average: along that change of
-accelerations all closures stay closed. Where controllers are too fast for this, by themselves or through the motion,
-or read accelerations, nothing of the leap is used, and the run ends before the singular position with the status of
-one.
+The motion leaps under what is driven before the leap. Then, in turn, states of controllers are integrated in small
+parts along the cubic between both ends, and the motion once more by Lobatto's rule under what is driven there, until
+speeds are known. At the inner nodes that is not what is driven at these instants but what has the same average
+over the leap and the same first moment: they move speeds and coordinates alike, also where a controller comes to a
+limit within the leap or swings faster than the rule resolves.
+
+Where controllers are too fast for this, by themselves or through the motion, or read accelerations, nothing of the leap
+is used, and the run ends before the singular position with the status of one.
 """
 
-from math import inf
+from math import inf, nan, sqrt
 
 import numpy as np
 
 from flexmb.control import tables as a
-from flexmb.control.loop import accelerate, give, settle, steer, take
-from flexmb.jit.direct import real_at
+from flexmb.control.loop import accelerate, give, keep_good, steer, take
+from flexmb.integrate.control import Interval, copy
+from flexmb.integrate.leap import cubic
+from flexmb.integrate.lobatto import EDGE_WEIGHT, INNER, INNER_WEIGHT
+from flexmb.jit.direct import real_at, status_at
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import OK
 
-PARTS = 32  # steps of controllers' states in a leap
-SLOW = 0.125  # ratio of successive corrections by states' own effect, in one of these steps
-CONVERGING = 0.125  # the same of accelerations by feedback, in the leap
-ROUNDING = 2.0**-30  # of accelerations: less beside a singular position than elsewhere
+# What is wanted of speeds and of controllers' states, relative: less than the tightest usual tolerance, 1e-10.
+WANTED = 2.0**-34
+# The longest leap takes 2^-9 of the time in which a mechanism moves as far as it is large. Drives that change as fast
+# as it moves are then wrong by as much at first, and speeds by 2^-18: `FED_BACK` so often makes `WANTED` of it.
+TURNS = 4
+FED_BACK = 2.0**-4
+# What rounding makes of speeds across the branch, relative: a gap of 2^-50 is 2^-37 of the position across it at a
+# distance of 2^-13, and as much over 2^-13 of its speed, 2^-24, times a few for long chains. Controllers see it.
+ACROSS = 2.0**-20
+# Parts of a leap in which states are integrated at first. A limit that is reached within one spoils the average of a
+# drive by 2^-15 of its change, which is 2^-33 of speeds at most.
+PARTS = 32
+# And at last: not for accuracy, but so that there is an end. Others only change which controllers end a run.
+FINEST = 2048
+# A part of z time constants of a controller corrects its rates by z/2 each time, and errs by z^4/120 of what dies out.
+SLOW = 0.5 * (120.0 * WANTED) ** 0.25
 
 
 @kernel
@@ -46,7 +64,8 @@ def leap(end, y, dy, y_new, dy_new, s):
     _put(s.slope_before, dy)
     _put(s.after, y_new)
     _put(s.slope_after, dy_new)
-    if not s.follows[0] and _carry(t, h, y, dy, y_new, dy_new, s) and _correct(t, h, y_new, dy_new, s):
+    if not s.continuous[0] or (not s.follows[0] and _follow(Interval(t, t + h, t + h), y, dy, y_new, dy_new, s)):
+        keep_good(s)
         return h
     s.stuck[0] = 1
     return 0.0
@@ -75,85 +94,154 @@ def _put(of_motion, y):
 
 
 @helper
-def _carry(t, h, y, dy, y_new, dy_new, s):
-    """x along the leap into y_new, by the classical rule, and averages of drives into s.mean; whether x is slow enough.
-    """
-    n, m = y.shape[0], s.y.shape[0] - 1
-    trial, k, part = np.empty(n), np.zeros((4, n)), h / PARTS
-    for i in range(m, n - 1):
-        y_new[i] = y[i]
-    for d in range(s.drive.shape[0]):
-        s.mean[d] = 0.0 if s.continuous[0] else s.function[s.drive[d].function].data[0]
-    if not s.continuous[0]:
-        return True
-    for step in range(PARTS):
-        for stage in range(4):
-            ahead = 0.5 * ((stage + 1) // 2)
-            _between((step + ahead) / PARTS, h, y, dy, y_new, dy_new, trial)
-            for i in range(m, n - 1):
-                trial[i] = y_new[i] + ahead * part * k[stage - 1, i] if stage > 0 else y_new[i]
-            take(trial, s)
-            if steer(t + (step + ahead) * part, s) != OK:
-                return False
-            give(s.dy, s.change, s, k[stage])
-            weight = (1.0 if stage in (0, 3) else 2.0) / (6.0 * PARTS)
-            for d in range(s.drive.shape[0]):
-                s.mean[d] += weight * s.function[s.drive[d].function].data[0]
-        if not _is_slow(k, m, s):
+def _follow(step, y, dy, y_new, dy_new, s):
+    """y_new and dy_new with controllers, from those of the motion under what was driven before; whether they settle."""
+    effect, former = inf, np.empty(s.drive.shape[0])
+    for i in range(s.y.shape[0] - 1, y.shape[0] - 1):
+        y_new[i], dy_new[i] = y[i], dy[i]
+    for d in range(former.shape[0]):
+        s.driven[3, d] = s.function[s.drive[d].function].data[0]
+    for turn in range(TURNS + 1):
+        copy(s.driven[3], former)
+        if not _carry(step, y, dy, y_new, dy_new, s) or _arrive(step.end, y_new, dy_new, s) != OK:
             return False
-        for i in range(m, n - 1):
-            y_new[i] += part / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
+        effect, last = _effect(step, former, dy_new, s), effect
+        if not effect <= FED_BACK * (last + ACROSS):
+            return False
+        if effect <= WANTED:
+            break
+        if turn < TURNS and _move(step, y, dy, y_new, dy_new, s) != OK:
+            return False
     return True
 
 
 @helper
-def _between(x, h, y, dy, y_new, dy_new, result):
-    """Hermite's cubic at the fraction x of the leap."""
-    for i in range(y.shape[0]):
-        change = y_new[i] - y[i]
-        bend = (1.0 - x) * (h * dy[i] - change) - x * (h * dy_new[i] - change)
-        result[i] = y[i] + x * (change + (1.0 - x) * bend)
+def _carry(step, y, dy, y_new, dy_new, s):
+    """x along the leap into y_new, and what is driven into s.driven; whether parts are short enough."""
+    parts = PARTS
+    while parts <= FINEST:
+        if _carry_in(parts, step, y, dy, y_new, dy_new, s):
+            _place_drives(s)
+            return True
+        parts *= 2
+    return False
 
 
 @helper
-def _is_slow(k, m, s):
-    """Whether the second and third rates in a step are close: of each controller, they differ by its states alone."""
+def _carry_in(parts, step, y, dy, y_new, dy_new, s):
+    """The same by the classical rule in so many parts; s.driven has average and first moment at the inner nodes."""
+    n, m = y.shape[0], s.y.shape[0] - 1
+    trial, k, x, part = np.empty(n), np.zeros((4, n)), np.empty(n), (step.end - step.start) / parts
+    for i in range(m, n - 1):
+        x[i] = y[i]
+    for d in range(s.drive.shape[0]):
+        s.driven[1, d] = s.driven[2, d] = 0.0
+    for p in range(parts):
+        for stage in range(4):
+            ahead = 0.5 * ((stage + 1) // 2)
+            place = (p + ahead) / parts
+            t = step.start + place * (step.end - step.start)
+            cubic(step, y, dy, y_new, dy_new, t, trial)
+            for i in range(m, n - 1):
+                trial[i] = x[i] + ahead * part * k[stage - 1, i] if stage > 0 else x[i]
+            take(trial, s)
+            if steer(t, s) != OK:
+                return False
+            give(s.dy, s.change, s, k[stage])
+            weight = (1.0 if stage in (0, 3) else 2.0) / (6.0 * parts)
+            for d in range(s.drive.shape[0]):
+                value = s.function[s.drive[d].function].data[0]
+                s.driven[1, d] += weight * value
+                s.driven[2, d] += weight * place * value
+                if p == 0 and stage == 0:
+                    s.driven[0, d] = value
+                s.driven[3, d] = value
+        if not _is_slow(k, x, part, parts * part, m, s):
+            return False
+        for i in range(m, n - 1):
+            x[i] += part / 6.0 * (k[0, i] + 2.0 * (k[1, i] + k[2, i]) + k[3, i])
+    for i in range(m, n - 1):
+        y_new[i] = x[i]
+    return True
+
+
+@helper
+def _is_slow(k, x, part, h, m, s):
+    """Whether the second and third rates in a part are close: of each controller, they differ by its states alone."""
     for i in range(s.controller.shape[0]):
         o = s.controller[i]
         if not o.sampled:
             left, change, size = 0.0, 0.0, 0.0
             for j in range(m + o.x, m + o.x + o.states):
-                left += (k[2, j] - k[1, j]) ** 2
-                change += (k[1, j] - k[0, j]) ** 2
-                size += k[0, j] ** 2
-            if not left <= SLOW**2 * change + ROUNDING**2 * size:
+                left += (part * (k[2, j] - k[1, j])) ** 2
+                change += (part * (k[1, j] - k[0, j])) ** 2
+                size += x[j] ** 2 + (h * k[0, j]) ** 2
+            if not left <= SLOW**2 * change + WANTED**2 * size:
                 return False
     return True
 
 
 @helper
-def _correct(t, h, y_new, dy_new, s):
-    """y_new by the drives' average, and its slope; whether feedback is slow enough beside the leap.
-
-    Needs the slope by the drives of the start in s.slope_after; leaves that by those of the end in s.slope_before.
-    """
-    n, m = y_new.shape[0], s.y.shape[0] - 1
-    if _slope(t + h, y_new, dy_new, s) != OK:
-        return False
-    for i in range(m):
-        s.slope_before[i] = s.dy[i]
+def _place_drives(s):
+    """Rows 1 and 2 of s.driven: values at the inner nodes by which Lobatto's rule has this average, first moment."""
     for d in range(s.drive.shape[0]):
-        s.function[s.drive[d].function].data[0] = s.mean[d]
-    if accelerate(t + h, s) != OK:
-        return False
-    for i in range(m + 1):
-        y_new[i if i < m else n - 1] += h * (s.dy[i] - s.slope_after[i])
-    settle(t + h, y_new, s)
-    if _slope(t + h, y_new, dy_new, s) != OK:
-        return False
-    left, change, size = 0.0, 0.0, 0.0
+        inner = (s.driven[1, d] - EDGE_WEIGHT * (s.driven[0, d] + s.driven[3, d])) / INNER_WEIGHT
+        moment = (s.driven[2, d] - EDGE_WEIGHT * s.driven[3, d]) / INNER_WEIGHT
+        rise = (moment - 0.5 * inner) / (1.0 - 2.0 * INNER)
+        s.driven[1, d], s.driven[2, d] = 0.5 * inner - rise, 0.5 * inner + rise
+
+
+@helper
+def _arrive(t, y, dy, s):
+    """dy at the end of the leap, y, once that is closed; returns a status code."""
+    take(y, s)
+    status = steer(t, s)
+    if status == OK:
+        status = _slope_beside(t, s)
+    give(s.y, s.state, s, y)
+    give(s.dy, s.change, s, dy)
+    return status
+
+
+@helper
+def _effect(step, former, dy, s):
+    """What the change of drives does to speeds in the leap, relative to them: at its end, where dy is the slope."""
+    for d in range(former.shape[0]):
+        s.function[s.drive[d].function].data[0] = former[d]
+    if _slope_beside(step.end, s) != OK:
+        return nan
+    change, size, m = 0.0, 0.0, s.y.shape[0] - 1
     for i in range(m - s.rates.shape[0], m):
-        left += (s.dy[i] - s.slope_before[i]) ** 2
-        change += (s.slope_before[i] - s.slope_after[i]) ** 2
-        size += s.dy[i] ** 2
-    return left <= CONVERGING**2 * change + ROUNDING**2 * size
+        change += (dy[i] - s.dy[i]) ** 2
+        size += s.y[i] ** 2
+    return (step.end - step.start) * sqrt(change / size)
+
+
+@helper
+def _slope_beside(t, s):
+    """s.dy on whichever side of the singular position; s.y is closed to rounding."""
+    return status_at(s.address[a.BESIDE], (t, s.y, s.dy, s.address[a.CONSTANTS]))
+
+
+@helper
+def _move(step, y, dy, y_new, dy_new, s):
+    """q, u and work of y_new by Lobatto's rule, under what is driven at its nodes; returns a status code."""
+    h, n, m = step.end - step.start, y.shape[0], s.y.shape[0] - 1
+    inner, total = np.empty(n), np.empty(n)
+    for i in range(n):
+        total[i] = EDGE_WEIGHT * (dy[i] + dy_new[i])
+    for node in (1, 2):
+        t = step.start + (INNER if node == 1 else 1.0 - INNER) * h
+        cubic(step, y, dy, y_new, dy_new, t, inner)
+        take(inner, s)
+        for d in range(s.drive.shape[0]):
+            s.function[s.drive[d].function].data[0] = s.driven[node, d]
+        status = _slope_beside(t, s)
+        if status != OK:
+            return status
+        for i in range(m + 1):
+            total[i if i < m else n - 1] += INNER_WEIGHT * s.dy[i]
+    for i in range(m + 1):
+        j = i if i < m else n - 1
+        y_new[j] = y[j] + h * total[j]
+    return OK

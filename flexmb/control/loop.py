@@ -98,15 +98,29 @@ def look(t, y, signal, s):
     return status
 
 
+@kernel
+def respond(t, s):
+    """What continuous controllers make of the signals of sensors and of their states, as they are; a status code."""
+    status = _act_continuously(t, s)
+    _drive(s)
+    return status
+
+
 @helper
 def settle(t, y, s):
     """Put the mechanics' part of y on its manifold; states of controllers are kept beside the last good state there."""
     take(y, s)
     nothing_at(s.address[a.MANIFOLD], (t, s.y, s.address[a.CONSTANTS]))
     if s.address[a.BACK] and real_at(s.address[a.BACK], (s.before, s.address[a.CONSTANTS])) == t:
-        for i in range(s.state.shape[0]):
-            s.good[i] = s.state[i]
+        keep_good(s)
     give(s.y, s.state, s, y)
+
+
+@helper
+def keep_good(s):
+    """States of controllers, for those beside the last good state of the motion."""
+    for i in range(s.state.shape[0]):
+        s.good[i] = s.state[i]
 
 
 @helper

@@ -22,7 +22,8 @@ def powers(system: System, times: Real, states: Real, drives: Record, signals: R
     longer = _lengthening(ends, rows[:, len(loads) :].reshape(len(times), len(connectors), 2, 24))
     for drive in drives:
         rate = np.zeros(len(times))
-        for j in np.flatnonzero(c.speed["motor"] == drive["function"]):
+        pushed = c.hinge_spring["speed"][c.hinge_spring["function"] == drive["function"]]
+        for j in [*np.flatnonzero(c.speed["motor"] == drive["function"]), *pushed]:
             rate += states[:, system.nq + j]
         rate += along[:, c.load["function"][loads] == drive["function"]].sum(axis=1)
         rate += longer[:, c.connector["function"][connectors] == drive["function"]].sum(axis=1)

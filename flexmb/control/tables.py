@@ -22,9 +22,9 @@ SAMPLE, APPLY = range(2)
 
 # Kernels and tables that the loop reaches by address: places in `Loop.address`.
 MOTION, MANIFOLD, RETRACTION, CONSTANTS, WORKSPACE, MARKERS, TREE, TREE_WORKSPACE, OBSERVING, OUTPUTS = range(10)
-BACK, LEAP = range(10, 12)  # of closed chains; 0 elsewhere
-ASKING = 12  # Python, for loads that no kernel finds where the motion was just evaluated; 0 where there is one
-ADDRESSES = 13
+BACK, LEAP, BESIDE = range(10, 13)  # of closed chains; 0 elsewhere
+ASKING = 13  # Python, for loads that no kernel finds where the motion was just evaluated; 0 where there is one
+ADDRESSES = 14
 # The same of `LoopTangent.address`.
 JACOBIAN, EXACT, TANGENT = range(3)
 
@@ -109,7 +109,7 @@ class Loop:
     slope_before: Real
     after: Real  # ... and on the other
     slope_after: Real
-    mean: Real  # (drives,) what is driven in a leap, on average
+    driven: Real  # (4,drives) at the nodes of a leap
     rates: Real  # (nu,) accelerations that markers are seen with
     markers: Real  # (K,24) as in flexmb.entry.observation
     loads: Real  # (N+C,6) of hinges, then of closures

@@ -144,14 +144,14 @@ def _sensor(system: System, sensor: Sensor) -> tuple[int, int, int, int]:
         case LoadSensor(hinge=hinge):
             return a.LOAD, [*observed.hinges, *observed.closures].index(hinge), 6, a.WORLD
         case DriveSensor(coordinate=coordinate):
-            return a.DRIVE_LOAD, _driven(system, coordinate), 1, a.WORLD
+            return a.DRIVE_LOAD, driven_speed(system, coordinate), 1, a.WORLD
         case TimeSensor():
             return a.TIME, 0, 1, a.WORLD
     return a.PROFILE, 0, 2, a.WORLD
 
 
-def _driven(system: System, coordinate: str) -> int:
-    """The number of its speed, -1 where it is free."""
+def driven_speed(system: System, coordinate: str) -> int:
+    """The number of a scalar coordinate's speed, -1 where it is free."""
     rate = rate_name(coordinate, scalar_paths(system.scene)[coordinate])
     number = [name for name, _ in system.state_names[1]].index(rate)
     return number if system.constants.speed["prescribed"][number] >= 0 else -1

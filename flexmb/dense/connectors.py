@@ -14,7 +14,7 @@ from flexmb.dense.function_jets import profile
 from flexmb.dense.jets import MovingFrame, skew
 from flexmb.dense.members import DenseTree
 from flexmb.scene import schema as s
-from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeFriction, by_stem
+from flexmb.scene.connectors import AlongHinge, BetweenNodes, HingeFriction, actuator, by_stem
 from flexmb.scene.tree import coordinate_of
 from flexmb.typing import Real
 
@@ -43,8 +43,8 @@ def grip(connector: BetweenNodes, a: MovingFrame, b: MovingFrame, t: float) -> G
     return Grip(on_a, on_b, energy)
 
 
-def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Real) -> Hold:
-    """Of a connector along a coordinate of a hinge, point mass or wheel."""
+def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Real, t: float) -> Hold:
+    """Of a connector along a coordinate of a hinge, point mass or wheel, at time t."""
     item, number = coordinate_of(scene, connector)
     x = [scalar for scalar in tree.scalars if scalar.owner == item.name][number]
     law, rate = by_stem(connector), u[x.u]
@@ -59,7 +59,8 @@ def hold(scene: s.Scene, tree: DenseTree, connector: AlongHinge, q: Real, u: Rea
         pressed = max(0.0, 1.0 + law["stop_dissipation"] * side * rate)
         load += side * law["stop_stiffness"] * depth * pressed
         energy += 0.5 * law["stop_stiffness"] * depth**2
-    return Hold(x.u, -load, energy)
+    push = actuator(connector)
+    return Hold(x.u, (0.0 if push is None else float(profile(push, t).value)) - load, energy)
 
 
 def resistance(law: dict[str, Any], x: float) -> tuple[float, float]:

@@ -143,7 +143,7 @@ class DenseSystem:
             tau[member.u_hinge] += ball_torque(member.hinge, q[member.q_hinge], u[member.u_hinge])
         for connector in self.scene.connectors:
             if not isinstance(connector, BetweenNodes):
-                held = hold(self.scene, self.tree, connector, q, u)
+                held = hold(self.scene, self.tree, connector, q, u, t)
                 tau[held.u] += held.load
         return tau
 
@@ -252,7 +252,7 @@ class DenseSystem:
         spring += sum(gripped.energy for gripped in self.grips(q, u).values())
         for connector in self.scene.connectors:
             if not isinstance(connector, BetweenNodes):
-                spring += hold(self.scene, self.tree, connector, q, u).energy
+                spring += hold(self.scene, self.tree, connector, q, u, 0.0).energy
         return {
             "kinetic": kinetic + sum(body.kinetic for body in bodies),
             "strain": strain,

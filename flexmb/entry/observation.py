@@ -135,7 +135,7 @@ def sense_markers(t, y, c, w, out):
     pose_sweep(c, w)
     acceleration_sweep(c, w)
     for i in range(out.marker_port.shape[0]):
-        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
 
 
 @helper
@@ -159,7 +159,7 @@ def _observe_motion(c, w, out):
         pose_sweep(c, w)
         acceleration_sweep(c, w)
     for i in range(out.marker_port.shape[0]):
-        _observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
+        observe_marker(c, w, out.marker_body[i], out.marker_port[i], out.markers[i])
 
 
 @helper
@@ -173,7 +173,7 @@ def _observe_along_hinges(c, w, loads):
 
 
 @helper
-def _observe_marker(c, w, k, port, row):
+def observe_marker(c, w, k, port, row):
     """The row (24,) of a marker at a port of body k."""
     R = mat3(w.body[k].pose_rotation, 0)
     alpha, a = times6(R, port_acceleration(c, w, k, port))

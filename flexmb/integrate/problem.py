@@ -90,12 +90,14 @@ class Accuracy(NamedTuple):
 class Leaping(NamedTuple):
     """Kernels `back` and `leap` of a `Problem` that can go on from where a step fails.
 
+    beside(t, y, dy, constants) finds slopes where `leap` does, for what is around the problem; a status code.
     watch_steps(constants) prepares it for a method that does not estimate errors: steps fail that are too long to
     resolve what they meet.
     """
 
     back: Any
     leap: Any
+    beside: Any
     watch_steps: Callable[[Any], None]
 
 

@@ -1,24 +1,30 @@
 """The linear model of a scene with continuous controllers: their states behind those of the motion.
 
-What the controllers see and drive is linearised by differences of fourth order, exact but for rounding where sensors
-and laws are linear; the motion itself by exact derivatives, under the torques that the controllers ask for.
+With y = C z + D v + E f what sensors say by the motion z, by what is driven, v, and by other forces f, and the laws
+
+    v = G y + G_x x,    x' = L y + L_x x
+
+G knows nothing of loads and accelerations (or the scene was refused, for its torques would depend on themselves). So
+G D = G E = 0, and the laws close the loop. C and E are exact, and D but for rounding, as loads are linear in what is
+driven. The laws, which take nothing but numbers, are differenced to fourth order: exact but for rounding where they are
+linear.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import partial
 from typing import NamedTuple
 
 import numpy as np
 
 from flexmb.control.feedback import Feedback
-from flexmb.control.loop import project, rhs
+from flexmb.control.loop import look, project, respond
 from flexmb.integrate.problem import Accuracy, Clock
 from flexmb.linear.linear_model import LinearModel
+from flexmb.linear.observed import values
+from flexmb.linear.sensed import Along, sensed
 from flexmb.linear.variations import Equations, equations_of
-from flexmb.motion.retraction import move
 from flexmb.scene.functions import Constant
 from flexmb.system import algorithms
 from flexmb.system.closed import ClosedSystem
@@ -28,7 +34,7 @@ from flexmb.tables.status import OK, Status
 from flexmb.typing import Real
 
 LARGE = 2.0**20
-"""Change of a value whose effect is linear: beside it the rounding of all others is nothing."""
+"""Change of what is driven, whose effect is linear: beside it the rounding of all else is nothing."""
 REMEDY = "linearise flexmb.open_loop(scene), and close the loop on that model"
 STEP = 1e-3
 """Of differences, in SI units or relative: its fourth power and rounding over it are both 1e-13."""
@@ -37,26 +43,25 @@ STEP = 1e-3
 def closed_loop(system: System, state: State, model: Callable[[Equations, State], LinearModel]) -> LinearModel:
     """About a state, and the controllers' initial states; `model` makes the linear model of a motion.
 
-    NotImplementedError for controllers that are sampled or read what depends on forces of the same instant.
+    NotImplementedError for controllers that are sampled.
     """
     if isinstance(system, ClosedSystem):
         state = system._admissible(*system.layout.entering(state))
     loop = ClosedLoop(system, state)
     found = loop.at(state, loop.initial, model)
-    of_motion, states = found.of_motion, len(loop.initial)
     return replace(
-        of_motion,
-        states=(*of_motion.states, *((name, "") for name in loop.state_names)),
-        A=found.A,
-        B=np.vstack([of_motion.B, np.zeros((states, len(of_motion.inputs)))]),
-        C=np.hstack([of_motion.C, np.zeros((len(of_motion.outputs), states))]),
-    )
+        found.of_motion,
+        states=(*found.of_motion.states, *((name, "") for name in loop.state_names)),
+        A=found.A, B=found.B, C=found.C,
+    )  # fmt: skip
 
 
 class AtState(NamedTuple):
-    """A closed loop linearised: A (2f+X,2f+X) of [xi; du; dx]; rates (X,) of x; the model of the motion by itself."""
+    """A closed loop linearised: A, B, C of 2f+X states [xi; du; dx]; rates (X,) of x; the model of the motion alone."""
 
     A: Real
+    B: Real
+    C: Real
     rates: Real
     of_motion: LinearModel
 
@@ -69,8 +74,6 @@ class ClosedLoop:
         self._plant = plant = system._anew()
         chosen, route = algorithms.chosen("articulated"), plant.route()
         self._feedback = feedback = Feedback(plant, chosen, route, route.tables())
-        if feedback.reads_at_once:
-            raise NotImplementedError(f"a controller reads an acceleration or a load: {REMEDY}")
         clock = Clock(np.array([start.t, start.t + 1.0]), np.array([start.t + 1.0]))
         y = feedback.begin(_Start(start), clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.initial: Real = y[plant.nq + plant.nu : -1]
@@ -81,25 +84,20 @@ class ClosedLoop:
     def at(self, state: State, x: Real, model: Callable[[Equations, State], LinearModel]) -> AtState:
         """Linearised about a state of the motion and x (X,) of the controllers."""
         plant, feedback = self._plant, self._feedback
-        y = np.concatenate([state.q, state.u, x, [0.0]])
+        laws = _Laws(feedback, state.t, np.concatenate([state.q, state.u, x, [0.0]]))
         equations = equations_of(plant)
-        seen = _Seen(feedback, state.t, plant.nq + plant.nu)
-        derivative = np.column_stack([
-            (at[0] - at[3] + 8.0 * (at[2] - at[1])) / (12.0 * size)
-            for move_by, size in _variations(plant, y, equations, state)
-            for at in [[seen(move_by(k * size)) for k in (-2, -1, 1, 2)]]
-        ])  # fmt: skip
-        now = seen(y)  # and the controllers say again what they say at the state
-        of_motion, at = model(equations, state), equations.variations(state)
-        n, drives, states = equations.freedom, len(now) - len(x), len(x)
-        by_independent = np.eye(len(at.by_chosen) + states, 2 * n + states, 2 * n - len(at.by_chosen))
-        by_independent[: len(at.by_chosen), : 2 * n] = at.by_chosen
-        derivative = derivative @ by_independent
-        A = np.zeros((2 * n + states, 2 * n + states))
-        A[: 2 * n, : 2 * n] = of_motion.A
-        A[n : 2 * n] += _effect(equations, state, feedback.driven)[at.chosen] @ derivative[:drives]
-        A[2 * n :] = derivative[drives:]
-        return AtState(A, now[drives:], of_motion)
+        of_motion = model(equations, state)
+        n, drives, states, sensors = len(of_motion.rates), len(feedback.driven), len(x), laws.sensors
+        G, L = laws.derivative[:drives, :sensors], laws.derivative[drives:, :sensors]
+        G_x, L_x = laws.derivative[:drives, sensors:], laws.derivative[drives:, sensors:]
+        rows = slice(len(of_motion.outputs) - sensors, None)  # sensors come last
+        C, E = of_motion.C[rows], of_motion.D[rows]
+        moved, said = _effect(equations, state, feedback.driven)
+        pushed = np.vstack([np.zeros((n, drives)), moved[equations.variations(state).chosen]])
+        A = np.block([[of_motion.A + pushed @ G @ C, pushed @ G_x], [L @ (C + said @ G @ C), L_x + L @ said @ G_x]])
+        outputs = np.hstack([of_motion.C, np.zeros((len(of_motion.C), states))])
+        outputs[rows] += said @ np.hstack([G @ C, G_x])
+        return AtState(A, np.vstack([of_motion.B, L @ E]), outputs, laws.rates, of_motion)
 
 
 class _Start(NamedTuple):
@@ -113,21 +111,42 @@ class _Start(NamedTuple):
         return np.concatenate([self.state.q, self.state.u, [0.0]])
 
 
-class _Seen:
-    """What is driven at y = [q, u, x, work], and the rates of x, as one row."""
+class _Laws:
+    """Continuous controllers at y = [q, u, x, work]: what is driven and the rates of x, with their derivatives.
 
-    def __init__(self, feedback: Feedback, t: float, of_motion: int) -> None:
-        self._feedback, self._t, self._of_motion = feedback, t, of_motion
+    `derivative` (drives+X,S+X) is by what sensors say and by x. DynamicsError where there are no accelerations.
+    """
 
-    def __call__(self, y: Real) -> Real:
-        """DynamicsError where there are no accelerations."""
-        loop, slope = self._feedback.running, np.empty(len(y))
-        status = rhs(self._t, y, slope, loop, loop)
+    def __init__(self, feedback: Feedback, t: float, y: Real) -> None:
+        self._feedback, self._loop, self._t = feedback, feedback.running, t
+        self._raise(look(t, y, self._loop.signal.copy(), self._loop))
+        signals, places = self._loop.signal, feedback.continuous_states
+        self.sensors: int = int(np.sum(self._loop.sensor["width"]))
+        self.rates: Real = self._respond()[len(feedback.driven) :]
+        columns = [self._difference(signals, i) for i in range(self.sensors)]
+        columns += [self._difference(self._loop.state, i) for i in places]
+        self.derivative = np.column_stack(columns) if columns else np.zeros((len(feedback.driven) + len(places), 0))
+        self._respond()  # and the controllers say again what they say at the state
+
+    def _difference(self, array: Real, i: int) -> Real:
+        value, h = array[i], STEP * max(1.0, abs(array[i]))
+        found = []
+        for k in (-2, -1, 1, 2):
+            array[i] = value + k * h
+            found.append(self._respond())
+        array[i] = value
+        return np.asarray((found[0] - found[3] + 8.0 * (found[2] - found[1])) / (12.0 * h), float)
+
+    def _respond(self) -> Real:
+        """What is driven, then the rates of x."""
+        self._raise(respond(self._t, self._loop))
+        driven = [self._loop.function["data"][f, 0] for f in self._feedback.driven]
+        return np.array([*driven, *self._loop.change[self._feedback.continuous_states]])
+
+    def _raise(self, status: int) -> None:
         self._feedback.raise_trouble()
         if status != OK:
             raise DynamicsError(Status(status).advice.format(body="at this state"))
-        driven = [loop.function["data"][f, 0] for f in self._feedback.driven]
-        return np.array([*driven, *slope[self._of_motion : -1]])
 
 
 def _refuse(system: System) -> None:
@@ -139,39 +158,14 @@ def _refuse(system: System) -> None:
         )
 
 
-def _variations(
-    plant: System, y: Real, equations: Equations, state: State
-) -> Iterator[tuple[Callable[[float], Real], float]]:
-    """For each displacement, speed and controller's state, y as a function of its change, and the step of differences.
-    """
-    nq, nu = plant.nq, plant.nu
-
-    def displaced(j: int, size: float) -> Real:
-        result, increment = y.copy(), np.zeros(nu)
-        increment[j] = size
-        move(y, increment, result, plant.constants)
-        return result
-
-    def changed(i: int, size: float) -> Real:
-        result = y.copy()
-        result[i] += size
-        return result
-
-    for j in equations.free:
-        yield partial(displaced, j), STEP
-    for j in equations.free:
-        yield partial(changed, nq + j), STEP * max(1.0, abs(state.u[j]))
-    for i in range(nq + nu, len(y) - 1):
-        yield partial(changed, i), STEP * max(1.0, abs(y[i]))
-
-
-def _effect(equations: Equations, state: State, driven: Iterable[int]) -> Real:
-    """(n,D) accelerations of the free speeds by each value that is driven, in which they are linear."""
-    held = equations.constant_functions(state.t)
-
-    def rates(f: int, change: float) -> Real:
-        changed = Constant(value=held[f].value + change)
-        return equations.with_functions([*held[:f], changed, *held[f + 1 :]]).rates(state)
-
-    columns = [(rates(f, LARGE) - rates(f, 0.0)) / LARGE for f in driven]
-    return np.column_stack(columns) if columns else np.zeros((len(equations.free), 0))
+def _effect(equations: Equations, state: State, driven: Sequence[int]) -> tuple[Real, Real]:
+    """Accelerations (n,D) of the free speeds and what sensors say (S,D), by each value that is driven: linear in it."""
+    held, system, now = equations.constant_functions(state.t), equations.system, values(equations, state)
+    by_drive = np.zeros((len(now), len(driven)))
+    for i, f in enumerate(driven):
+        changed = Constant(value=held[f].value + LARGE)
+        other = equations.with_functions([*held[:f], changed, *held[f + 1 :]])
+        by_drive[:, i] = (values(other, state) - now) / LARGE
+    still = np.zeros((system.nq + system.nu, len(driven)))
+    rates = by_drive[system._observation.columns["rates"][0]][equations.free]
+    return rates, sensed(system, Along(now, by_drive, still))

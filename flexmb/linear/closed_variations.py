@@ -20,7 +20,7 @@ closed stays so, under
 
 from __future__ import annotations
 
-from typing import NamedTuple, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from scipy.linalg import qr, solve_triangular
@@ -85,12 +85,26 @@ class ClosedEquations(Equations):
             )
         c = self.constants
         self._closures = system.closures.on_tree(c, lambda: workspace(c, system.nq, system.nu))
-        self._rank = system.rank
+        self.rank = system.rank
+        """How many rows of the closures are independent."""
         self._rows_w = closure_tangent_workspace(self._closures.constants[1])
 
     @property
     def freedom(self) -> int:
-        return len(self.free) - self._rank
+        return len(self.free) - self.rank
+
+    @property
+    def tangent_tables(self) -> tuple[Any, ...]:
+        return self.constants, self._w, self._closures.constants[1], self._rows_w
+
+    @property
+    def row_loads(self) -> Real:
+        """(G,) loads of the rows where `rates` was asked for last."""
+        return self._closures.row_loads
+
+    def row_rates(self, state: State) -> Real:
+        """J (G,n): rates of the rows by the free speeds."""
+        return self._slopes(state).of_row_rates.by_speed
 
     def rates(self, state: State) -> Real:
         return self._closures.motion(state.t, pack(state)).accelerations[self.free]
@@ -152,7 +166,7 @@ class ClosedEquations(Equations):
 
     def _freedom(self, state: State, J: Real) -> _Freedom:
         """DynamicsError at a singular position."""
-        mass, rank = self.mass(state), self._rank
+        mass, rank = self.mass(state), self.rank
         weight = self._closures.constants[1].weight  # rotations beside translations
         root = np.linalg.cholesky(mass)
         U, S, Vt = np.linalg.svd(weight[:, None] * solve_triangular(root, J.T, lower=True).T)

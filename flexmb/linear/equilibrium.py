@@ -43,8 +43,8 @@ def equilibrium(system: System | Scene, guess: State | None = None) -> State:
     time. Wheels without springs stay at their angles. Of a scene with continuous controllers it is where the closed
     loop rests, the controllers' own states included. Whether the equilibrium is stable is for `linearize(...,
     held=True)`. Raises EquilibriumError where none is found, NotImplementedError for closures on bodies of level
-    "ruthless" and controllers that are sampled or read accelerations or loads, ValueError or TypeError for a guess that
-    is not a state of this system or leaves closures open.
+    "ruthless" and sampled controllers, ValueError or TypeError for a guess that is not a state of this system or leaves
+    closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)

@@ -90,8 +90,9 @@ class LinearModel:
     """x' = A x + B f, y = C x + D f about `state`, x = [xi; du]: displacements (n,) and changes of the speeds (n,).
 
     Names and units: `states` (2n), `inputs` (loads of hinges and wheels along their free speeds), `outputs` (the
-    states, then displacement and rotation vector of every marker, World axes). mass (n,n): mass matrix. motion (nq,n):
-    dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit derivative by time.
+    states, then displacement and rotation vector of every marker, World axes, then what sensors say). mass (n,n): mass
+    matrix. motion (nq,n): dq = motion xi. rates (n,): udot at `state`, zero in an equilibrium; drift (n,): its explicit
+    derivative by time.
 
     Of a closed chain the states are independent coordinates and their speeds, as many as the closures leave. Those that
     depend on them follow the states among the outputs, and `motion` moves all.

@@ -24,9 +24,10 @@ def linearize(system: System | Scene, state: State | None = None, *, held: bool 
     state's time, as in `equilibrium`. Where the state is no equilibrium, `LinearModel.rates` has its accelerations.
     Of a closed chain it is that of as many independent coordinates as the closures leave; those that depend on them are
     among the outputs. Of a scene with controllers it is that of the closed loop: their states come last, and start
-    where the scene says. Raises DynamicsError where the accelerations do not exist, NotImplementedError for sampled
-    controllers and closures on bodies of level "ruthless", ValueError or TypeError for what is not a state of this
-    system or leaves closures open.
+    where the scene says. What sensors say is among the outputs: "gyro[0]", or "angle" of one number; loads and
+    accelerations depend on the inputs at once, by D. Raises DynamicsError where the accelerations do not exist,
+    NotImplementedError for sampled controllers and closures on bodies of level "ruthless", ValueError or TypeError for
+    what is not a state of this system or leaves closures open.
     """
     if isinstance(system, Scene) and system.controllers:
         system = compile(system)
@@ -61,13 +62,20 @@ def linear_model(equations: Equations, state: State) -> LinearModel:
     dependent = np.setdiff1d(np.arange(2 * len(free)), chosen)
     states = tuple(everything[i] for i in chosen)
     C = np.vstack([np.eye(2 * n), at.by_chosen[dependent], seen])
+    D = np.zeros((len(C), len(driven)))
+    if system.scene.sensors:
+        from flexmb.linear.sensed import of_sensors  # few scenes need it
+
+        sensors = of_sensors(equations, at)
+        C, D = np.vstack([C, sensors.by_state]), np.vstack([D, sensors.by_force[:, driven]])
+        markers += sensors.names
     if not all(np.isfinite(part).all() for part in (at.A, at.drift, at.rates)):
         raise DynamicsError("derivatives are not finite: coordinates or speeds are so large that products overflow")
     return LinearModel(
         scene=system.scene.name, state=state, states=states,
         inputs=tuple((names[i], _FORCE[speeds[i][1]]) for i in driven),
         outputs=(*states, *(everything[i] for i in dependent), *markers),
-        A=at.A, B=B, C=C, D=np.zeros((len(C), len(driven))),
+        A=at.A, B=B, C=C, D=D,
         mass=at.mass, motion=at.motion, rates=at.rates, drift=at.drift,
     )  # fmt: skip
 

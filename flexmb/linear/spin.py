@@ -10,12 +10,15 @@ from flexmb.linear.equilibrium import balanced
 from flexmb.linear.linear_model import LinearModel
 from flexmb.linear.linearize import linear_model
 from flexmb.linear.variations import Equations, entering
+from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.schema import Revolute, Scene
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 
 DEPENDENT = 1e-9  # change of the accelerations with the angle, as part of the size of their derivatives
+
+CLOSED = "look at the eigenvalues of the closed loop about a state: flexmb.linearize(scene, state)"
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,6 +44,9 @@ def steady_spin(system: System | Scene, hinge: str, rate: float, guess: State | 
     turn other hinges: there is no steady spin.
     EquilibriumError where no deformation is found.
     """
+    if isinstance(system, System | Scene):
+        scene = system if isinstance(system, Scene) else system.scene
+        refuse_feedback(scene, "a steady spin or Campbell diagram", CLOSED)
     base, guess = entering(system, guess)
     system, rate = base.system, arguments.number("rate", rate)
     speed = _turning(system, hinge)

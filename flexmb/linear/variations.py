@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -84,6 +85,15 @@ class Equations:
     def freedom(self) -> int:
         """How many speeds are independent."""
         return len(self.free)
+
+    @property
+    def tangent_tables(self) -> tuple[Any, ...]:
+        """Constants and workspaces of kernels whose numbers are duals."""
+        return self.constants, self._w
+
+    def check(self, status: int) -> None:
+        """DynamicsError unless a status of these kernels is OK."""
+        self._check(status, int(self._w.fault[0]))
 
     def held(self, t: float) -> Equations:
         """The same equations with every function of time held at its value at time t (s)."""

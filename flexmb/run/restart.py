@@ -57,8 +57,8 @@ class Restart:
                 scene = msgspec.json.decode(file["scene"].tobytes(), type=Scene)
                 memory = Memory(*(np.array(file[name], float) for name in Memory._fields))
                 known = [np.array(file[name], float) for name in LoopMemory._fields if name in file]
-        except (KeyError, ValueError, EOFError, TypeError) as problem:
-            raise ValueError(f"{path} holds no restart of a run: {problem}") from None
+        except (KeyError, ValueError, EOFError, TypeError):  # what NumPy says of other files is no help
+            raise ValueError(f"{path} holds no restart of a run: give the restart.npz of one") from None
         like = integrator(method).memory(len(memory.y))
         if [each.shape for each in memory] != [each.shape for each in like] or len(memory.numbers) != NUMBERS:
             raise ValueError(f"{path} holds a restart of another version: run the first part again")

@@ -152,12 +152,6 @@ def refuse_without_jacobian(system: System, algorithm: Algorithm, method: Method
                 f'"ruthless", as "{system.fault_name(Status.OUT_OF_RANGE, system.closures.at_rest[0])}": its inertia '
                 f'is not where closures join it; use level "linear" or a better one, or method {others}'
             )
-    continuous = [each.name for each in system.scene.controllers if each.period_s is None]
-    if continuous and system.scene.closures:
-        raise NotImplementedError(
-            f'method "{method}" does not know continuous controllers of closed chains, as "{continuous[0]}": use '
-            f"{others}, or give it a period_s"
-        )
     if not algorithms.chosen(algorithm).jacobian:
         alone = " or ".join(f'"{name}"' for name in algorithms.WITH_JACOBIAN)
         raise NotImplementedError(

@@ -69,12 +69,13 @@ class Bushing(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="bus
 
 
 class AngularSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="angular_spring"):
-    """A nonlinear spring and damper along an angle of a hinge, beside what the hinge has itself, and its stops.
+    """A nonlinear spring, damper and actuator along an angle of a hinge, beside what the hinge has itself, and stops.
 
     `coordinate` names the angle as the hinge does ("rotation", "first", "rotations[1]"); it may be left out where there
     is only one. x is the angle beyond `rest_rad`; or `loads_Nm` over `table_rad`, see SpringDamper. Beyond `lower_rad`
     or `upper_rad` a stop pushes back by `stop_stiffness_Nm_rad` d (1 + `stop_dissipation_s_rad` d'), where d is how
-    deep it is pressed in; it never pulls.
+    deep it is pressed in; it never pulls. `torque_Nm` is an actuator that acts as the motor of a hinge does: one
+    more drive, for any number of springs may share a coordinate.
     """
 
     name: str
@@ -91,10 +92,11 @@ class AngularSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", ta
     upper_rad: float | None = None
     stop_stiffness_Nm_rad: float = 0.0
     stop_dissipation_s_rad: float = 0.0
+    torque_Nm: Function | None = None
 
 
 class LinearSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="linear_spring"):
-    """The same along a displacement of a hinge or point mass: see AngularSpring."""
+    """The same along a displacement of a hinge or point mass, with an actuator `force_N`: see AngularSpring."""
 
     name: str
     hinge: str
@@ -110,6 +112,7 @@ class LinearSpring(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag
     upper_m: float | None = None
     stop_stiffness_N_m: float = 0.0
     stop_dissipation_s_m: float = 0.0
+    force_N: Function | None = None
 
 
 class AngularFriction(SceneStruct, frozen=True, kw_only=True, tag_field="kind", tag="angular_friction"):
@@ -151,3 +154,8 @@ Connector = BetweenNodes | AlongHinge
 def by_stem(connector: Connector) -> dict[str, Any]:
     """The values of a connector by their keys without units: those of angles and displacements are called alike."""
     return {split_unit(key)[0]: getattr(connector, key) for key in connector.__struct_fields__}
+
+
+def actuator(connector: SpringDamper | HingeSpring) -> Function | None:
+    """What its actuator does over time."""
+    return connector.torque_Nm if isinstance(connector, AngularSpring) else connector.force_N

@@ -47,10 +47,10 @@ def _silent(item: Any) -> Any:
     return msgspec.structs.replace(item, **{key: new for key, new in changes.items() if new is not getattr(item, key)})
 
 
-def refuse_feedback(scene: Scene, what: str) -> None:
-    """NotImplementedError for a scene with controllers, which `what` would ignore."""
+def refuse_feedback(scene: Scene, what: str, instead: str = "run the scene by simulate") -> None:
+    """NotImplementedError for a scene with controllers, which `what` would ignore; the message says what to do."""
     if scene.controllers:
         raise NotImplementedError(
-            f'scene "{scene.name}" has controllers, and {what} knows of none: give it flexmb.open_loop(scene), or run '
-            "the scene by simulate"
+            f'scene "{scene.name}" has controllers, and {what} knows of none: give it flexmb.open_loop(scene), or '
+            f"{instead}"
         )

@@ -142,7 +142,8 @@ class SpringOptions(SpringEnds, LoadLaw, total=False):
 
 class HingeSpringOptions(LoadLaw, total=False):
     """Which `coordinate` of the hinge, the law about `rest`, and stops at `lower` and `upper` (rad or m) with their
-    `stop_stiffness` and `stop_dissipation` (s/rad or s/m)."""
+    `stop_stiffness` and `stop_dissipation` (s/rad or s/m); an actuator's `torque` (N m) along an angle,
+    `force` (N) along a displacement."""
 
     coordinate: str
     rest: float
@@ -150,6 +151,8 @@ class HingeSpringOptions(LoadLaw, total=False):
     upper: float | None
     stop_stiffness: float
     stop_dissipation: float
+    torque: s.Function | None
+    force: s.Function | None
 
 
 class FrictionOptions(TypedDict, total=False):

@@ -16,7 +16,7 @@ from flexmb.closure.branch import watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.jacobian import chain_tangent
-from flexmb.closure.leap import back, leap
+from flexmb.closure.leap import back, beside, leap
 from flexmb.closure.tables import Closed
 from flexmb.entry import articulated
 from flexmb.integrate.problem import Leaping, Linear
@@ -203,7 +203,7 @@ class ClosedSystem(System):
             chain = self.closures.chain(algorithm, stabilise)
             return chain, chain
 
-        leaping = Leaping(back, leap, watch_steps)
+        leaping = Leaping(back, leap, beside, watch_steps)
         return Route(tables, closed_dynamics.rhs, closed_dynamics.project, leaping, self._linear)
 
     def _linear(self, chain: Closed, _: Closed) -> Linear:

@@ -8,8 +8,9 @@ import numpy as np
 
 from flexmb.building.links import Side, closure_sides
 from flexmb.modal.flexible_model import FlexibleNode
+from flexmb.scene.bodies import SidBody
 from flexmb.scene.quaternions import rotation_by, rotation_matrix
-from flexmb.scene.tree import GROUND
+from flexmb.scene.tree import GROUND, rest_frames
 from flexmb.tables.arrays import Workspace
 from flexmb.typing import Real
 
@@ -62,7 +63,7 @@ def node_pose(system: System, w: Workspace, body: str, node: str) -> Pose:
     try:
         at = system._links[k].node(node)
     except (KeyError, ValueError) as error:
-        raise ValueError(f'body "{body}" has no node "{node}"') from error
+        raise ValueError(_without_node(system, body, node)) from error
     pose = link_pose(w, k)
     turn, position = deformed(at, w.eta[k, : system._links[k].mode_count])
     return Pose(pose.rotation @ turn, pose.position + pose.rotation @ position)
@@ -114,3 +115,9 @@ def _of_side(w: Workspace, side: Side, body: int, port: int) -> Pose:
 def _port(w: Workspace, port: int) -> tuple[Real, Real]:
     """Rotation (3,3) port -> link and position (3,) of a port of a link."""
     return w.port["R"][port].reshape(3, 3), w.port["r"][port]
+
+
+def _without_node(system: System, body: str, node: str) -> str:
+    found = next((each for each in system.scene.bodies if each.name == body), None)  # none for a point mass
+    nodes = "" if found is None or isinstance(found, SidBody) else f'; its nodes are {", ".join(rest_frames(found))}'
+    return f'body "{body}" has no node "{node}"{nodes}'

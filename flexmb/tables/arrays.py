@@ -139,6 +139,7 @@ HINGE_SPRING = _record(
     ("upper", _F),
     ("stop_stiffness", _F),
     ("stop_dissipation", _F),
+    ("function", _I),  # of the actuator, -1 for none
 )
 FRICTION = _record(
     ("speed", _I),  # place in u

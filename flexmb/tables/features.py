@@ -35,6 +35,7 @@ ONE_SIDED = "one-sided connectors"
 ACTUATORS = "actuators"
 BUSHINGS = "bushings"
 HINGE_SPRINGS = "hinge springs"
+HINGE_ACTUATORS = "hinge actuators"
 FRICTION = "friction"
 FUNCTIONS = "functions"
 MOTORS = "motors"
@@ -71,6 +72,7 @@ def features(c: Constants) -> frozenset[str]:
         ACTUATORS: np.any(c.connector["function"] >= 0),
         BUSHINGS: len(c.bushing) > 0,
         HINGE_SPRINGS: len(c.hinge_spring) > 0,
+        HINGE_ACTUATORS: np.any(c.hinge_spring["function"] >= 0),
         FRICTION: len(c.friction) > 0,
         FUNCTIONS: len(c.function) > 0,
         MOTORS: np.any(speed["motor"] >= 0),

@@ -52,8 +52,8 @@ _ADVICE = {
     ),
     Status.OUT_OF_RANGE: (
         "the deflection of body {body} grew beyond ten times its size: its linear modal field means nothing there; "
-        "look for an instability (an unstiffened beam spun above its first frequency, equal steps that are too long), or "
-        "divide the body into segments"
+        "look for an instability (an unstiffened beam spun above its first frequency, or equal steps that are too "
+        "long), or divide the body into segments"
     ),
     Status.CLOSURE_SINGULAR: (
         "closure {body} is singular: here the closures suppress fewer motions than at neighbouring places, and the "

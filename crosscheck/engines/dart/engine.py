@@ -38,7 +38,7 @@ class DartEngine:
         return Support("no", reason) if reason else Support("exact")
 
     def efforts(self, scene: Scene) -> tuple[Effort, ...]:
-        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-6, 1e-9, 1e-12))
+        return tuple(Effort("tolerance", rtol, "DOP853") for rtol in (1e-8, 1e-10, 1e-12))
 
     def compile(self, scene: Scene) -> DartModel:
         self.version()

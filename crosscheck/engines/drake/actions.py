@@ -45,15 +45,15 @@ class JointActions:
     def __bool__(self) -> bool:
         return bool(self._motors or self._springs or self._dampers or self._balls or self._held)
 
-    def held(self, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
+    def held(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""
-        return {name: (slot.v, load(float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._held}
+        return {name: (slot.v, load(t, float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._held}
 
     def forces(self, t: float, q: Real, v: Real, turned: tuple[Real, ...]) -> Real:
         tau = np.zeros(self._nv)
         for index, motor in self._motors:
             tau[index] += motor(t).value
-        for speed, each in self.held(q, v).values():
+        for speed, each in self.held(t, q, v).values():
             tau[speed] += each.load
         for slot in self._springs:
             tau[slot.v] -= slot.freedom.stiffness * (q[slot.q] - slot.freedom.rest)

@@ -39,7 +39,7 @@ class DrakeObserver:
         place(self._tree, context, state)
         drives = self._act(t, state, acceleration)
         loads = dict(zip(self._names, self._reactions(), strict=True))
-        exerted, held = self._loads.exerted(t, *self._motion()), self._joints.held(state.q, state.v)
+        exerted, held = self._loads.exerted(t, *self._motion()), self._joints.held(t, state.q, state.v)
         stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
         momentum = plant.CalcSpatialMomentumInWorldAboutPoint(context, np.zeros(3))
         centre = plant.CalcCenterOfMassPositionInWorld(context)

@@ -32,7 +32,7 @@ class Connected(NamedTuple):
 
 def connected(assembly: Assembly, states: States, paths: Paths) -> Connected:
     """What all connectors do at every sample."""
-    between, along = _between(assembly, states, paths), _along(assembly, paths)
+    between, along = _between(assembly, states, paths), _along(assembly, states.times.tolist(), paths)
     energy = np.zeros(len(states.times))
     for each in between.values():
         energy += [at.energy for at in each]
@@ -55,12 +55,12 @@ def _between(assembly: Assembly, states: States, paths: Paths) -> dict[str, list
     return found
 
 
-def _along(assembly: Assembly, paths: Paths) -> dict[str, list[Along]]:
+def _along(assembly: Assembly, times: list[float], paths: Paths) -> dict[str, list[Along]]:
     found = {}
     for name, item, number, load in along_hinges(assembly.scene):
         stage = assembly.links[item].stages[number]
-        motion = zip(coordinate(stage, paths).tolist(), coordinate_rate(stage, paths).tolist(), strict=True)
-        found[name] = [load(q, v) for q, v in motion]
+        motion = zip(times, coordinate(stage, paths).tolist(), coordinate_rate(stage, paths).tolist(), strict=True)
+        found[name] = [load(*each) for each in motion]
     return found
 
 

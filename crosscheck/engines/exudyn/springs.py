@@ -41,17 +41,17 @@ def between(shop: Workshop, connector: BetweenNodes, ends: Sequence[ConnectorEnd
         _force(shop, connector, ends)
 
 
-def along(shop: Workshop, stage: Stage, load: Callable[[float, float], Along]) -> int:
-    """A load along the coordinate of a joint, by its value and rate; returns Exudyn's object."""
+def along(shop: Workshop, stage: Stage, load: Callable[[float, float, float], Along]) -> int:
+    """A load along the coordinate of a joint, by time, value and rate; returns Exudyn's object."""
     if stage.angular:
         spring = shop.items.TorsionalSpringDamper(
             markerNumbers=list(stage.markers), nodeNumber=shop.angle_memory(initial(stage.coordinate)[0]),
-            springTorqueUserFunction=lambda mbs, t, item, q, v, k, d, rest: -load(q, v).load,
+            springTorqueUserFunction=lambda mbs, t, item, q, v, k, d, rest: -load(t, q, v).load,
         )  # fmt: skip
     else:
         spring = shop.items.LinearSpringDamper(
             markerNumbers=list(stage.markers),
-            springForceUserFunction=lambda mbs, t, item, q, v, k, d, rest: -load(q, v).load,
+            springForceUserFunction=lambda mbs, t, item, q, v, k, d, rest: -load(t, q, v).load,
         )
     return shop.mbs.AddObject(spring)
 

@@ -31,10 +31,11 @@ class MujocoConnections:
             each.name: each.exerted(t, self._frame(each.a, data), self._frame(each.b, data)) for each in self._between
         }
 
-    def along(self, data: mujoco.MjData) -> dict[str, tuple[int, Along]]:
+    def along(self, t: float, data: mujoco.MjData) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""
         return {
-            name: (slot.v, load(float(data.qpos[slot.q]), float(data.qvel[slot.v]))) for name, slot, load in self._along
+            name: (slot.v, load(t, float(data.qpos[slot.q]), float(data.qvel[slot.v])))
+            for name, slot, load in self._along
         }
 
     def add(self, t: float, data: mujoco.MjData) -> None:
@@ -47,13 +48,13 @@ class MujocoConnections:
                     arm = self._frame(at, data).position - data.xipos[body]
                     data.xfrc_applied[body, :3] += load[3:]
                     data.xfrc_applied[body, 3:] += load[:3] + cross(arm, load[3:])
-        for speed, held in self.along(data).values():
+        for speed, held in self.along(t, data).values():
             data.qfrc_applied[speed] += held.load
 
     def energy(self, t: float, data: mujoco.MjData) -> float:
         """Stored in all of them."""
         stored = sum(each.energy for each in self.exerted(t, data).values())
-        return stored + sum(held.energy for _, held in self.along(data).values())
+        return stored + sum(held.energy for _, held in self.along(t, data).values())
 
     def _frame(self, at: Attachment, data: mujoco.MjData) -> Moving:
         if at.link < 0:

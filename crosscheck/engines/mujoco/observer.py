@@ -54,7 +54,9 @@ class MujocoObserver:
             },
             momentum=momentum,
             connectors={name: each.on_b for name, each in connections.exerted(data.time, data).items()},
-            hinge_forces={name: np.array([held.load]) for name, (_, held) in connections.along(data).items()},
+            hinge_forces={
+                name: np.array([held.load]) for name, (_, held) in connections.along(data.time, data).items()
+            },
         )
 
     def _pole(self, bodies: int | NDArray[np.intp], data: mujoco.MjData) -> Real:
@@ -113,6 +115,7 @@ class MujocoObserver:
             half = about_axis[:3] if slot.freedom.angular else about_axis[3:]
             freedom = slot.freedom
             passive = freedom.stiffness * (freedom.rest - data.qpos[slot.q]) - freedom.damping * data.qvel[slot.v]
-            passive += sum(held.load for v, held in self._forces.connections.along(data).values() if v == slot.v)
+            along = self._forces.connections.along(data.time, data).values()
+            passive += sum(held.load for v, held in along if v == slot.v)
             named.setdefault(slot.link.joint, []).append(float(half @ data.xaxis[slot.joint] - passive))
         return {name: np.array(values) for name, values in named.items()}

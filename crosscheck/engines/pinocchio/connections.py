@@ -47,9 +47,9 @@ class PinocchioConnections:
         """Of what is not elastic in them."""
         return sum(each.power for each in self.exerted(t, data).values())
 
-    def along(self, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
+    def along(self, t: float, q: Real, v: Real) -> dict[str, tuple[int, Along]]:
         """By name the speed that a connector along a hinge acts on, and what it does."""
-        return {name: (slot.v, load(float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._along}
+        return {name: (slot.v, load(t, float(q[slot.q]), float(v[slot.v]))) for name, slot, load in self._along}
 
     def _frame(self, at: Attachment, data: pin.Data) -> Moving:
         if at.link < 0:

@@ -86,7 +86,7 @@ class Dynamics:
         """
         lost = self.forces.dampers_and_motors(t, state.v)
         tau = self.forces.springs(state.q) + lost
-        held = self.connections.along(state.q, state.v).values()
+        held = self.connections.along(t, state.q, state.v).values()
         for speed, each in held:
             tau[speed] += each.load
         wrenches = self._wrenches(t, state)

@@ -39,7 +39,7 @@ class PinocchioObserver:
         for link, joint in zip(links, dynamics.tree.joints, strict=True):
             local = angular_first(data.f[joint].vector)
             wrench[link.kind, link.joint] = rotate_spatial(data.oMi[joint].rotation, local)
-        exerted, held = dynamics.connections.exerted(t, data), dynamics.connections.along(state.q, state.v)
+        exerted, held = dynamics.connections.exerted(t, data), dynamics.connections.along(t, state.q, state.v)
         stored = sum(each.energy for each in exerted.values()) + sum(each.energy for _, each in held.values())
         pin.updateFramePlacements(model, data)
         markers = {name: self._marker(frame) for name, frame in self._frames.items()}

@@ -20,7 +20,7 @@ from crosscheck.library.mutations.edits import (
 )
 from crosscheck.library.mutations.mutation import FACTOR, HUNDREDTH, OPPOSITE, Mutation, MutationTarget
 from crosscheck.library.time_functions import delayed, scaled
-from flexmb.scene.connectors import SpringDamper
+from flexmb.scene.connectors import AngularSpring, Connector, HingeSpring, SpringDamper, actuator
 from flexmb.scene.control import ProfileSensor
 from flexmb.scene.functions import Function, Pulse, Ramp, Sine, SmoothStep, SpinUp, Table
 from flexmb.scene.schema import Scene, Wheel
@@ -58,11 +58,13 @@ def _driven(scene: Scene) -> Iterator[MutationTarget]:
             yield MutationTarget(sensor.name, f"profile, {_kind(sensor.function)}")
 
 
-def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper, Function]]:
+def _actuators(scene: Scene) -> Iterator[tuple[SpringDamper | HingeSpring, Function]]:
     """Springs with a function of time, and that."""
     for each in scene.connectors:
-        if isinstance(each, SpringDamper) and each.force_N is not None:
-            yield each, each.force_N
+        if isinstance(each, SpringDamper | HingeSpring):
+            function = actuator(each)
+            if function is not None:
+                yield each, function
 
 
 def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = None) -> Scene:
@@ -83,6 +85,11 @@ def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = 
             prescribed_rad=_changed(wheel.prescribed_rad, motion),
         )
 
+    def of_spring(spring: Connector) -> Connector:
+        assert isinstance(spring, SpringDamper | HingeSpring)  # it has an actuator
+        key = "torque_Nm" if isinstance(spring, AngularSpring) else "force_N"
+        return msgspec.structs.replace(spring, **{key: _changed(actuator(spring), change)})
+
     if any(hinge.name == target for hinge in scene.hinges):
         return on_hinge(scene, target, lambda hinge: with_coordinates(hinge, of_coordinate))
     if any(wheel.name == target for wheel in scene.wheels):
@@ -90,9 +97,7 @@ def _on_item(scene: Scene, target: str, change: Change, motion: Change | None = 
     if any(load.name == target for load in scene.loads):
         return on_load(scene, target, lambda load: msgspec.structs.replace(load, function=change(load.function)))
     if any(each.name == target for each, _ in _actuators(scene)):
-        return on_connector(
-            scene, target, lambda each: msgspec.structs.replace(each, force_N=_changed(each.force_N, change))
-        )
+        return on_connector(scene, target, of_spring)
     if any(isinstance(sensor, ProfileSensor) and sensor.name == target for sensor in scene.sensors):
         return on_sensor(scene, target, lambda each: msgspec.structs.replace(each, function=change(each.function)))
     raise CaseError(f'no hinge, wheel, load, actuator or profile is called "{target}"')

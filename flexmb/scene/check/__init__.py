@@ -36,7 +36,7 @@ def check_scene(scene: Scene, t_end: float | None = None, t_start: float = 0.0) 
     `t_end` (s) the run from there.
 
     A doubtful scene runs; what its `allow` lists is not returned. `compile`, `simulate` and the command lines show the
-    same doubts as a `SceneWarning`, which `python -W error::flexmb.SceneWarning` and the option `--strict` turn into an
+    same doubts as a `SceneWarning`, which `pytest -W error::flexmb.SceneWarning` and the option `--strict` turn into an
     error. SID bodies and every fidelity level pass: `compile` decides whether they can be run. Raises TypeError for
     anything but a Scene.
     """

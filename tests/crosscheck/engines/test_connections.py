@@ -81,11 +81,12 @@ def wheel_and_slug() -> Scene:
         )
         .point_mass("slug", "arm", mass=0.4, directions=[(0.0, 1.0, 0.0)], coordinates=[linear(position=0.1)])
         .angular_friction("bearing", "wheel", sliding=0.3, smoothing=0.01)
-        .angular_spring("inner", "elbow", coordinate="first", stiffness=3.0, stiffening=(0.0, 20.0))
+        .angular_spring("inner", "elbow", coordinate="first", stiffness=3.0, stiffening=(0.0, 20.0),
+                        torque=fm.Constant(value=0.6))
         .angular_spring("outer", "elbow", coordinate="second", upper=0.5, stop_stiffness=40.0, stop_dissipation=0.4)
         .angular_friction("rub", "elbow", coordinate="second", sliding=0.2, smoothing=0.1)
         .linear_spring("tank", "slug", table=(-0.2, 0.0, 0.2), loads=(-9.0, 0.0, 5.0), lower=-0.1, upper=0.05,
-                       stop_stiffness=300.0)
+                       stop_stiffness=300.0, force=fm.Constant(value=-2.0))
         .marker("tip", "arm", offset=(0.6, 0.0, 0.0))
         .scene()
     )  # fmt: skip

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 
 import flexmb as fm
 from crosscheck.engines.answers import support_of
-from crosscheck.engines.contract import Support
+from crosscheck.engines.contract import Run, Support
 from crosscheck.engines.functions_of_time import profile
 from crosscheck.engines.native import NativeEngine, radau5
+from crosscheck.engines.registry import engine
 from tests.flexmb.control.scenes import rotor
 from tests.flexmb.control.test_attitude import craft
+from tests.flexmb.control.test_closed_chains import GRASHOF, LAGGING, controlled
 
 LAW = fm.StateSpace(name="law", inputs=("angle",), D=((-1.0,),))
 
@@ -37,6 +40,19 @@ def test_the_native_engine_runs_them() -> None:
 
 def test_implicit_methods_take_continuous_ones() -> None:
     assert support_of(radau5(), rotor(LAW)).kind == "exact"
+
+
+@pytest.mark.parametrize("name", ["native-radau5", "native-exponential", "native-generalised-alpha"])
+def test_and_those_of_closed_chains(name: str) -> None:
+    """They run as by the engine without Jacobians."""
+    scene, run = controlled(GRASHOF, "drive", LAGGING), Run(np.linspace(0.0, 0.1, 3))
+    assert support_of(engine(name), scene).kind == "exact"
+    done, exact = (
+        engine(each).compile(scene).simulate(run, engine(each).efforts(scene)[-1]) for each in (name, "native")
+    )
+    assert done.status == exact.status == "finished"
+    apart = np.abs(done.markers["joint"].position - exact.markers["joint"].position).max()
+    assert apart < (1e-4 if "alpha" in name else 1e-9)
 
 
 def test_a_signal_is_no_profile() -> None:

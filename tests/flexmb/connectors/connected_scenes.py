@@ -66,8 +66,11 @@ def losses(builder: SceneBuilder) -> SceneBuilder:
                        acts="tension")
         .bushing("soft", "hub", "boom", node_b="tip", stiffness=positive(2, 0.5), damping=positive(3, 0.3))
         .angular_spring("coil", "elbow", rest=0.1, stiffness=3.0, stiffening=(0.0, 8.0), damping=0.2, lower=-0.2,
-                        upper=0.3, stop_stiffness=400.0, stop_dissipation=0.02)
-        .linear_spring("rubber", "rail", table=(-0.1, 0.0, 0.2, 0.5), loads=(-4.0, 0.0, 3.0, 20.0), damping=0.5)
+                        upper=0.3, stop_stiffness=400.0, stop_dissipation=0.02,
+                        torque=s.Sine(amplitude=0.7, angular_frequency_rad_s=5.0, phase_rad=0.3))
+        .angular_spring("second motor", "elbow", torque=s.Constant(value=-0.4))
+        .linear_spring("rubber", "rail", table=(-0.1, 0.0, 0.2, 0.5), loads=(-4.0, 0.0, 3.0, 20.0), damping=0.5,
+                       force=s.Constant(value=0.9))
         .angular_friction("bearing", "wheel", sliding=0.02, smoothing=0.05)
         .angular_friction("hinge friction", "elbow", sliding=0.3, static=0.5, stribeck=0.2, smoothing=0.01)
         .linear_friction("rail friction", "rail", sliding=0.4, smoothing=0.01)

@@ -151,6 +151,10 @@ EACH = {
     "bushing": bushing(0.4, 0.7),
     "angular spring": Alone(turning(0.2, 0.7).angular_spring("coil", "hinge", upper=0.4, **LAW).scene(), INERTIA, 0.2,
                             0.7, coil),
+    "motor beside another": Alone(
+        turning(0.2, 0.7).angular_spring("one", "hinge", torque=s.Constant(value=2.0))
+        .angular_spring("other", "hinge", stiffness=4.0, torque=s.Constant(value=-5.0)).scene(), INERTIA, 0.2, 0.7,
+        lambda x, v: (-4.0 * x - 3.0, -3.0 * v)),
     "in its stop": Alone(turning(0.6, 0.7).angular_spring("coil", "hinge", upper=0.4, **LAW).scene(), INERTIA, 0.6, 0.7,
                          coil),
     "linear spring": Alone(sliding(0.3, -0.7).linear_spring("curve", "hinge", **CURVED).scene(), MASS, 0.3, -0.7,

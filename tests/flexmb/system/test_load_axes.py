@@ -113,7 +113,7 @@ def test_what_is_no_axes_and_no_node_is_refused() -> None:
         system.hinge_loads(state, axes="body")
     with pytest.raises(ValueError, match='no body "lower"'):
         system.hinge_loads(state, about=("lower", "tip"))
-    with pytest.raises(ValueError, match='no node "end"'):
+    with pytest.raises(ValueError, match='no node "end"; its nodes are'):
         system.hinge_loads(state, about=("upper", "end"))
     with pytest.raises(ValueError, match="give body and node"):
         system.hinge_loads(state, about="tip")

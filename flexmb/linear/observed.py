@@ -1,0 +1,134 @@
+"""Exact derivatives of what sensors read, along the coordinates of a linear model and by generalised forces.
+
+At given closure loads f of a closed chain they come from dual numbers, and so do those by f (of trees there are none).
+With Y the change of [q, u] by [xi; du] and g'' = K f + c the rows' accelerations, which stay zero,
+
+    df = -K^+ d(g'')|f Y + (1 - K^+ K) dK K^+ f Y
+
+for loads are the least that do what they do. A generalised force t along the free speeds changes the accelerations by
+M^-1 t at given f, hence what hinges transmit by inverse dynamics, and f by -K^+ J M^-1 t.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flexmb.closure.observed_tangent import closed_observed_jacobian
+from flexmb.entry.observed_tangent import observed_jacobian, outputs_tangent
+from flexmb.linear.closed_variations import ClosedEquations
+from flexmb.linear.variations import Equations, Variations
+from flexmb.system.observables import Observation
+from flexmb.tables.state import State, pack
+from flexmb.typing import Real
+
+LARGE = 2.0**20
+"""Change of an acceleration whose effect is linear: beside it the rounding of all others is nothing."""
+
+
+class Observed(NamedTuple):
+    """A row (E,) of what sensors read, laid out as `Observation.columns`, and its derivatives: by the state
+    [xi; du] (E,2f) of a linear model, by generalised forces along the n free speeds (E,n)."""
+
+    value: Real
+    by_state: Real
+    by_force: Real
+
+
+class _Raw(NamedTuple):
+    """The row (E,), with the rows' accelerations behind it its derivatives by [q, u] and by the rows' loads."""
+
+    value: Real
+    by_y: Real
+    by_load: Real
+
+
+def observed(equations: Equations, at: Variations) -> Observed:
+    """At the state of these variations; DynamicsError where there are no accelerations."""
+    state, found = at.state, _free(equations, at.state)
+    Y, by_force = moving(equations, at), _by_force(equations, state)
+    by_state = found.by_y @ Y
+    rows, E = found.by_load.shape[1], len(found.value)
+    if not rows:
+        return Observed(found.value, by_state, by_force)
+    assert isinstance(equations, ClosedEquations)  # it has closures
+    K, by_load = found.by_load[E:], found.by_load[:E]
+    inverse = _inverse(K, equations.rank)
+    loads = -inverse @ by_state[E:]
+    if equations.rank < rows:
+        held = equations.row_loads
+        other = _raw(equations, state, held + inverse @ held).by_y[E:] - found.by_y[E:]  # dK K^+ f
+        loads += (np.eye(rows) - inverse @ K) @ other @ Y
+    pushed = -inverse @ equations.row_rates(state) @ np.linalg.inv(equations.mass(state))
+    return Observed(found.value, by_state[:E] + by_load @ loads, by_force + by_load @ pushed)
+
+
+def values(equations: Equations, state: State) -> Real:
+    """The row (E,) of what sensors read at a state; DynamicsError where there are no accelerations."""
+    return _free(equations, state).value
+
+
+def _free(equations: Equations, state: State) -> _Raw:
+    """At a state, under the closure loads that there are."""
+    if not isinstance(equations, ClosedEquations):
+        return _raw(equations, state, np.zeros(0))
+    equations.rates(state)  # which finds the loads of the rows
+    return _raw(equations, state, equations.row_loads)
+
+
+def _raw(equations: Equations, state: State, load: Real) -> _Raw:
+    system, y, rows = equations.system, pack(state), len(load)
+    observation: Observation = system._observation
+    out, E = outputs_tangent(observation.out), observation.width
+    J, closures = np.empty((E + rows, len(y) + rows)), np.zeros((len(system.scene.closures), 6))
+    if isinstance(equations, ClosedEquations):
+        status = closed_observed_jacobian(state.t, y, load, J, closures, *equations.tangent_tables, out)
+    else:
+        status = observed_jacobian(state.t, y, J, *equations.tangent_tables, out)
+    equations.check(status)
+    row = np.concatenate([out.every[:, 0], out.drives[:, 0], closures.ravel()])
+    return _Raw(row, J[:, : len(y) - 1], J[:, len(y) :])
+
+
+def moving(equations: Equations, at: Variations) -> Real:
+    """Y (nq+nu,2f): change of [q, u] by [xi; du]."""
+    nq, f = equations.system.nq, len(at.chosen)
+    Y = np.zeros((nq + equations.system.nu, 2 * f))
+    Y[:nq, :f] = at.motion
+    Y[nq + equations.free] = at.by_chosen[len(equations.free) :]
+    return Y
+
+
+def _by_force(equations: Equations, state: State) -> Real:
+    """(E,n) by generalised forces along the free speeds, at given closure loads."""
+    system, free = equations.system, equations.free
+    places = system._observation.columns
+    whole = system.mass_matrix(state)
+    rates = np.zeros((system.nu, len(free)))
+    rates[free] = np.linalg.inv(whole[np.ix_(free, free)])
+    found = np.zeros((system._observation.width, len(free)))
+    resting = _of_rates(equations, state, np.zeros(system.nu))
+    for i, column in enumerate(rates.T):
+        for name, change in _of_rates(equations, state, LARGE * column).items():
+            found[places[name][0], i] = (change - resting[name]).ravel() / LARGE
+    driven = np.flatnonzero(system.constants.speed["prescribed"] >= 0)
+    found[places["drives"][0].start + driven] = whole[driven] @ rates
+    return found
+
+
+def _of_rates(equations: Equations, state: State, rates: Real) -> dict[str, Real]:
+    """What changes with accelerations (nu,): hinge loads by inverse dynamics, markers."""
+    system, y = equations.system, pack(state)
+    loads = system._inverse(state.t, y, rates)[1]
+    out = system._out
+    out.rates[:] = rates
+    system._observe_motion(state.t, y)
+    return {"rates": rates, "loads": loads, "markers": out.markers.copy()}
+
+
+def _inverse(K: Real, rank: int) -> Real:
+    """K^+ (G,G) of a symmetric matrix of this rank."""
+    values, vectors = np.linalg.eigh(0.5 * (K + K.T))
+    kept = slice(len(K) - rank, None)
+    return np.asarray(vectors[:, kept] / values[kept] @ vectors[:, kept].T, float)
