@@ -16,15 +16,20 @@ from flexmb.typing import Real
 
 Measure = Callable[[str, Real], float]  # of a channel's signal: its largest magnitude, its range
 ROUNDING = 2.0**-26  # of its family's size: a signal that is smaller has no digits of its own
+NOTHING = 2.0**-50  # of what the scene says: sums of such numbers leave so much by rounding, as torques of forces do
 
 
 def size_of(own: float, further: Sequence[float], doubt: float) -> float:
     """The size (SI) of a signal: its `own` range, or the first of `further` above `doubt`, its uncertainty (SI).
 
-    `further` are those of `Sizes.of`. A range below `ROUNDING` of the family's is not taken: the signal is zero.
+    `further` are those of `Sizes.of`. A range below `ROUNDING` of the family's is not taken, nor are the range and the
+    family's below `NOTHING` of what the rest of the scene says: the signal is zero.
     """
-    candidates = [own, *further] if own > ROUNDING * (further[0] if further else 0.0) else list(further)
-    return next((size for size in candidates if size > doubt), max(candidates, default=0.0))
+    kin, of_scene = (*further, 0.0, 0.0)[:2]
+    if max(own, kin) < NOTHING * of_scene:
+        return of_scene
+    candidates = [own, kin, of_scene] if own > ROUNDING * kin else [kin, of_scene]
+    return next((size for size in candidates if size > doubt), max(candidates))
 
 
 @dataclass
@@ -41,8 +46,10 @@ class Sizes:
         return self._largest(signal_range, family(channel)), self._of_scene(channel)
 
     def magnitude(self, channel: str) -> float:
-        """The largest magnitude (SI) in the channel's family."""
-        return self._largest(magnitude, family(channel))
+        """What the rounding of a channel is relative to (SI): the largest magnitude in its family, or what the rest of
+        the scene says where the family is nothing beside that."""
+        kin, of_scene = self._largest(magnitude, family(channel)), self._of_scene(channel)
+        return of_scene if kin < NOTHING * of_scene else kin
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""

@@ -10,6 +10,7 @@ from crosscheck.judging.case_verdicts import judge
 from crosscheck.judging.figures import figures, recordable
 from crosscheck.judging.outcome import SessionOutcome
 from crosscheck.judging.results import CaseResults, Result, collect
+from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty, spatial
 from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, conserve
 from crosscheck.library.accepted import Figure, dumps
@@ -199,6 +200,8 @@ def test_why_there_is_nothing_to_compare(a: Signal, b: Signal, scale: float | No
         (values(0.0, 0.5, doubt=0.5), values(0.0, 0.25, sizes=(0.125,)), 0.5),
         (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**24,)), 0.5),
         (values(0.0, 0.5), values(0.0, 0.0, sizes=(2.0**25,)), 2.0**25),  # 2^-26 of its family: it is rounding
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(0.5, 2.0**49)), 0.5),
+        (values(0.0, 0.5), values(0.0, 0.0, sizes=(0.5, 2.0**50)), 2.0**50),  # the family is rounding
     ],
 )
 def test_a_signal_that_is_zero_within_its_doubt_is_measured_by_its_family(a: Signal, b: Signal, size: float) -> None:
@@ -503,3 +506,9 @@ goals = { "marker:tip.position" = 1e-3 }
     alike = {name: VariantInfo(level="full", drawing=None) for name in infos}
     (verdict,) = judge(collect([msgspec.structs.replace(record, variants=alike), *runs]).cases[0])
     assert verdict.level == "full"
+
+
+@pytest.mark.parametrize(("torque", "size"), [(1e-13, 1e-13), (1e-15, 20.0)])
+def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(torque: float, size: float) -> None:
+    signals = {"load:pivot.force": way(10.0), TIP: way(2.0), "load:pivot.torque": way(torque)}
+    assert np.isclose(Sizes(signals, signals.__getitem__).magnitude("load:pivot.torque"), size, rtol=1e-5, atol=0.0)
