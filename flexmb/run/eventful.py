@@ -31,10 +31,10 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
-# Chattering: so many events in a row between which nothing moves further than the error that is allowed, within this
-# part of a run. They only tell an endless sequence from some events that fall together: the intervals of an endless one
-# shrink by a factor, or to roundings of time, so that it passes any such limit.
-MANY, SHORT = 50, 1e-6
+# Chattering: so many instants of events within this part of a run, the fewer of them if nothing moves in between further
+# than the error that is allowed. At the pace of the others it would need a thousand million of them. Sequences without
+# end come to any pace, for their intervals shrink by a factor, or to roundings of time.
+FEW, MANY, SHORT = 50, 1000, 1e-6
 HARDLY = 16.0  # roundings of time: what follows so soon advances no time
 
 
@@ -72,6 +72,7 @@ class EventfulRun:
         self._algorithm, self._stabilise = algorithm, stabilise
         self._events = _by_what_they_watch(whole)
         self._happened: list[EventRecord] = []
+        self._paused_at: list[float] = []
         self._idle: list[float] = []
         """Times of the last events, between which nothing moved."""
         self._passed, self._until = set[str](), -np.inf
@@ -95,7 +96,7 @@ class EventfulRun:
             y, controlled = self._apart(raw.y)
             arrived = piece.found if piece.early else self._arriving(piece.found, watched, levels, y)
             if piece.found:
-                self._count_idle(begin, raw)
+                self._count(begin, raw)
             for event in arrived:
                 records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
                 self._happened += [replace(record, early=piece.early) for record in records]
@@ -306,18 +307,21 @@ class EventfulRun:
                 sides[i] = came
         return sides
 
-    def _count_idle(self, begin: Beginning, raw: Raw) -> None:
-        """Whether, in a piece that an event ends, neither speeds at its ends nor time lead anywhere."""
+    def _count(self, begin: Beginning, raw: Raw) -> None:
+        """An event that ends a piece; it is idle if neither speeds at the piece's ends nor time led anywhere."""
         fastest = max(np.max(np.abs(u), initial=0.0) for u in (begin.state.u, raw.y[self._speeds]))
         lasted = raw.t - begin.state.t
         if fastest * lasted > self._settings.atol and lasted > HARDLY * np.spacing(abs(raw.t)):
             self._idle.clear()
         self._idle.append(raw.t)
+        self._paused_at.append(raw.t)
 
     def _chatters(self) -> bool:
-        if len(self._idle) < MANY:
-            return False
-        return self._idle[-1] - self._idle[-MANY] < SHORT * (self._times[-1] - self._times[0])
+        soon = SHORT * (self._times[-1] - self._times[0])
+        return any(
+            len(times) >= many and times[-1] - times[-many] < soon
+            for times, many in ((self._idle, FEW), (self._paused_at, MANY))
+        )
 
     def _last(self, raw: Raw, ends: bool) -> Raw:
         """The state after the last event is an output too."""
@@ -332,7 +336,7 @@ class EventfulRun:
         if ends:
             found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
         elif last.status is Status.CHATTERING:
-            names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-MANY:])
+            names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-FEW:])
             found = replace(found, message=f"{found.message}; the last were {' and '.join(names)}")
         cost = {name: 0 for name in vars(found.statistics)}
         self._join(replace(found, statistics=replace(found.statistics, **cost)))
