@@ -31,7 +31,7 @@ from flexmb.tables.status import Status
 from flexmb.typing import Real
 
 DIRECTIONS = {"rising": 1, "falling": -1, "either": 0}
-# Chattering: so many instants of events within this part of a run, the fewer of them if nothing moves in between further
+# Chattering: so many instants of events within this part of a run, the fewer of them if nothing moves meanwhile further
 # than the error that is allowed. At the pace of the others it would need a thousand million. Sequences without end come
 # to any pace, for their intervals shrink by a factor, or to roundings of time.
 FEW, MANY, SHORT = 50, 1000, 1e-6
