@@ -47,9 +47,9 @@ class Sizes:
 
     def magnitude(self, channel: str) -> float:
         """What the rounding of a channel is relative to (SI): the largest magnitude in its family, or what the rest of
-        the scene says where the family is nothing beside that."""
+        the scene says where the family is nothing beside that. Exact zeros have no rounding."""
         kin, of_scene = self._largest(magnitude, family(channel)), self._of_scene(channel)
-        return of_scene if kin < NOTHING * of_scene else kin
+        return of_scene if 0.0 < kin < NOTHING * of_scene else kin
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""

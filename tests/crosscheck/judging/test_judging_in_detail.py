@@ -508,7 +508,7 @@ goals = { "marker:tip.position" = 1e-3 }
     assert verdict.level == "full"
 
 
-@pytest.mark.parametrize(("torque", "size"), [(1e-13, 1e-13), (1e-15, 20.0)])
+@pytest.mark.parametrize(("torque", "size"), [(1e-13, 1e-13), (1e-15, 20.0), (0.0, 0.0)])
 def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(torque: float, size: float) -> None:
     signals = {"load:pivot.force": way(10.0), TIP: way(2.0), "load:pivot.torque": way(torque)}
     assert np.isclose(Sizes(signals, signals.__getitem__).magnitude("load:pivot.torque"), size, rtol=1e-5, atol=0.0)
