@@ -13,7 +13,6 @@ from flexmb.spatial.vector import (
     rotate_plane,
     rotate_rows,
     rotate_sym,
-    store3,
     store9,
     store_sym,
     sym6,
@@ -36,15 +35,6 @@ def store_inertia(a, i, p):
     store_sym(a, i, p[0])
     store9(a, i + 6, p[1])
     store_sym(a, i + 15, p[2])
-
-
-@helper
-def store_full(a, i, p):
-    """The 6x6 matrix itself into the block of a 2-D array that starts at row and column i."""
-    for n in range(6):
-        x, y = inertia_column(p, n)
-        store3(a[i + n], i, x)
-        store3(a[i + n], i + 3, y)
 
 
 @helper

@@ -40,19 +40,6 @@ def store_column6(a, n, V):
 
 
 @helper
-def add_column3(a, i, n, v):
-    a[i, n] += v[0]
-    a[i + 1, n] += v[1]
-    a[i + 2, n] += v[2]
-
-
-@helper
-def add_column6(a, n, V):
-    add_column3(a, 0, n, V[0])
-    add_column3(a, 3, n, V[1])
-
-
-@helper
 def strips3(w, a, i, n):
     """Strips of rows i, i+1, i+2 that start at column n."""
     return strip(w, a[i], n), strip(w, a[i + 1], n), strip(w, a[i + 2], n)

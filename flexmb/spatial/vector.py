@@ -158,22 +158,6 @@ def rotate_sym(r, s):
 
 
 @helper
-def add_outer(m, a, b):
-    """M + a b'."""
-    return (
-        a[0] * b[0] + m[0],
-        a[0] * b[1] + m[1],
-        a[0] * b[2] + m[2],
-        a[1] * b[0] + m[3],
-        a[1] * b[1] + m[4],
-        a[1] * b[2] + m[5],
-        a[2] * b[0] + m[6],
-        a[2] * b[1] + m[7],
-        a[2] * b[2] + m[8],
-    )
-
-
-@helper
 def rotate_mat(r, m):
     """R M R'."""
     return matmul(matmul(r, m), transpose(r))

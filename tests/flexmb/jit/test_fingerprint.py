@@ -14,6 +14,9 @@ import pytest
 from numba.core.dispatcher import Dispatcher
 
 import flexmb
+from flexmb.control.attitude import eigenaxis_slew
+from flexmb.entry import articulated
+from flexmb.jain import explicit
 from flexmb.jit import fingerprint as module
 from flexmb.jit.cache import KernelCache
 from flexmb.jit.fingerprint import fingerprint, reached
@@ -228,7 +231,8 @@ def test_a_name_that_is_nowhere_is_refused():
         key(near=edited(NEAR, ("return FACTOR * x", "return NOWHERE * x")))
 
 
-def test_every_kernel_of_the_package_has_a_key_of_its_own():
+def dispatchers() -> tuple[set[FunctionType], set[FunctionType]]:
+    """All kernels of the package, and all its helpers."""
     modules = [
         importlib.import_module(each.name)
         for each in pkgutil.walk_packages(flexmb.__path__, "flexmb.")
@@ -236,8 +240,26 @@ def test_every_kernel_of_the_package_has_a_key_of_its_own():
     ]
     found = {value for each in modules for value in vars(each).values() if isinstance(value, Dispatcher)}
     kernels = {each.py_func for each in found if isinstance(each._cache, KernelCache)}
+    return kernels, {each.py_func for each in found} - kernels
+
+
+def test_every_kernel_of_the_package_has_a_key_of_its_own():
+    kernels, _ = dispatchers()
     assert len(kernels) > 30
     assert len({fingerprint(kernel) for kernel in kernels}) == len(kernels)
+
+
+def test_every_helper_of_the_package_is_in_the_key_of_a_kernel():
+    """Else it is dead, or a chooser hides it, and who edits it goes on with what was compiled before."""
+    kernels, helpers = dispatchers()
+    known = {function for kernel in kernels for function in reached(kernel)}
+    unknown = {f"{each.__module__}.{each.__qualname__}" for each in helpers - known if _counts(each)}
+    assert unknown == {eigenaxis_slew.py_func.__module__ + ".eigenaxis_slew"}  # a user's function, named in scenes
+
+
+def test_both_choices_are_in_the_key():
+    """By width, by class and by number, what is not interpreted as Python too."""
+    assert {explicit._in_strips.py_func, explicit._one_by_one.py_func} <= set(reached(articulated.rhs.py_func))
 
 
 ROOM = """'''Words.'''
@@ -268,17 +290,21 @@ def test_of_the_room_itself_only_words_are_free(tmp_path, monkeypatch):
     assert digest(ROOM.replace("'c'", "'d'").replace('"c"', '"d"')) != digest(ROOM)
 
 
+def _counts(function: FunctionType) -> bool:
+    return function.__module__.startswith("flexmb.") and not function.__module__.startswith("flexmb.jit.")
+
+
 def compiled_beyond(*kernels: Dispatcher) -> list[str]:
-    """What numba compiled for these kernels in this process and their keys do not know."""
+    """What numba compiled for these kernels in this process and their keys do not know; all of the room jit counts."""
     known = {function for each in kernels for function in reached(each.py_func)}
     found = list[str]()
     for each in gc.get_objects():
-        if isinstance(each, Dispatcher) and each.overloads and each.py_func.__module__.startswith("flexmb."):
+        if isinstance(each, Dispatcher) and each.overloads and _counts(each.py_func):
             cells = [cell.cell_contents for cell in each.py_func.__closure__ or ()]  # of a choice: what is chosen
             chosen = [getattr(cell, "py_func", cell) for cell in cells if not isinstance(cell, type)]
             inner = each.py_func.__qualname__.startswith("call.")
             for function in chosen if inner else [each.py_func]:
-                if isinstance(function, FunctionType) and function not in known:
+                if isinstance(function, FunctionType) and _counts(function) and function not in known:
                     found.append(f"{function.__module__}.{function.__qualname__}")
     return found
 
@@ -300,12 +326,10 @@ assert len(helpers) > 5, helpers
 print(compiled_beyond(rk4, *mine))
 """
 WHOLE = """
+import gc
 import flexmb
-from flexmb.entry import articulated, composite, unsplit
-from flexmb.closure import dynamics
-from flexmb.frisch import evaluation
+from flexmb.jit.cache import KernelCache
 from flexmb.run.warm_up import looped, with_panel
-from flexmb.tables import soundness
 from numba.core.dispatcher import Dispatcher
 from tests import trees
 from tests.flexmb.jit.test_fingerprint import compiled_beyond
@@ -316,8 +340,9 @@ for scene in (trees.random_scene(0, trees.MIXED), with_panel(), looped()):
             system.accelerations(system.initial_state, algorithm)
         except flexmb.SceneError:
             assert algorithm == "frisch"
-rooms = (articulated, composite, unsplit, dynamics, evaluation, soundness)
-kernels = [each for room in rooms for each in vars(room).values() if isinstance(each, Dispatcher)]
+dispatchers = [each for each in gc.get_objects() if isinstance(each, Dispatcher)]
+kernels = [each for each in dispatchers if isinstance(each._cache, KernelCache)]
+assert len(kernels) > 5, kernels
 print(compiled_beyond(*kernels))
 """
 
