@@ -15,6 +15,7 @@ from typing import Any
 from llvmlite import ir
 from numba import typeof, types
 from numba.core import cgutils
+from numba.core.compiler_lock import global_compiler_lock
 from numba.extending import lower_builtin, type_callable
 from numba.np.arrayobj import populate_array
 
@@ -69,9 +70,11 @@ def address(bundle: Any) -> int:
 def settled(compiled: Any, *kinds: Any) -> Any:
     """A kernel that is compiled for these types, and refuses others by a TypeError instead of being compiled anew."""
     if kinds not in compiled.overloads:
-        compiled.disable_compile(False)
-        compiled.compile(kinds)
-        compiled.disable_compile()
+        with global_compiler_lock:  # of two threads that want it first, one would forbid what the other is about to do
+            if kinds not in compiled.overloads:
+                compiled.disable_compile(False)
+                compiled.compile(kinds)
+                compiled.disable_compile()
     return compiled
 
 

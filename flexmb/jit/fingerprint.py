@@ -18,11 +18,13 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, is_dataclass
 from enum import Enum
 from functools import cache
 from importlib.util import find_spec
 from pathlib import Path
+from pkgutil import iter_modules
 from types import CodeType, FunctionType, ModuleType
 from typing import Any
 
@@ -31,8 +33,7 @@ import numba
 import numpy as np
 
 _BY_VERSION = {"builtins", "math", "cmath", "numpy", "numba"}
-_ROOM = Path(__file__).parent
-_COMPILE_NOTHING = {"__init__", "collector", "counting", "once", "progress"}  # files of this room
+_COMPILE_NOTHING = {"collector", "counting", "folder", "once", "progress"}  # modules of this room
 _PLAIN = {type(None), type(...), bool, int, float, complex, str, bytes}
 _KIND = inspect.CO_VARARGS | inspect.CO_VARKEYWORDS | inspect.CO_GENERATOR  # other flags say how the file was compiled
 _CONSTANT, _GLOBAL, _EXTENDED = frozenset(dis.hasconst), dis.opmap["LOAD_GLOBAL"], dis.opmap["EXTENDED_ARG"]
@@ -69,7 +70,10 @@ def reached(kernel: FunctionType) -> list[FunctionType]:
 def _compiler() -> bytes:
     """Digest of what compiles: Python, numba and what it stands on, and the code of this room."""
     versions = sys.implementation.cache_tag, numba.__version__, llvmlite.__version__, np.__version__
-    room = [_digest(_FileWords(file.stem)) for file in sorted(_ROOM.glob("*.py")) if file.stem not in _COMPILE_NOTHING]
+    names = sorted(module.name for module in iter_modules(sys.modules[__package__].__path__))  # in a zip file, too
+    room = [_digest(_ModuleWords(name)) for name in names if name not in _COMPILE_NOTHING]
+    if not room:
+        raise TypeError(f"{__package__} shows none of its modules, and what compiles is part of the key of a kernel")
     return hashlib.sha256(repr((versions, room)).encode()).digest()
 
 
@@ -209,16 +213,31 @@ class _Words:
             yield from self._value(item)
 
 
-class _FileWords(_Words):
-    """A file of this room: what its functions refer to is in this room too, or in the libraries."""
+class _ModuleWords(_Words):
+    """A module of this room: what its functions refer to is in this room too, or in the libraries."""
 
     def __init__(self, name: str) -> None:
         name = f"{__package__}.{name}"
-        loader: Any = getattr(find_spec(name), "loader", None)
-        super().__init__(FunctionType(loader.get_code(name), {"__name__": name}))
+        super().__init__(FunctionType(_code_of(name), {"__name__": name}))
 
     def _global(self, name: str) -> Any:
         return None
+
+
+def _code_of(module: str) -> CodeType:
+    """What a module says, compiled here where its source is a file: whatever loaded it may have changed it.
+
+    pytest loads all modules of a distribution that has a plug-in by a loader of its own, which knows no `get_code`.
+    Loaders of zip files and of frozen programs have no files, but `get_code`.
+    """
+    spec = find_spec(module)
+    if spec is not None and spec.origin and spec.has_location and Path(spec.origin).suffix == ".py":
+        with suppress(OSError):
+            return compile(Path(spec.origin).read_bytes(), spec.origin, "exec", dont_inherit=True)
+    code = getattr(spec and spec.loader, "get_code", lambda _: None)(module)
+    if not isinstance(code, CodeType):
+        raise TypeError(f"the code of {module} cannot be read, and it is part of the key of a compiled kernel")
+    return code
 
 
 def _is_docstring(code: CodeType, operation: bytes, argument: Sequence[int]) -> bool:

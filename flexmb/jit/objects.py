@@ -31,14 +31,15 @@ _DATA, _DIMENSIONS, _SHAPE, _ELEMENTS, _FLAGS = 2, 3, 4, 7, 8  # of an array: dt
 _ORDERED = 0x0001 | 0x0100  # flags of an array: C order, aligned
 _LOW = 0xFFFFFFFF
 
-FLOAT, ARRAY, REALS, VECTORCALL, INCREF, SAVE, RESTORE = range(7)  # rows of `interpreter`
+FLOAT, ARRAY, REALS, VECTORCALL, INCREF, SAVE, RESTORE, IDENT = range(8)  # rows of `interpreter`
 
 
 @cache
 def interpreter() -> Index:
-    """(7,) Addresses in this process: types float and array, dtype float64, and functions of the interpreter."""
+    """(8,) Addresses in this process: types float and array, dtype float64, and functions of the interpreter."""
     api = ctypes.pythonapi
-    functions = api.PyObject_Vectorcall, api.Py_IncRef, api.PyEval_SaveThread, api.PyEval_RestoreThread
+    lock = api.PyEval_SaveThread, api.PyEval_RestoreThread
+    functions = api.PyObject_Vectorcall, api.Py_IncRef, *lock, api.PyThread_get_thread_ident
     where = [ctypes.cast(function, ctypes.c_void_p).value for function in functions]
     return np.array([id(float), id(np.ndarray), id(np.dtype(np.float64)), *where], np.int64)
 
@@ -149,6 +150,12 @@ def taken(python, x):
     """A new reference to an object."""
     nothing_at(python[INCREF], (x,))
     return x
+
+
+@helper
+def this_thread(python):
+    """The number of the thread that calls, `threading.get_ident()`."""
+    return status_at(python[IDENT], ())
 
 
 def word_at(address: Any, i: Any) -> Any:

@@ -282,7 +282,7 @@ def test_of_the_room_itself_only_words_are_free(tmp_path, monkeypatch):
         importlib.invalidate_caches()
         (tmp_path / "room" / "part.py").write_text(source)
         (tmp_path / "room" / "__pycache__").exists() and shutil.rmtree(tmp_path / "room" / "__pycache__")
-        return module._digest(module._FileWords("part"))
+        return module._digest(module._ModuleWords("part"))
 
     assert digest(ROOM.replace("Words", "Other words, of another length")) == digest(ROOM)
     assert digest(f"# a comment\n\n{ROOM}") == digest(ROOM)
