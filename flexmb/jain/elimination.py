@@ -18,6 +18,10 @@ ELIMINATIONS = ("explicit", "woodbury", "condensed")  # by the numbers of flexmb
 WELL_CONDITIONED = 1e4  # modal masses scaled to a unit diagonal; condensing loses the square root of it
 NEGLIGIBLE = 2.0**-49  # rows of a scaled root of Omega below it are rounding: 16 units
 
+# Modes for each node from which condensing is faster, of bodies whose inertia is that of the undeformed shape and of
+# those whose tables follow the deformation: measured, see `is_faster`.
+AT_REST, FOLLOWING = 11, 18
+
 
 def with_elimination(c: a.Constants, choice: Elimination = "fastest") -> a.Constants:
     """The constants with the variant that eliminates the modes of each body; ReducedConstants where any is reduced.
@@ -71,7 +75,7 @@ def is_faster(c: a.Constants, k: int, nodes: int) -> bool:
     gain earlier, but not what compiling costs.
     """
     body = c.body[k]
-    return bool(body["modes"] >= (11 if LEVELS[body["level"]].at_rest else 18) * max(1, nodes))
+    return bool(body["modes"] >= (AT_REST if LEVELS[body["level"]].at_rest else FOLLOWING) * max(1, nodes))
 
 
 def _is_regular(M: a.Real) -> bool:

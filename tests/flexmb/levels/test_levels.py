@@ -51,7 +51,7 @@ def systems(scene) -> dict[str, System]:
 
 @pytest.mark.parametrize("level", ["ruthless", "linear"])
 def test_levels_coincide_at_rest_shape(systems, level):
-    """Undeformed and with the modes still, all are the same equations, summed in different orders."""
+    """Jain & Rodriguez (B1): undeformed and with the modes still, all are the same equations, in other orders."""
     full, other = systems["full"], systems[level]
     state = with_deformation(full, 0.0)
     bound = algebra(full.nu, len(full.body_names), 15)
