@@ -58,6 +58,7 @@ def test_user():
 if __name__ == "__main__":
     test_user()
 """
+PYTEST = ("python", "-m", "pytest", "-q", "-s", "test_user.py")
 # As the loaders of frozen programs: code objects from an archive, found by a hook on the path, with neither files nor
 # sources; what a package contains is listed by the hook's finder.
 FROZEN = """
@@ -180,7 +181,7 @@ def same(found: dict[str, Any], ordinary: dict[str, Any]) -> bool:
 
 def test_inside_pytest(installed: Path, folder: Path, ordinary: dict[str, Any]) -> None:
     """pytest's rewriting is off for both packages, but for the two modules that pytest itself asks for."""
-    found = told(said(installed, folder, "python", "-m", "pytest", "-q", "-s", "test_user.py"))
+    found = told(said(installed, folder, *PYTEST))
     assert same(found, ordinary)
     rewritten = {name for name, loader in found["loaders"].items() if loader != "SourceFileLoader"}
     assert rewritten == {"crosscheck", "crosscheck.pytest_plugin"}
@@ -188,13 +189,13 @@ def test_inside_pytest(installed: Path, folder: Path, ordinary: dict[str, Any]) 
 
 def test_inside_pytest_without_the_plug_in(installed: Path, folder: Path, ordinary: dict[str, Any]) -> None:
     """Who forbids the plug-in gets rewritten modules, and from these the same kernels."""
-    found = told(said(installed, folder, "python", "-m", "pytest", "-q", "-s", "-p", "no:crosscheck.pytest_plugin", "test_user.py"))
+    found = told(said(installed, folder, *PYTEST, "-p", "no:crosscheck.pytest_plugin"))
     assert same(found, ordinary)
     assert found["loaders"]["flexmb"] == "AssertionRewritingHook"
 
 
 def test_inside_pytest_by_an_egg_link(linked: Path, folder: Path, ordinary: dict[str, Any]) -> None:
-    found = told(said(linked, folder, "python", "-m", "pytest", "-q", "-s", "test_user.py"))
+    found = told(said(linked, folder, *PYTEST))
     assert same(found, ordinary)
     assert found["place"] != ordinary["place"]
     assert found["loaders"]["flexmb"] == "SourceFileLoader"
@@ -269,7 +270,7 @@ ASKED = {
 def test_python_calls_ask_for_files_too(
     asked: Any, file: str | None, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    """None of them takes no files for equal files: in a zip file, without sources, from a loader that names no place."""
+    """None of them takes no files for equal files: in a zip file, without sources, by a loader that names no place."""
     (tmp_path / "__init__.pyc").touch()
     spec = ModuleSpec("flexmb", None, origin=None if file is None else str(tmp_path / file))
     monkeypatch.setattr(own_files, "find_spec", lambda name: spec)

@@ -63,7 +63,8 @@ def test_an_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     with tarfile.open(sdist) as packed:
         packed.extractall(tmp_path / "unpacked", filter="data")
     (source,) = (tmp_path / "unpacked").iterdir()
-    for name in ("tests/repo/test_wheel.py", ".ci/run", "docs/ci.md", "action.yml", "CHANGELOG.md", "CITATION.cff", "LICENSE"):
+    pages = "docs/ci.md", "action.yml", "CHANGELOG.md", "CITATION.cff", "LICENSE"
+    for name in ("tests/repo/test_wheel.py", ".ci/run", *pages):
         assert (source / name).exists(), name
     again = built("wheel", source, tmp_path / "wheel")
     with zipfile.ZipFile(again) as packed:
