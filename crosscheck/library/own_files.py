@@ -17,10 +17,11 @@ OURS = ("flexmb", "crosscheck")
 def source_folder(package: str) -> Path:
     """Folder of the source files of `flexmb` or `crosscheck`; CaseError where they are no files."""
     spec = find_spec(package)
-    folder = Path(str(spec and spec.origin)).parent
-    if not (folder / "__init__.py").is_file():
+    folder = Path(spec.origin).parent if spec is not None and spec.origin is not None else None
+    if folder is None or not (folder / "__init__.py").is_file():
+        place = folder or "what it was loaded from"
         raise CaseError(
-            f"crosscheck reads the source files of {package}, and {folder} has none: from a zip file, in a frozen "
+            f"crosscheck reads the source files of {package}, and {place} has none: from a zip file, in a frozen "
             "program or without sources only flexmb runs. Install both with pip to run crosscheck."
         )
     return folder

@@ -32,8 +32,9 @@ def packages_of(home: Path) -> Path:
 
 def install(commands: Path, archive: Path) -> None:
     """Install a wheel, without what it requires."""
-    pip = [sys.executable, "-m", "pip", "--python", str(commands / "python"), "install", "--no-deps", "--no-index"]
-    subprocess.run([*pip, "--ignore-installed", str(archive)], check=True, capture_output=True)
+    pip = [sys.executable, "-m", "pip", "--python", str(commands / "python"), "install"]
+    alone = ["--no-deps", "--no-index", "--no-compile", "--ignore-installed"]
+    subprocess.run([*pip, *alone, str(archive)], check=True, capture_output=True)
 
 
 def called(commands: Path, folder: Path, *words: str, path: Path | None = None) -> subprocess.CompletedProcess[str]:

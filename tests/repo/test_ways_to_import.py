@@ -168,8 +168,7 @@ def told(output: str) -> dict[str, Any]:
 
 @pytest.fixture(scope="module")
 def ordinary(installed: Path, folder: Path) -> dict[str, Any]:
-    """From the wheel, installed, in a program. The second run is the one that finds all it wants on disk."""
-    said(installed, folder, "python", "test_user.py")
+    """From the wheel, installed, in a program."""
     found = told(said(installed, folder, "python", "test_user.py"))
     assert found["asked"] and set(found["loaders"].values()) == {"SourceFileLoader"}
     return found
@@ -272,6 +271,7 @@ def test_python_calls_ask_for_files_too(
 ) -> None:
     """None of them takes no files for equal files: in a zip file, without sources, by a loader that names no place."""
     (tmp_path / "__init__.pyc").touch()
+    monkeypatch.chdir(Path(own_files.__file__).parent)  # where there are sources, but those of a package beside it
     spec = ModuleSpec("flexmb", None, origin=None if file is None else str(tmp_path / file))
     monkeypatch.setattr(own_files, "find_spec", lambda name: spec)
     with pytest.raises(CaseError, match="Install both with pip"):
