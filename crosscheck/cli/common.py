@@ -16,6 +16,7 @@ from rich.console import Console
 from crosscheck.engines.registry import BUILT_IN, plug_ins
 from crosscheck.library import find
 from crosscheck.library.case import CaseError
+from crosscheck.library.own_files import OURS, source_folder
 from crosscheck.records.lock import FolderInUseError, locked
 from crosscheck.running.scheduler import TIME_LIMIT_S
 from crosscheck.terminal.text import words
@@ -58,6 +59,11 @@ def everything(
     ] = False,
 ) -> None:
     """Has no words of its own: the application's help stands above."""
+    try:
+        for package in OURS:
+            source_folder(package)
+    except CaseError as error:
+        refuse(str(error))
 
 
 def _machine_readable(asked: bool) -> bool:

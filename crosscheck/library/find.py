@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import os
 from dataclasses import dataclass, field
-from importlib.resources import as_file, files
 from pathlib import Path
 from typing import TypeVar
 
@@ -12,6 +11,7 @@ from crosscheck.library.accepted import FILE as ACCEPTED
 from crosscheck.library.accepted import Accepted
 from crosscheck.library.case import CaseError, Provenance, RunFile, Variant
 from crosscheck.library.check import check_accepted, check_provenance, check_run_file
+from crosscheck.library.own_files import source_folder
 from flexmb.scene.convert import to_struct
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import SceneError, closest
@@ -43,11 +43,9 @@ class Case:
 
 def shipped_folder() -> Path:
     """Folder of the shipped cases: package data of an installed wheel, or `cases/` beside the package in a checkout."""
-    packaged = files("crosscheck") / "cases"
-    if packaged.is_dir():
-        with as_file(packaged) as folder:
-            return folder
-    return Path(__file__).resolve().parents[2] / "cases"
+    package = source_folder("crosscheck")
+    packaged = package / "cases"
+    return packaged if packaged.is_dir() else package.resolve().parent / "cases"
 
 
 def shipped_cases() -> tuple[Case, ...]:

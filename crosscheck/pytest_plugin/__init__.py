@@ -15,9 +15,12 @@ is asked for something.
 from __future__ import annotations
 
 import shutil
+import sys
 import tempfile
 import uuid
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
+from contextlib import suppress
+from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,8 +34,22 @@ TEMPORARY = pytest.StashKey[Path]()
 SHARED = "crosscheck_shared"  # what the controller of xdist tells its workers: folder and session
 
 
+class AsInstalled:
+    """Finds the modules of flexmb and crosscheck as if there were no pytest; other modules are left to the others.
+
+    pytest rewrites the assertions of every package in a distribution that has a plug-in. Here that is a library, which
+    people want to try as it is: same code, same tracebacks, same start. Who stands first in `sys.meta_path` decides.
+    """
+
+    @staticmethod
+    def find_spec(name: str, path: Sequence[str] | None = None, target: Any = None) -> ModuleSpec | None:
+        """What Python itself finds, or None for a module that is not ours."""
+        return PathFinder.find_spec(name, path, target) if name.partition(".")[0] in ("flexmb", "crosscheck") else None
+
+
 def pytest_addoption(parser: pytest.Parser) -> None:
-    """The options, in a group of their own."""
+    """The options, in a group of their own. This is asked first of all, before any conftest.py is imported."""
+    sys.meta_path.insert(0, AsInstalled)
     group = parser.getgroup("crosscheck", "hold a multibody engine against the reference cases")
     group.addoption(
         "--crosscheck", action="append", default=[], metavar="CASES",
@@ -74,7 +91,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_unconfigure(config: pytest.Config) -> None:
-    """Remove the records, unless they were asked for."""
+    """Remove the records, unless they were asked for, and what finds our modules in this session."""
+    with suppress(ValueError):  # a session inside a session restores the path itself
+        sys.meta_path.remove(AsInstalled)
     temporary = config.stash.get(TEMPORARY, None)
     if temporary is not None:
         shutil.rmtree(temporary, ignore_errors=True)

@@ -75,10 +75,10 @@ def marks_of(case: Case) -> tuple[str, ...]:
 
 def _cases(words: str) -> tuple[Case, ...]:
     """The cases that a pattern of names, or a case, a tag or a folder means."""
-    names = fnmatch.filter(shipped_names(), words) if any(sign in words for sign in "*?[") else [words]
-    if not names:
-        raise pytest.UsageError(f'--crosscheck "{words}" names no case: `crosscheck list` shows them all')
     try:
+        names = fnmatch.filter(shipped_names(), words) if any(sign in words for sign in "*?[") else [words]
+        if not names:
+            raise pytest.UsageError(f'--crosscheck "{words}" names no case: `crosscheck list` shows them all')
         return resolve(tuple(names))
     except CaseError as error:
         raise pytest.UsageError(f"--crosscheck: {error}") from None

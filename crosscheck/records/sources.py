@@ -19,7 +19,8 @@ from importlib.metadata import Distribution, distributions
 from importlib.util import find_spec
 from pathlib import Path
 
-OURS = ("flexmb", "crosscheck")
+from crosscheck.library.own_files import OURS, source_folder
+
 _NAMED = re.compile(r"([A-Za-z_]\w*(?:\.\w+)*)(?::\w+)?")
 
 
@@ -32,7 +33,12 @@ class Sources:
 
 
 def sources(modules: Iterable[str], alone: Iterable[str] = ()) -> Sources:
-    """Everything that `modules` reach by imports, and the files of the modules `alone` without what these import."""
+    """Everything that `modules` reach by imports, and the files of the modules `alone` without what these import.
+
+    CaseError where flexmb or crosscheck were not imported from files: a key that leaves them out would match any code.
+    """
+    for package in OURS:
+        source_folder(package)
     found = Sources()
     waiting = list(dict.fromkeys(modules))
     own = {*OURS, *(_top(module) for module in waiting)}

@@ -39,9 +39,21 @@ def test_crosscheck_options_exist() -> None:
     assert {word for word in words if word.startswith("--")} <= options
 
 
+CONTINUOUS_INTEGRATION = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+
+
 def test_the_test_command_is_what_continuous_integration_runs() -> None:
-    (pattern,) = re.findall(r'grep -E "(.*)" README.md', (ROOT / ".ci" / "run").read_text(encoding="utf-8"))
+    (pattern,) = re.findall(r'grep -E "(.*)" README.md', CONTINUOUS_INTEGRATION)
     assert [line for line in README.splitlines() if re.search(pattern, line)] == [COMMANDS[1]]
+
+
+def test_continuous_integration_leaves_no_tests_out() -> None:
+    """What the command gets on the sources is what the suite on the wheel leaves out, and its words are the same."""
+    (sources,) = re.findall(r'^bash -c "\$command (\S+)" ', CONTINUOUS_INTEGRATION, flags=re.MULTILINE)
+    (left_out,) = re.findall(r"--ignore=(\S+) \|\|", CONTINUOUS_INTEGRATION)
+    assert sources == left_out and (ROOT / sources).is_dir()
+    (start,) = re.findall(r"^words=\$\{command##\*(\S+) \}", CONTINUOUS_INTEGRATION, flags=re.MULTILINE)
+    assert COMMANDS[1].rpartition(f"{start} ")[2].startswith("-m pytest ")
 
 
 def test_the_python_examples_run() -> None:

@@ -6,17 +6,15 @@ An sdist makes the same wheel. The fresh environment borrows the dependencies of
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
-import sysconfig
 import tarfile
-import venv
 import zipfile
 from pathlib import Path
 
 import pytest
 
+from tests.repo.installations import built, said
 from tests.repo.project import PYPROJECT, ROOT, is_cache
 
 FROM_WHEEL = """
@@ -29,53 +27,6 @@ assert pathlib.Path(flexmb.__file__).is_relative_to(wheel), flexmb.__file__
 assert shipped_folder().is_relative_to(wheel), shipped_folder()
 print(*sorted(case.name for case in shipped_cases()))
 """
-
-
-def built(target: str, source: Path, folder: Path) -> Path:
-    """The file that hatchling makes of a source tree."""
-    build = [sys.executable, "-m", "hatchling", "build", "--target", target, "--directory", str(folder)]
-    subprocess.run(build, cwd=source, check=True, capture_output=True)
-    (archive,) = folder.iterdir()
-    return archive
-
-
-@pytest.fixture(scope="module")
-def archive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A wheel of this checkout."""
-    return built("wheel", ROOT, tmp_path_factory.mktemp("wheel"))
-
-
-@pytest.fixture(scope="module")
-def wheel(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The wheel, unpacked."""
-    folder = tmp_path_factory.mktemp("unpacked") / "wheel"
-    with zipfile.ZipFile(archive) as packed:
-        packed.extractall(folder)
-    return folder
-
-
-@pytest.fixture(scope="module")
-def installed(archive: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Folder of the commands in a fresh environment in which the wheel is installed."""
-    home = tmp_path_factory.mktemp("fresh")
-    venv.create(home, with_pip=False, symlinks=True)
-    commands = home / ("Scripts" if os.name == "nt" else "bin")
-    python = str(commands / "python")
-    fresh = {"base": str(home), "platbase": str(home)}
-    packages = Path(sysconfig.get_path("purelib", "venv", vars=fresh))
-    (packages / "borrowed.pth").write_text(sysconfig.get_path("purelib") + "\n", encoding="utf-8")
-    install = [sys.executable, "-m", "pip", "--python", python, "install", "--no-deps", "--no-index"]
-    subprocess.run([*install, "--ignore-installed", str(archive)], check=True, capture_output=True)
-    return commands
-
-
-def said(commands: Path, folder: Path, *words: str) -> str:
-    """What an installed command prints, run in an empty folder."""
-    clean = {name: text for name, text in os.environ.items() if name != "PYTHONPATH"}
-    command = [str(commands / words[0]), *words[1:]]
-    run = subprocess.run(command, cwd=folder, env=clean, capture_output=True, text=True, check=False)
-    assert run.returncode == 0, run.stdout + run.stderr
-    return run.stdout
 
 
 def test_ships_the_packages_and_nothing_else(wheel: Path) -> None:
@@ -112,7 +63,8 @@ def test_an_sdist_makes_the_same_wheel(wheel: Path, tmp_path: Path) -> None:
     with tarfile.open(sdist) as packed:
         packed.extractall(tmp_path / "unpacked", filter="data")
     (source,) = (tmp_path / "unpacked").iterdir()
-    for name in ("tests/repo/test_wheel.py", "docs/ci.md", "action.yml", "CHANGELOG.md", "CITATION.cff", "LICENSE"):
+    pages = "docs/ci.md", "action.yml", "CHANGELOG.md", "CITATION.cff", "LICENSE"
+    for name in ("tests/repo/test_wheel.py", ".ci/run", *pages):
         assert (source / name).exists(), name
     again = built("wheel", source, tmp_path / "wheel")
     with zipfile.ZipFile(again) as packed:

@@ -12,6 +12,7 @@ import pytest
 
 from crosscheck.conformance import trial
 from crosscheck.engines.registry import engine
+from crosscheck.library import own_files
 from crosscheck.pytest_plugin import compared, items, request, runs
 from tests.crosscheck.fake_project import fake_project
 from tests.crosscheck.sessions import copy_case, run_here
@@ -149,6 +150,16 @@ def test_tags_are_marks(inside: pytest.Pytester, case: Path) -> None:
     ran(inside, *on(case, "fine"), "-m", "small and crosscheck").assert_outcomes(passed=len(CHANNELS), deselected=1)
     chosen = ran(inside, *on(case, "fine"), "-k", "position")
     chosen.assert_outcomes(passed=1, deselected=len(CHANNELS))
+
+
+def test_cases_that_lie_in_no_folder_are_a_usage_error(
+    inside: pytest.Pytester, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As where crosscheck was imported from a zip file: a sentence, before anything runs."""
+    monkeypatch.setattr(own_files, "find_spec", lambda name: None)
+    result = ran(inside, "--crosscheck", "wheel_*", "--crosscheck-engine", "fine")
+    assert result.ret == pytest.ExitCode.USAGE_ERROR
+    result.stderr.fnmatch_lines(["*crosscheck reads the source files of crosscheck, and *"])
 
 
 @pytest.mark.parametrize(

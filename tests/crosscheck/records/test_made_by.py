@@ -43,6 +43,7 @@ WITHOUT_PART = {
     "crosscheck.engines.functions_of_time": "says to the drawing how a wheel starts; native evaluates functions itself",
     "crosscheck.records.drawing": "holds what was drawn",
     "crosscheck.records.held": "holds the stored reference, which is made of other runs",
+    "crosscheck.pytest_plugin": "finds our modules inside pytest, as Python would",
     "crosscheck.running.held": "holds the stored reference, which is made of other runs",
     "flexmb.output.writing": "says what is wrong with a folder",
     "crosscheck.running.scheduler": "says what a scheduler is",

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import re
 from importlib import import_module
+from pkgutil import iter_modules
 from typing import get_args
 
 import pytest
 
 import flexmb as fm
+from flexmb import integrate
 from flexmb.integrate.catalogue import INTEGRATORS, integrator
 from flexmb.integrate.integrator import Integrator, Method
 from flexmb.integrate.settings import Settings
@@ -23,8 +25,7 @@ def test_names_for_type_checkers_are_those_of_the_catalogue():
 
 
 def test_every_declaration_is_in_the_catalogue():
-    files = [path for path in (ROOT / "flexmb" / "integrate").glob("*.py") if path.stem != "__init__"]
-    modules = [import_module(f"flexmb.integrate.{path.stem}") for path in files]
+    modules = [import_module(f"flexmb.integrate.{each.name}") for each in iter_modules(integrate.__path__)]
     declared = [each for module in modules for each in vars(module).values() if isinstance(each, Integrator)]
     assert len(declared) == len(INTEGRATORS)
     assert all(INTEGRATORS[each.name] is each for each in declared)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import flexmb
 from flexmb.entry import articulated, factorisation
 from flexmb.jain.response import response
 from flexmb.tables.arrays import ANGULAR_Z, LINEAR_Z, NO_AXIS, Constants
@@ -15,7 +17,6 @@ from flexmb.tables.status import OK
 from flexmb.typing import Real
 from tests.bounds import gamma
 from tests.flexmb.jain.random_states import RandomState, random_state
-from tests.repo.project import ROOT
 
 
 @pytest.fixture(scope="module", params=["rigid", "full"])
@@ -62,7 +63,8 @@ def test_two_files_know_of_it():
     """Elsewhere neither its mark nor the axis: the recursion asks a hinge for what it does."""
     named = re.compile(r"\b(SINGLE|ANGULAR_Z|LINEAR_Z|REVOLUTE|PRISMATIC)\b|free_count == -1\b|body\[k\]\.axis\b")
     assert named.search("if w.body[k].free_count == SINGLE:")
-    rooms = [path for room in ("jain", "closure", "entry") for path in (ROOT / "flexmb" / room).glob("*.py")]
+    packages = Path(flexmb.__file__).parent
+    rooms = [path for room in ("jain", "closure", "entry") for path in (packages / room).glob("*.py")]
     knowing = [path.name for path in rooms if named.search(path.read_text(encoding="utf-8"))]
     assert sorted(knowing) == ["axis.py", "hinge_solve.py"]
 

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from flexmb import jit
 from flexmb.jit import folder as folders
 from flexmb.jit import hooks
 from flexmb.jit.folder import cache_directory, delete_unused, warn_once
@@ -240,7 +241,7 @@ def part(x):
 def test_an_edited_helper_in_another_file_is_compiled_and_edited_words_are_not(tmp_path):
     """A package of its own: the room jit, a kernel, and a helper in another file."""
     package = tmp_path / "flexmb"
-    shutil.copytree(ROOT / "flexmb" / "jit", package / "jit")
+    shutil.copytree(Path(jit.__file__).parent, package / "jit")
     (package / "__init__.py").write_text("")
     (package / "entry.py").write_text(ENTRY)
     environment = os.environ | {"PYTHONPATH": str(tmp_path), "NUMBA_CACHE_DIR": str(tmp_path / "cache")}

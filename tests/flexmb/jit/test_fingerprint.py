@@ -7,6 +7,8 @@ import pkgutil
 import shutil
 import subprocess
 import sys
+from importlib.machinery import ModuleSpec
+from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import FunctionType, ModuleType
 
@@ -288,6 +290,39 @@ def test_of_the_room_itself_only_words_are_free(tmp_path, monkeypatch):
     assert digest(f"# a comment\n\n{ROOM}") == digest(ROOM)
     assert digest(ROOM.replace("2.0", "3.0")) != digest(ROOM)
     assert digest(ROOM.replace("'c'", "'d'").replace('"c"', '"d"')) != digest(ROOM)
+
+
+class Speechless:
+    """A loader that has no code to show, as that of compiled extensions, or of pytest for what it rewrites."""
+
+
+def test_the_room_is_read_from_its_files_whatever_loaded_it(monkeypatch):
+    """pytest's loader runs other code than the file says, and shows none."""
+    plain = module._compiler.__wrapped__()
+    found = module.find_spec
+
+    def rewritten(name: str) -> ModuleSpec:
+        return spec_from_file_location(name, found(name).origin, loader=Speechless())
+
+    monkeypatch.setattr(module, "find_spec", rewritten)
+    assert module._compiler.__wrapped__() == plain
+
+
+@pytest.mark.parametrize("place", [None, "hidden.so", "gone.py"])
+def test_a_room_that_cannot_be_read_gives_no_key(place, monkeypatch, tmp_path):
+    """A key that left the compiler out would find kernels of another one."""
+    spec = ModuleSpec("flexmb.jit.kernel", Speechless(), origin=place and str(tmp_path / place))
+    spec.has_location = place is not None
+    monkeypatch.setattr(module, "find_spec", lambda name: spec)
+    with pytest.raises(TypeError, match="cannot be read"):
+        module._compiler.__wrapped__()
+
+
+def test_a_room_that_is_not_listed_gives_no_key(monkeypatch):
+    """As by a loader of a frozen program that finds modules by their names and lists none."""
+    monkeypatch.setattr(module, "iter_modules", lambda path: iter(()))
+    with pytest.raises(TypeError, match="shows none of its modules"):
+        module._compiler.__wrapped__()
 
 
 def _counts(function: FunctionType) -> bool:
