@@ -13,6 +13,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Sequence
+from functools import cache
 from threading import RLock
 from typing import Any
 
@@ -80,10 +81,17 @@ def gate(
     returned (1,): where the array is, a view of `rates`. Both may change, and `careful` holds the array.
     """
     passed = _gate(quaternions, rates, nq, speed, doubt, behind, owner, returned, id(careful))
+    address = _address()
+    with _making:
+        return builtin(address, passed, careful)
+
+
+@cache
+def _address() -> int:
+    """Of `evaluate`, compiled once for all gates."""
     signature = STATUS(*[STATUS] * 4)
     evaluate.compile(signature.args)
-    with _making:
-        return builtin(HOOKS.address(evaluate, signature), passed, careful)
+    return HOOKS.address(evaluate, signature)
 
 
 def _gate(

@@ -192,7 +192,7 @@ def main() -> None:
     """The command line."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("scenes", nargs="*", help="by default all")
-    parser.add_argument("--span", type=float, default=0.01, help="seconds for each question")
+    parser.add_argument("--span", type=float, default=0.005, help="seconds for each question")
     parser.add_argument("--spoiled", action="store_true")
     asked = parser.parse_args()
     if asked.spoiled:

@@ -11,6 +11,7 @@ import re
 import subprocess
 import sys
 import threading
+import time
 import weakref
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
@@ -19,12 +20,15 @@ from typing import Any
 
 import numpy as np
 import pytest
+from numba.core.compiler_lock import global_compiler_lock
 
 import flexmb as fm
 from flexmb.closure.closures import Closures
 from flexmb.frisch.nested_system import NestedSystem
+from flexmb.jit.direct import Direct
 from flexmb.run.warm_up import general_kernels, looped
 from flexmb.system.closed import ClosedSystem
+from flexmb.system.evaluator import Evaluator
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.tables.features import GENERAL, features
 from flexmb.tables.per_thread import per_thread
@@ -225,6 +229,32 @@ def test_what_a_thread_has_goes_with_it():
     assert [each() for each in kept] == [None] * 4
 
 
+def written(kept: Any) -> bool:
+    """Whether calls write into something that is kept."""
+    if isinstance(kept, dict):
+        return any(map(written, kept.values()))
+    if isinstance(kept, list | tuple):
+        return any(map(written, kept))
+    name = type(kept).__name__
+    return isinstance(kept, Direct | Evaluator) or name in WRITTEN or name.endswith("Workspace")
+
+
+WRITTEN = {"Outputs", "Observation", "Matrices", "Joint", "Response"}
+
+
+@pytest.mark.parametrize("made", [lambda: W.scene, looped], ids=["tree", "closed"])
+def test_nothing_that_calls_write_into_is_kept_for_all_threads(made):
+    """But what runs and batches take out of the list that it is kept in, while they use it."""
+    system = fm.compile(made())
+    for ask in questions(system, system.initial_state).values():
+        ask(system, system.initial_state)
+    factors = system.factorise(system.initial_state)
+    for each in (system, system.nested(), factors):
+        shared = {name: value for name, value in vars(each).items() if name not in ("_own", "kept")}
+        assert not [name for name, value in shared.items() if written(value)], each
+        assert written(vars(each._own))  # negative control: it is there, for this thread
+
+
 def test_closures_count_their_rows_for_all_threads():
     system = fm.compile(looped())
     assert isinstance(system, ClosedSystem)
@@ -272,6 +302,35 @@ def test_a_process_that_is_forked_off_while_threads_work_goes_on():
         busy.set()
         for each in threads:
             each.join()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_process_that_is_forked_off_while_a_thread_compiles_can_compile():
+    """It waits for the kernel, and does not inherit a lock that nobody there can release."""
+    compiling, seconds = threading.Event(), 0.3
+
+    def work() -> None:
+        with global_compiler_lock:
+            compiling.set()
+            time.sleep(seconds)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    compiling.wait()
+    child = multiprocessing.get_context("fork").Process(target=_compile_in_a_child)
+    child.start()
+    child.join(20)
+    hangs = child.is_alive()
+    if hangs:
+        child.kill()
+    thread.join()
+    assert not hangs and child.exitcode == 0
+
+
+def _compile_in_a_child() -> None:
+    with global_compiler_lock:
+        pass
 
 
 def _in_a_child(system: fm.System, state: fm.State, told: Any) -> None:
