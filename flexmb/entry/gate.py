@@ -114,9 +114,9 @@ gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _
 def evaluate(place, arguments, count, names):
     """A builtin of t, q (nq,) and u (nu,): the rates of the gate at this place."""
     g = gate_at(bundle_of(place))
-    if _is_owner(g) and count == 3 and names == 0 and _admitted(arguments, g) and _evaluated(arguments, g) and _sound(g):
-        if _is_plain(g.returned[0], g):
-            return taken(g.python, g.returned[0])
+    passes = _is_owner(g) and count == 3 and names == 0 and _admitted(arguments, g)
+    if passes and _evaluated(arguments, g) and _sound(g) and _is_plain(g.returned[0], g):
+        return taken(g.python, g.returned[0])
     return called(g.python, g.careful[0], arguments, count, names)
 
 

@@ -208,7 +208,7 @@ class Mechanics:
         out.loads[:] = self._inverse(t, y, out.rates)[1]
         self._observe_motion(t, y)
 
-    # Kernels with the tables that they are called with, each thread's own, found when first asked for: that compiles them
+    # Kernels with the tables that they are called with, each thread's own; found when asked for, which compiles them
 
     @per_thread
     def _recur(self) -> Direct:

@@ -78,11 +78,11 @@ class System(Mechanics):
         return System(self.scene, self._asked)
 
     @per_thread
-    def _w(self) -> Workspace:  # type: ignore[override]
+    def _w(self) -> Workspace:
         return self.workspace()
 
     @per_thread
-    def _recursion_w(self) -> Workspace:  # type: ignore[override]
+    def _recursion_w(self) -> Workspace:
         return self.recursion_workspace()
 
     @per_thread
