@@ -50,8 +50,19 @@ class GroupResponse(NamedTuple):
     own: int
 
 
+class _Counted(NamedTuple):
+    """By group, the independent rows of a closed configuration, -1 before they are known; the size of all rows' ports
+    there. It is never written to: who counts anew puts another one in its place, and threads read one or the other."""
+
+    ranks: Index
+    size: Real
+
+
 class Closures:
-    """The closures of one scene and the tree under them. It owns one workspace: threads must not share it."""
+    """The closures of one scene and the tree under them.
+
+    What is asked for in several steps is kept from one to the next: `for_thread` gives another thread the same ones.
+    """
 
     def __init__(
         self,
@@ -70,8 +81,7 @@ class Closures:
         self.scene, self._tree, self._slowest, self._check = closures, tree, slowest, check
         self._layout = layout
         self.constants = constants, own
-        self._ranks = np.full(len(own.group), -1)  # independent rows of a closed configuration; -1: not yet known
-        self._size = np.zeros(len(own.row))  # of the rows' ports there
+        self._counted = [_Counted(np.full(len(own.group), -1), np.zeros(len(own.row)))]
         self._chain = self._evaluated = self.chain("articulated")
         self._composite: Closed | None = None
         self.is_singular = False
@@ -80,6 +90,12 @@ class Closures:
     def on_tree(self, constants: Constants, tree: Callable[[], Workspace]) -> Closures:
         """The same closures on the same tree with other functions of time, and workspaces for them."""
         return Closures(self.scene, constants, self.constants[1], self._layout, tree, self._slowest, self._check)
+
+    def for_thread(self) -> Closures:
+        """The same with workspaces of its own: whoever counts the independent rows does so for all."""
+        found = self.on_tree(self.constants[0], self._tree)
+        found._counted = self._counted
+        return found
 
     @property
     def row_loads(self) -> Real:
@@ -91,7 +107,7 @@ class Closures:
         c, cc = self.constants
         w, route = self._tree(), self._route(algorithm)
         own = workspace(cc, c, len(w.q))
-        own.rank[:], own.size[:], own.gain[:] = self._ranks, self._size, (2.0 * rate, rate * rate)
+        (own.rank[:], own.size[:]), own.gain[:] = self._counted[0], (2.0 * rate, rate * rate)
         own.notices[0] = GAPS if rate > 0.0 else NOTHING
         return Closed(c, w, cc, own, w if isinstance(route, Recursion) else self._tree(), route)
 
@@ -145,7 +161,7 @@ class Closures:
         return t + step, there
 
     def _motion(self, t: float, y: Real, s: Closed) -> ClosedMotion:
-        s.cw.rank[:], self._evaluated = self._ranks, s
+        s.cw.rank[:], self._evaluated = self._counted[0].ranks, s
         self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
         status = dynamics.closure_loads(s.w, s.cc, s.cw)
         self.is_singular = status == CLOSURE_SINGULAR
@@ -243,16 +259,17 @@ class Closures:
     def count_rows(self) -> None:
         """Independent rows at the state linearised last, taken as those of the mechanism."""
         dynamics.count_rows(self._chain.cc, self._own)
-        self._ranks, self._size = self._own.rank.copy(), self._own.size.copy()
+        self._counted[0] = _Counted(self._own.rank.copy(), self._own.size.copy())
 
     def count_as(self, other: Closures) -> None:
         """As many independent rows as the same closures have on a tree of the same freedom."""
-        self._ranks, self._size = other._ranks.copy(), other._size.copy()
+        self._counted[0] = other._counted[0]
 
     @property
     def rank(self) -> int:
         """Independent rows of a closed configuration; -1 before the first one is known."""
-        return int(np.sum(self._ranks)) if np.all(self._ranks >= 0) else -1
+        ranks = self._counted[0].ranks
+        return int(np.sum(ranks)) if np.all(ranks >= 0) else -1
 
     @property
     def independent(self) -> int:

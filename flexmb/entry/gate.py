@@ -3,12 +3,18 @@
 Compiled once for all algorithms and scenes: the kernel behind it is called by address, and the gate itself is a
 function of the interpreter. Whatever is not plainly right, it leaves to a function of Python, which finds out what to
 say.
+
+What is behind the gate belongs to one thread, as the kernel lets others run while it writes: the gate asks for the
+number of the thread that calls (2 ns), and leaves those that it does not know to the function of Python too.
 """
 
 from __future__ import annotations
 
 import math
+import os
 from collections.abc import Callable, Sequence
+from functools import cache
+from threading import RLock
 from typing import Any
 
 import numpy as np
@@ -27,6 +33,7 @@ from flexmb.jit.objects import (
     is_float,
     is_vector,
     taken,
+    this_thread,
     value,
     vector,
     word_at,
@@ -36,6 +43,14 @@ from flexmb.tables.arrays import SPEED_STATE
 from flexmb.tables.soundness import SOUND, soundness
 from flexmb.tables.status import OK
 from flexmb.typing import Index, Real, Record
+
+NOBODY = -1  # no thread has this number
+
+# While `builtin` notes down a kernel that it meets for the first time; nothing that is done meanwhile takes a lock. No
+# process is forked off meanwhile: there it would stay held.
+_making = RLock()
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=_making.acquire, after_in_parent=_making.release, after_in_child=_making.release)
 
 _LONG = 50  # speeds from which other threads may run meanwhile: letting them costs 50 ns
 
@@ -50,41 +65,74 @@ class Gate:
     speed: Record  # (nu,) SPEED_STATE, where the kernel leaves udot
     doubt: Index  # (1,)
     behind: Index  # (3 or 4,) addresses of the kernel, and of the bundles that it takes after t and y
-    objects: Index  # (2,) of what is returned, and of the function that is called instead
+    owner: Index  # (1,) number of the thread that passes, or NOBODY
+    returned: Index  # (1,) address of the array that is returned
+    careful: Index  # (1,) address of the function that is called instead
     python: Index  # `flexmb.jit.objects.interpreter`
 
 
 def gate(
-    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], careful: Any
-) -> Callable[..., Real]:
-    """(t, q, u): rates (nu,), which every call writes anew, or what `careful` makes of these arguments.
+    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], owner: Index,
+    returned: Index, careful: Any,
+) -> Callable[..., Real]:  # fmt: skip
+    """(t, q, u): an array of the rates (nu,), which every call writes anew, or what `careful` makes of these arguments.
 
-    speed and doubt are those of the workspace of the kernel behind the gate.
+    speed and doubt are those of the workspace of the kernel behind the gate. owner (1,): the thread that it is for;
+    returned (1,): where the array is, a view of `rates`. Both may change, and `careful` holds the array.
     """
-    passed = _gate(quaternions, rates, nq, speed, doubt, behind, (id(rates), id(careful)))
+    passed = _gate(quaternions, rates, nq, speed, doubt, behind, owner, returned, id(careful))
+    address = _address()
+    with _making:
+        return builtin(address, passed, careful)
+
+
+@cache
+def _address() -> int:
+    """Of `evaluate`, compiled once for all gates."""
     signature = STATUS(*[STATUS] * 4)
     evaluate.compile(signature.args)
-    return builtin(HOOKS.address(evaluate, signature), passed, rates, careful)
+    return HOOKS.address(evaluate, signature)
 
 
 def _gate(
-    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], objects: Sequence[int]
-) -> Gate:
-    y, addresses = np.zeros(nq + len(rates) + 1), (np.array(each, np.int64) for each in (behind, objects))
-    return Gate(quaternions, y, rates, speed, doubt, *addresses, interpreter())
+    quaternions: Index, rates: Real, nq: int, speed: Record, doubt: Index, behind: Sequence[int], owner: Index,
+    returned: Index, careful: int,
+) -> Gate:  # fmt: skip
+    y, (kernel_and_tables, function) = np.zeros(nq + len(rates) + 1), map(_whole, (behind, [careful]))
+    return Gate(quaternions, y, rates, speed, doubt, kernel_and_tables, owner, returned, function, interpreter())
+
+
+def _whole(numbers: Sequence[int]) -> Index:
+    return np.array(numbers, np.int64)
 
 
 _NOTHING = np.zeros(0, np.int64)
-gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _NOTHING, (), ()))
+gate_at = at_address(_gate(_NOTHING, np.zeros(0), 0, np.zeros(0, SPEED_STATE), _NOTHING, (), _NOTHING, _NOTHING, 0))
 
 
 @kernel
 def evaluate(place, arguments, count, names):
     """A builtin of t, q (nq,) and u (nu,): the rates of the gate at this place."""
     g = gate_at(bundle_of(place))
-    if count == 3 and names == 0 and _admitted(arguments, g) and _evaluated(arguments, g) and _sound(g):
-        return taken(g.python, g.objects[0])
-    return called(g.python, g.objects[1], arguments, count, names)
+    passes = _is_owner(g) and count == 3 and names == 0 and _admitted(arguments, g)
+    if passes and _evaluated(arguments, g) and _sound(g) and _is_plain(g.returned[0], g):
+        return taken(g.python, g.returned[0])
+    return called(g.python, g.careful[0], arguments, count, names)
+
+
+@helper
+def _is_owner(g):
+    """Whether the thread that calls is the first one that did: here it holds the interpreter's lock, no other comes."""
+    this = this_thread(g.python)
+    if g.owner[0] == NOBODY:
+        g.owner[0] = this
+    return g.owner[0] == this
+
+
+@helper
+def _is_plain(x, g):
+    """Whether an array that was shown to others still has its shape: they may have given it another."""
+    return is_vector(g.python, x) and vector(x).shape[0] == g.rates.shape[0]
 
 
 @helper

@@ -17,6 +17,7 @@ from flexmb.frisch.errata import CORRECTED, Erratum
 from flexmb.frisch.tables import NestedWorkspace, workspace
 from flexmb.scene.schema import Scene
 from flexmb.tables.arrays import Constants
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import Layout, finite_result
 from flexmb.typing import Index, Real
 
@@ -98,7 +99,7 @@ def nested_system(scene: Scene, errata: Set[Erratum] = CORRECTED, null_partition
 
 
 class NestedSystem:
-    """The equations of one scene. It owns one workspace: threads must not share it.
+    """The equations of one scene. Threads may share them: each has a workspace of its own.
 
     y = [q, u, work]: ValueError or TypeError for what does not fit, DynamicsError where numbers overflow.
     """
@@ -114,7 +115,11 @@ class NestedSystem:
         """`errata` of the print are kept; `null_partitions`: see `flexmb.frisch.constants.nested_constants`."""
         self.constants = nested_constants(constants, chain, errata, null_partitions)
         self._layout = layout
-        self._w = self.workspace()
+
+    @per_thread
+    def _w(self) -> NestedWorkspace:
+        """The one that all questions of this thread write."""
+        return self.workspace()
 
     def workspace(self) -> NestedWorkspace:
         """A fresh workspace for the right-hand side; one per thread."""
@@ -122,7 +127,7 @@ class NestedSystem:
 
     @property
     def own_workspace(self) -> NestedWorkspace:
-        """The one that all questions here write."""
+        """The one that all questions of this thread write."""
         return self._w
 
     def accelerations(self, t: float, y: Real) -> tuple[int, Real]:

@@ -9,7 +9,6 @@ environment FLEXMB_KERNELS=general is set runs every scene by them, somewhat slo
 from __future__ import annotations
 
 import argparse
-import os
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,6 +28,7 @@ from flexmb.system.algorithms import ON_CHAINS, RUNNING, WITH_JACOBIAN
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
+from flexmb.tables.features import GENERAL, KERNELS
 
 Kind = Literal["tree", "condensed", "closed"]
 
@@ -95,16 +95,12 @@ def _compile(scene: Scene, kind: Kind, methods: Sequence[Method], algorithms: Se
 
 @contextmanager
 def general_kernels() -> Iterator[None]:
-    """For the tables that are made meanwhile."""
-    before = os.environ.get("FLEXMB_KERNELS")
-    os.environ["FLEXMB_KERNELS"] = "general"
+    """For the tables that this thread makes meanwhile; the environment is that of all threads."""
+    before = KERNELS.set(GENERAL)
     try:
         yield
     finally:
-        if before is None:
-            del os.environ["FLEXMB_KERNELS"]
-        else:
-            os.environ["FLEXMB_KERNELS"] = before
+        KERNELS.reset(before)
 
 
 def _runs(kind: Kind, algorithm: Algorithm, method: Method) -> bool:

@@ -11,9 +11,10 @@ from __future__ import annotations
 
 import os
 import sys
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -77,6 +78,8 @@ class BatchAccelerations(NamedTuple):
 
 class Batch:
     """Copies that share their structure: hinges, levels, modes, where loads act; their numbers may differ.
+
+    Threads may share a batch, beside those that it starts itself.
 
     `systems`: one for each copy, or a single one for any number of copies. ValueError where there is none, or where one
     has another structure than the first.
@@ -289,7 +292,14 @@ def in_threads(work: Callable[[Iterable[Any]], None], parts: Sequence[Any], thre
     if threads <= 1:
         work(parts)
         return
-    waiting = iter(parts)  # one iterator for all: taking the next one of a list is atomic
+    waiting = deque(parts)
     with ThreadPoolExecutor(threads) as pool:
-        for done in [pool.submit(work, waiting) for _ in range(threads)]:
+        for done in [pool.submit(work, _taken_from(waiting)) for _ in range(threads)]:
             done.result()
+
+
+def _taken_from(waiting: deque[Any]) -> Iterator[Any]:
+    """One after the other, while there are some: to take one is a single step, which no other thread comes between."""
+    with suppress(IndexError):
+        while True:
+            yield waiting.popleft()

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 
 def _own(system: Mechanics) -> tuple[Any, ...]:
-    return system.constants, system._w, system._places()
+    return system.constants, system._w, system._matrices
 
 
 def _fresh(system: Mechanics) -> tuple[Any, ...]:

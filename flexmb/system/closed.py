@@ -28,6 +28,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.observables import Evaluation
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
@@ -44,8 +45,14 @@ class ClosedSystem(System):
         super().__init__(scene)
         own = closure_constants(scene, self.constants, self._closure_ports)
         slowest = slowest_mode(self._links)
-        self.closures = Closures(scene.closures, self.constants, own, self.layout, self.workspace, slowest, self._check)
+        tree = scene.closures, self.constants, own, self.layout, self.workspace, slowest
+        self._closures = self._own.closures = Closures(*tree, self._check)  # this thread's own
         self._start: State | None = None
+
+    @per_thread
+    def closures(self) -> Closures:
+        """From Python, for what takes several steps."""
+        return self._closures.for_thread()
 
     def _anew(self) -> ClosedSystem:
         """The same scene turned into other arrays."""

@@ -3,32 +3,33 @@
 from __future__ import annotations
 
 from functools import cached_property, partial
+from threading import get_ident
 from typing import Any
 
 import numpy as np
 
-from flexmb.entry.gate import gate
+from flexmb.entry.gate import NOBODY, gate
 from flexmb.jit.direct import Direct, addresses, direct
 from flexmb.jit.objects import readable
 from flexmb.jit.pointer import REAL, STATUS, VECTOR
 from flexmb.system.algorithm import DynamicsAlgorithm
 from flexmb.system.mechanics import Mechanics
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import finite_result
 from flexmb.tables.status import OK
-from flexmb.typing import Real
+from flexmb.typing import Index, Real
 
 
 class Evaluator(partial):  # a partial, so that a call takes no way through Python
     """`evaluator(t, q, u)`: udot (nu,) at time t (s), q (nq,) and u (nu,), in an array that every call writes anew.
 
     `System.evaluator` makes one. The array, `accelerations`, is for reading; copy what is to be kept. Arrays of floats
-    in C order go in as they are; what else `System.evaluate` takes is converted. An evaluator writes into its own
-    workspace: one per thread. Raises ValueError, TypeError and DynamicsError as `System.evaluate` does.
+    in C order go in as they are; what else `System.evaluate` takes is converted. Threads may share an evaluator: each
+    gets an array of its own. It is the fastest in the thread that calls it first. Raises ValueError, TypeError and
+    DynamicsError as `System.evaluate` does.
     """
 
-    accelerations: Real
-    _system: Mechanics
-    _algorithm: DynamicsAlgorithm
+    _careful: _Careful
 
     def __new__(cls, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> Evaluator:
         """tables: what the algorithm's kernel takes after t and y, the workspace second."""
@@ -36,36 +37,86 @@ class Evaluator(partial):  # a partial, so that a call takes no way through Pyth
         call: Any = careful
         if readable():
             behind = addresses(algorithm.kernel(), STATUS, REAL, VECTOR, *tables)
-            call = gate(system.layout.quaternions, careful.shown, system.nq, w.speed, w.doubt, behind, careful)
+            call = gate(
+                system.layout.quaternions, careful.rates, system.nq, w.speed, w.doubt, behind, careful.owner,
+                careful.returned, careful,
+            )  # fmt: skip
         self = super().__new__(cls, call)
-        self.accelerations, self._system, self._algorithm = careful.shown, system, algorithm
+        self._careful = careful
         return self
+
+    @property
+    def accelerations(self) -> Real:
+        """(nu,) The array that calls of this thread write into and return."""
+        return self._careful.shown
 
     def __reduce__(self) -> tuple[Any, ...]:
         """A copy is made by the copied system."""
-        return self._system.evaluator, (self._algorithm.name,)
+        return self._careful.system.evaluator, (self._careful.algorithm.name,)
 
 
 class _Careful:
-    """The same step by step, for arguments in another form, and for all that there is something to say of."""
+    """The same step by step, for arguments in another form, for other threads, and for all that there is to say.
+
+    The evaluator belongs to the thread that calls it first. Another one with the same number, which Python gives again
+    when a thread has ended, may well take it over: no two that live have the same.
+    """
 
     def __init__(self, system: Mechanics, algorithm: DynamicsAlgorithm, tables: tuple[Any, ...]) -> None:
-        self._system, self._algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
-        self._rates = np.zeros(system.nu)
-        self.shown = self._rates.view()
-        self.shown.flags.writeable = False
+        self.system, self.algorithm, self._tables, self._w = system, algorithm, tables, tables[1]
+        numbers = np.zeros(system.nu)
+        self.rates = numbers[:]
+        numbers.flags.writeable = False  # hence those of all other views
+        self._numbers = numbers
+        self.owner: Index = np.full(1, NOBODY)
+        self.returned: Index = np.zeros(1, np.int64)
+        """(1,) Address of the array that is shown, for the gate."""
+        self._first = dict[str, int]()
+        self._show()
+
+    def __call__(self, t: Any, q: Any, u: Any) -> Real:
+        if not self._is_owner():
+            return self._of_this_thread(t, q, u)
+        t, y = self.system.layout.packed(t, q, u)
+        status = self._evaluate(t, y)
+        if status != OK:
+            self.system._check(status, int(self._w.fault[0]))
+        self.rates[:] = self._w.speed["acceleration"]
+        finite_result(self.rates, t)
+        self.system._trust(t, y, self._w)
+        return self.shown
+
+    @property
+    def shown(self) -> Real:
+        """What calls of this thread return: a new view of the rates where somebody has made another of the last."""
+        if self.owner[0] not in (NOBODY, get_ident()):
+            return self._of_this_thread.accelerations
+        one, other = self._shown, self._numbers
+        if (one.shape, one.dtype, one.flags.c_contiguous) != (other.shape, other.dtype, True):
+            self._show()
+        return self._shown
+
+    def _show(self) -> None:
+        shown = self._numbers.view()
+        self.returned[0] = id(shown)  # first: the gate must not return what is let go
+        self._shown = shown
+
+    def _is_owner(self) -> bool:
+        """Whether this thread is the first one that called.
+
+        The gate has noted it. Where there is none, as in an interpreter without a lock, one of several at once is.
+        """
+        this = get_ident()
+        if self.owner[0] == NOBODY:
+            self.owner[0] = self._first.setdefault("thread", this)
+        return bool(self.owner[0] == this)
+
+    @per_thread
+    def _of_this_thread(self) -> Evaluator:
+        """For a thread that is not the owner."""
+        return Evaluator(self.system, self.algorithm, self.algorithm.fresh(self.system))
 
     @cached_property
     def _evaluate(self) -> Direct:
         """(t, y): the kernel by an entry of its own, compiled when first needed."""
-        return direct(self._algorithm.kernel(), STATUS, REAL, VECTOR, *self._tables)
-
-    def __call__(self, t: Any, q: Any, u: Any) -> Real:
-        t, y = self._system.layout.packed(t, q, u)
-        status = self._evaluate(t, y)
-        if status != OK:
-            self._system._check(status, int(self._w.fault[0]))
-        self._rates[:] = self._w.speed["acceleration"]
-        finite_result(self._rates, t)
-        self._system._trust(t, y, self._w)
-        return self.shown
+        return direct(self.algorithm.kernel(), STATUS, REAL, VECTOR, *self._tables)

@@ -16,6 +16,7 @@ from flexmb.entry import factorisation
 from flexmb.jain.response import Response, response
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import finite_result
 from flexmb.typing import Real
 
@@ -42,13 +43,24 @@ class Condition(NamedTuple):
         return not self.kappa * NEGLIGIBLE < 1.0
 
 
+class _Factors(NamedTuple):
+    """The status of the factorisation, the factors in a workspace, and what products write besides."""
+
+    status: int
+    w: Workspace
+    x: Response
+
+
 class MassMatrixFactors:
-    """M (nu,nu) of one state as F F' in the order of u; every product costs O(N)."""
+    """M (nu,nu) of one state as F F' in the order of u; every product costs O(N).
+
+    Threads may share it: a product writes beside the factors, so each thread finds them once for itself.
+    """
 
     def __init__(
-        self, constants: Constants, workspace: Workspace, t: float, y: Real, held: Constants | None = None
+        self, constants: Constants, made: Callable[[], Workspace], t: float, y: Real, held: Constants | None = None
     ) -> None:
-        """Keeps `workspace` for itself; `status` says whether M was positive definite.
+        """`made` makes workspaces; `status` says whether M was positive definite.
 
         Speeds that `held` prescribes are left out; by default none is.
         """
@@ -56,20 +68,19 @@ class MassMatrixFactors:
             speed = constants.speed.copy()
             speed["prescribed"] = -1
             held = replace(constants, speed=speed)
-        self._c, self._w = held, workspace
-        self._x: Response = response(constants)
-        self._t = t
-        self.status: int = factorisation.factorise(t, y, constants, self._c, workspace)
+        self._tree, self._c, self._made = constants, held, made
+        self._t, self._y = t, y.copy()
+        self.status = self._factors.status
 
     @property
     def is_doubtful(self) -> bool:
         """Whether a pivot is so small that it may be rounding."""
-        return bool(self._w.doubt[0])
+        return bool(self._factors.w.doubt[0])
 
     @property
     def fault(self) -> int:
         """Number of the body whose D is not positive definite."""
-        return int(self._w.fault[0])
+        return int(self._factors.w.fault[0])
 
     def solve(self, b: Real) -> Real:
         """M^-1 b for b (nu,) or (nu,m); this and all products raise ValueError or TypeError for other arrays."""
@@ -93,11 +104,12 @@ class MassMatrixFactors:
         free = self._c.speed["prescribed"] < 0
         y = np.where(free, np.random.default_rng(0).normal(size=len(free)), 0.0)
         kappa, size = 0.0, float(np.linalg.norm(y))
+        _, w, x = self._factors
         for _ in range(STEPS):
             if not 0.0 < size < np.inf:
                 break
             y /= size
-            factorisation.weigh(self._c, self._w, self._x, y)
+            factorisation.weigh(self._c, w, x, y)
             before, size = size, float(np.linalg.norm(y))
             kappa = size
             if size <= CONVERGED * before:
@@ -107,14 +119,20 @@ class MassMatrixFactors:
     @property
     def log_determinant(self) -> float:
         """log det M."""
-        return float(factorisation.log_determinant(self._c, self._w))
+        return float(factorisation.log_determinant(self._c, self._factors.w))
+
+    @per_thread
+    def _factors(self) -> _Factors:
+        w = self._made()
+        return _Factors(factorisation.factorise(self._t, self._y, self._tree, self._c, w), w, response(self._tree))
 
     def _by_columns(self, apply: Callable[..., None], b: Real) -> Real:
         b = arguments.finite("the array", arguments.array("the array", b))
         if b.ndim not in (1, 2) or len(b) != len(self._c.speed):
             raise ValueError(f"this mass matrix has {len(self._c.speed)} rows, got an array of shape {b.shape}")
         rows = np.array(np.atleast_2d(b.T), order="C")
-        apply(self._c, self._w, self._x, rows)
+        _, w, x = self._factors
+        apply(self._c, w, x, rows)
         finite_result(rows, self._t)
         found: Real = rows[0] if b.ndim == 1 else rows.T
         return found

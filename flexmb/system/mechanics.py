@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from functools import cached_property
+from functools import cached_property, partial
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 
 import numpy as np
@@ -19,6 +19,7 @@ from flexmb.jit.pointer import MATRIX, NOTHING, REAL, STATUS, VECTOR
 from flexmb.system.factors import MassMatrixFactors
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Constants, Workspace
+from flexmb.tables.per_thread import Own, per_thread
 from flexmb.tables.state import DynamicsError, Layout, PrecisionWarning, State, finite_result
 from flexmb.tables.status import OK, Status
 from flexmb.tables.workspaces import workspace
@@ -73,7 +74,7 @@ class ConsistentMotion(NamedTuple):
 
 
 class Mechanics:
-    """Everything that a `System` can be asked about its equations of motion. It writes into one workspace."""
+    """Everything that a `System` can be asked about its equations of motion. Each thread has workspaces of its own."""
 
     constants: Constants
     recursion_constants: Constants  # the same with bodies eliminated as chosen
@@ -85,7 +86,7 @@ class Mechanics:
     _out: Outputs
 
     def __init__(self) -> None:
-        self._matrices: Matrices | None = None
+        self._own = Own()
 
     @property
     def body_names(self) -> tuple[str, ...]:
@@ -97,11 +98,11 @@ class Mechanics:
         raise NotImplementedError
 
     def evaluator(self, algorithm: Any = "articulated") -> Evaluator:
-        """Of an algorithm, with a workspace of its own."""
+        """Of an algorithm, with workspaces of its own."""
         raise NotImplementedError
 
     def _evaluator(self, algorithm: Any) -> Evaluator:
-        """Of an algorithm that there is, with this system's workspace."""
+        """Of an algorithm that there is, with the workspace that this thread has here."""
         raise NotImplementedError
 
     def workspace(self) -> Workspace:
@@ -128,7 +129,7 @@ class Mechanics:
 
         Of all speeds, prescribed ones too. Raises DynamicsError where M is not positive definite.
         """
-        factors = MassMatrixFactors(self.constants, self.workspace(), *self.layout.entering(state))
+        factors = MassMatrixFactors(self.constants, self.workspace, *self.layout.entering(state))
         self._check(factors.status, factors.fault)
         if factors.is_doubtful:
             self._judge(self._precision(factors))
@@ -207,58 +208,57 @@ class Mechanics:
         out.loads[:] = self._inverse(t, y, out.rates)[1]
         self._observe_motion(t, y)
 
-    # Kernels with the tables that they are called with, found when first asked for: that compiles them
+    # Kernels with the tables that they are called with, each thread's own; found when asked for, which compiles them
 
-    @cached_property
+    @per_thread
     def _recur(self) -> Direct:
         """(t, y, dy): the right-hand side by the recursion; a status code."""
         return direct(articulated.rhs, STATUS, REAL, VECTOR, VECTOR, self.recursion_constants, self._recursion_w)
 
-    @cached_property
+    @per_thread
     def _observe_recursion(self) -> Direct:
         """(): everything observable where `_recur` was just evaluated."""
         return direct(observe, NOTHING, self.recursion_constants, self._recursion_w, self._out)
 
-    @cached_property
+    @per_thread
     def _transmit(self) -> Direct:
         """(loads): those of all hinges where `_recur` was just evaluated."""
         return direct(transmitted, NOTHING, self.recursion_constants, self._recursion_w, MATRIX)
 
-    @cached_property
+    @per_thread
     def _observe_motion(self) -> Direct:
         """(t, y): markers, wheel loads, energy and momentum of out.rates, accelerations found elsewhere."""
         return direct(observe_motion, NOTHING, REAL, VECTOR, self.constants, self._w, self._out)
 
-    @cached_property
+    @per_thread
     def _accelerate(self) -> Direct:
         """(t, y): the recursion with every body eliminated explicitly; a status code."""
         return direct(articulated.accelerations, STATUS, REAL, VECTOR, self.constants, self._w)
 
-    @cached_property
+    @per_thread
     def _invert(self) -> Direct:
         """(t, y, rates, tau, loads)."""
         return direct(
             articulated.inverse_dynamics, NOTHING, REAL, VECTOR, VECTOR, self.constants, self._w, VECTOR, MATRIX
         )
 
-    @cached_property
+    @per_thread
     def _fill_mass_matrix(self) -> Direct:
         """(t, y, M)."""
-        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, self.constants, self._w, self._places(), MATRIX)
+        return direct(composite.mass_matrix, NOTHING, REAL, VECTOR, self.constants, self._w, self._matrices, MATRIX)
 
-    @cached_property
+    @per_thread
     def _held(self) -> Direct:
         """(t, y, rates): accelerations with every hinge and wheel held at `rates`; a status code."""
         tables = held_hinges(self.constants, self.workspace())
         return direct(consistent_accelerations, STATUS, REAL, VECTOR, VECTOR, self.constants, *tables)
 
-    def _places(self) -> Matrices:
+    @per_thread
+    def _matrices(self) -> Matrices:
         """Made when first asked for: they are as large as the mass matrix."""
-        if self._matrices is None:
-            self._matrices = matrices(self.constants)
-        return self._matrices
+        return matrices(self.constants)
 
-    @cached_property
+    @per_thread
     def _joint(self) -> Joint:
         """What the unsplit recursion writes besides the workspace."""
         return unsplit.joint(self.constants)
@@ -278,7 +278,8 @@ class Mechanics:
     def _precision_at(self, t: float, y: Real, held: Constants | None = None) -> Precision:
         """`held`: the constants whose prescribed speeds are held, by default the scene's."""
         held = self.constants if held is None else held
-        return self._precision(MassMatrixFactors(self.constants, workspace(held, self.nq, self.nu), t, y, held))
+        made = partial(workspace, held, self.nq, self.nu)
+        return self._precision(MassMatrixFactors(self.constants, made, t, y, held))
 
     def _trust(self, t: float, y: Real, w: _Doubting, held: Constants | None = None) -> None:
         """What an evaluation that met small pivots, w.doubt, is worth: see `_judge`."""

@@ -37,6 +37,7 @@ from flexmb.system.observables import Evaluation, Names, Observation
 from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
+from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import State, finite_result
 from flexmb.tables.status import OK, Status
 from flexmb.typing import Index, Real
@@ -50,7 +51,7 @@ _NO_CLOSURES = np.zeros((0, 6))
 
 
 class System(Mechanics):
-    """A checked scene turned into arrays; made by `compile`. It owns one workspace: threads must not share it."""
+    """A checked scene turned into arrays; made by `compile`. Threads may share it: each has workspaces of its own."""
 
     def __init__(self, scene: s.Scene, elimination: Elimination = "fastest") -> None:
         super().__init__()
@@ -68,7 +69,6 @@ class System(Mechanics):
         self._markers, self.recursion_constants = markers, with_elimination(self.constants, elimination)
         self.rhs, self.project = articulated.rhs, coordinates.project
         self._nested: dict[str, NestedSystem] = {}
-        self._evaluators: dict[str, Evaluator] = {}
         self.kept: dict[Any, Any] = {}
         """What runs find once and keep for the next one."""
         self._operators: SpatialOperators | None = None
@@ -77,24 +77,29 @@ class System(Mechanics):
         """The same scene turned into other arrays."""
         return System(self.scene, self._asked)
 
-    @cached_property
-    def _w(self) -> Workspace:  # type: ignore[override]
+    @per_thread
+    def _w(self) -> Workspace:
         return self.workspace()
 
-    @cached_property
-    def _recursion_w(self) -> Workspace:  # type: ignore[override]
+    @per_thread
+    def _recursion_w(self) -> Workspace:
         return self.recursion_workspace()
 
-    @cached_property
+    @per_thread
     def _observation(self) -> Observation:
         hinges, wheels = [link.hinge.name for link in self._links], [*self._wheel_names()]
         closures, driven = [closure.name for closure in self.scene.closures], self._driven([*hinges, *wheels])
         connectors = [each.name for each in between_nodes(self.scene)], [*_along_hinges(self.scene)]
         return Observation(Names(self._markers, hinges, wheels, closures, driven, *connectors), self.nu)
 
-    @cached_property
+    @property
     def _out(self) -> Outputs:  # type: ignore[override]
         return self._observation.out
+
+    @per_thread
+    def _evaluators(self) -> dict[str, Evaluator]:
+        """By algorithm."""
+        return {}
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copied and pickled as its scene: addresses are of one process, and arrays are parts of each other."""
@@ -176,7 +181,8 @@ class System(Mechanics):
 
         errata = algorithms.chosen(algorithm, algorithms.NESTED).errata
         if algorithm not in self._nested:
-            self._nested[algorithm] = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
+            made = NestedSystem(self.constants, self._links, self.layout, errata or frozenset())
+            return self._nested.setdefault(algorithm, made)
         return self._nested[algorithm]
 
     def partitions(self, state: State, algorithm: Algorithm = "frisch") -> Partitions:
@@ -207,7 +213,10 @@ class System(Mechanics):
         """
         if type(state) is not State or state.layout is not self.layout:
             self.layout.owning(state)
-        evaluator = self._evaluators.get(algorithm) or self._evaluator(algorithm)
+        try:
+            evaluator = self._own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
+        except (AttributeError, KeyError):
+            evaluator = self._evaluator(algorithm)
         return evaluator(state.t, state.q, state.u).copy()
 
     def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
@@ -227,14 +236,15 @@ class System(Mechanics):
         if found is None:
             from flexmb.system.batch import Batch  # lanes are for those who ask for many states
 
-            found = self.kept["batch"] = Batch([self])
+            found = self.kept.setdefault("batch", Batch([self]))
         return found
 
     def evaluator(self, algorithm: Algorithm = "articulated") -> Evaluator:
         """`accelerations` for a loop: `udot = evaluator(t, q, u)` writes into one array, by a workspace of its own.
 
-        A call costs a tenth of a microsecond besides the kernel. One evaluator per thread; compiled here, not at its
-        first call. NotImplementedError for closed chains.
+        A call costs a tenth of a microsecond besides the kernel, of the thread that calls it first; others may call it
+        too, each with an array and a workspace of its own, and wait half a microsecond longer. Compiled here, not at
+        its first call. NotImplementedError for closed chains.
         """
         chosen = algorithms.chosen(algorithm)
         return Evaluator(self, chosen, chosen.fresh(self))

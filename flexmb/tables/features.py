@@ -8,6 +8,7 @@ runs many different ones for a moment each, as a suite of tests does.
 from __future__ import annotations
 
 import os
+from contextvars import ContextVar
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +18,9 @@ from flexmb.typing import Flags, Record
 
 if TYPE_CHECKING:
     from flexmb.tables.arrays import Constants
+
+KERNELS: ContextVar[str] = ContextVar("kernels", default="")
+"""What this thread asks for, whatever the environment says; nothing: see there."""
 
 HINGE = "hinge"  # "hinge 1": the number of a kind in flexmb.hinges.catalogue
 LEVEL = "level"  # "level 1": the number of a level in flexmb.levels.body
@@ -47,11 +51,11 @@ MODAL_DAMPING = "modal damping"
 
 
 def features(c: Constants) -> frozenset[str]:
-    """Of the tables of a scene; GENERAL alone where the environment asks for it.
+    """Of the tables of a scene; GENERAL alone where this thread or the environment asks for it.
 
     Raises ValueError for a value of FLEXMB_KERNELS that means nothing.
     """
-    asked = os.environ.get("FLEXMB_KERNELS", "exact")
+    asked = KERNELS.get() or os.environ.get("FLEXMB_KERNELS", "exact")
     if asked not in ("exact", GENERAL):
         raise ValueError(f'FLEXMB_KERNELS is {asked!r}: use "exact", which is meant if it is not set, or "{GENERAL}"')
     if asked == GENERAL:

@@ -9,6 +9,8 @@ import pytest
 from flexmb.run import warm_up as warming
 from flexmb.run.warm_up import looped, main, warm_up
 from flexmb.scene.files import save_scene
+from flexmb.system.compile import compile
+from flexmb.tables.features import GENERAL, features
 
 # Compiled versions of every function of the package, before and after the scenes of the tests are run.
 PROBE = """
@@ -84,15 +86,15 @@ def test_kinds_are_compiled_for_everything_and_scenes_for_what_they_contain(monk
     asked = []
 
     def note(scene, kind, methods, algorithms):
-        asked.append((scene.name, kind, os.environ.get("FLEXMB_KERNELS")))
+        asked.append((scene.name, kind, features(compile(scene).constants) == {GENERAL}))
 
     monkeypatch.setattr(warming, "_compile", note)
     monkeypatch.delenv("FLEXMB_KERNELS", raising=False)
     save_scene(looped(), tmp_path / "scene.toml")
     main([])
     main([str(tmp_path / "scene.toml"), "--scene", "condensed"])
-    assert [each[1:] for each in asked] == [("tree", "general"), ("closed", None), ("condensed", "general")]
+    assert [each[1:] for each in asked] == [("tree", True), ("closed", False), ("condensed", True)]
     assert "FLEXMB_KERNELS" not in os.environ
     monkeypatch.setenv("FLEXMB_KERNELS", "mine")
     warm_up(scenes=["tree"])
-    assert os.environ["FLEXMB_KERNELS"] == "mine"
+    assert os.environ["FLEXMB_KERNELS"] == "mine" and asked[-1][2]

@@ -1,0 +1,338 @@
+"""Threads may share everything that is public: the same numbers to the bit, from the first call of a process on."""
+
+from __future__ import annotations
+
+import gc
+import inspect
+import multiprocessing
+import os
+import pickle
+import re
+import subprocess
+import sys
+import threading
+import time
+import weakref
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numba.core.compiler_lock import global_compiler_lock
+
+import flexmb as fm
+from flexmb.closure.closures import Closures
+from flexmb.frisch.nested_system import NestedSystem
+from flexmb.jit.direct import Direct
+from flexmb.run.warm_up import general_kernels, looped
+from flexmb.system.closed import ClosedSystem
+from flexmb.system.evaluator import Evaluator
+from flexmb.system.factors import MassMatrixFactors
+from flexmb.tables.features import GENERAL, features
+from flexmb.tables.per_thread import per_thread
+from tests.benchmarks.rivals import rigid_chain
+from tests.flexmb.system.argument_kinds import W
+from tests.flexmb.system.shared_calls import questions
+
+ROOT = Path(__file__).parents[3]
+
+
+def program(name: str, *words: str, **environment: str) -> str:
+    """What a module of this folder prints."""
+    done = subprocess.run(
+        [sys.executable, "-m", f"tests.flexmb.system.{name}", *words],
+        cwd=ROOT, capture_output=True, text=True, env=os.environ | environment,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stderr[-4000:]
+    return done.stdout + done.stderr[-2000:]
+
+
+def wrong(printed: str) -> tuple[int, int]:
+    """Wrong answers, and all."""
+    found = re.findall(r"(\d+) wrong of (\d+)", printed)
+    return sum(int(each) for each, _ in found), sum(int(count) for _, count in found)
+
+
+def test_threads_share_a_system_and_all_that_is_asked_of_it():
+    printed = program("shared_calls")
+    bad, count = wrong(printed)
+    assert bad == 0 and count > 2000, printed
+
+
+def test_what_is_shared_and_should_not_be_is_noticed():
+    """Negative control: without workspaces of their own, threads get wrong numbers."""
+    assert any(wrong(program("shared_calls", "--spoiled", "long", "closed"))[0] for _ in range(5))
+
+
+@pytest.mark.slow
+def test_ten_million_shared_calls():
+    """Evaluator and accelerations, each thread at a state of its own; the figures are printed."""
+    printed = program("shared_campaign", "10000000")
+    print(printed)
+    assert "in all 0 wrong of 10000000" in printed, printed
+
+
+@pytest.mark.parametrize("kernels", ["exact", "general"])
+def test_the_first_calls_of_a_process_may_be_those_of_threads(kernels):
+    assert program("first_calls", "shared", FLEXMB_KERNELS=kernels).strip() == "right"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("whose", ["shared", "own"])
+@pytest.mark.parametrize("kernels", ["exact", "general"])
+def test_the_first_calls_of_twenty_processes(kernels, whose):
+    assert [program("first_calls", whose, FLEXMB_KERNELS=kernels).strip() for _ in range(20)] == ["right"] * 20
+
+
+def test_a_thread_that_forbids_what_another_compiles_is_noticed():
+    """Negative control."""
+    assert any("compilation disabled" in program("first_calls", "shared", "--spoiled") for _ in range(5))
+
+
+# What threads do not ask of a shared system, and why.
+NOT_ASKED = {
+    "System.state", "System.coordinate", "System.speed", "System.fault_name", "System.route",  # they compute nothing
+    "System.workspace", "System.recursion_workspace", "System.composite_workspace",  # new ones
+    "System.nested",  # `reduced`
+    "System.evaluator",  # once for all
+    "NestedSystem.workspace", "NestedSystem.accelerations", "NestedSystem.motion", "NestedSystem.relative_motion",
+    "NestedSystem.partitions",  # by the system's
+    "MassMatrixFactors.half_solve", "MassMatrixFactors.half_multiply", "MassMatrixFactors.multiply",  # as `solve`
+}  # fmt: skip
+
+
+def test_every_public_method_is_asked():
+    asked: set[str] = set()
+    for system in (W.tree, fm.compile(looped())):
+        asked |= {name.split(",")[0] for name in questions(system, system.initial_state)}
+    asked |= {"solve"} if {"factorise"} <= asked else set()
+    for each in (fm.System, ClosedSystem, NestedSystem, MassMatrixFactors):
+        methods = [name for name, _ in inspect.getmembers(each, inspect.isfunction) if not name.startswith("_")]
+        called = each.__name__.removeprefix("Closed")
+        assert {name for name in methods if f"{called}.{name}" not in NOT_ASKED} <= asked, each
+
+
+# Evaluators
+
+
+def in_a_thread(work: Callable[[], Any]) -> Any:
+    with ThreadPoolExecutor(1) as pool:
+        return pool.submit(work).result()
+
+
+def test_each_thread_has_an_array_of_a_shared_evaluator():
+    evaluator, start = W.tree.evaluator(), W.tree.initial_state
+    q, u = start.q, W.state.u
+    mine = evaluator(0.0, q, u)
+    expected = mine.copy()
+
+    def other() -> bool:
+        theirs = evaluator(0.0, q, 2.0 * u)
+        again = evaluator(0.0, q, 2.0 * u)
+        return theirs is again is evaluator.accelerations and theirs is not mine and not np.array_equal(theirs, mine)
+
+    assert in_a_thread(other)
+    assert np.array_equal(mine, expected) and evaluator(0.0, q, u) is mine is evaluator.accelerations
+
+
+def test_an_evaluator_belongs_to_the_thread_that_calls_it_first():
+    """Not to the one that made it, as where a pool is given its evaluators."""
+    evaluator = W.tree.evaluator()
+    theirs = in_a_thread(lambda: evaluator(0.5, W.state.q, W.state.u))
+    mine = evaluator(0.5, W.state.q, W.state.u)
+    assert theirs is not mine and np.array_equal(theirs, mine)
+
+
+def reshaped(array: np.ndarray) -> None:
+    array.shape = (1, -1)
+
+
+def retyped(array: np.ndarray) -> None:
+    array.dtype = np.int64
+
+
+def cut_into_columns(array: np.ndarray) -> None:
+    array.dtype = np.dtype([("x", float)])
+
+
+def strided(array: np.ndarray) -> None:
+    array.strides = (0,)
+
+
+@pytest.mark.filterwarnings("ignore:Setting the:DeprecationWarning")
+@pytest.mark.parametrize("readable", [True, False], ids=["gate", "step by step"])
+@pytest.mark.parametrize("spoil", [reshaped, retyped, cut_into_columns, strided])
+def test_what_somebody_makes_of_the_array_harms_no_later_call(spoil, readable, monkeypatch):
+    if not readable:
+        monkeypatch.setattr("flexmb.system.evaluator.readable", lambda: False)
+    evaluator = W.tree.evaluator()
+    expected = W.tree.accelerations(W.state)
+    spoil(evaluator(W.state.t, W.state.q, W.state.u))
+    for _ in range(2):
+        assert np.array_equal(evaluator(W.state.t, W.state.q, W.state.u), expected)
+    assert evaluator(W.state.t, W.state.q, W.state.u) is evaluator.accelerations
+    spoil(evaluator.accelerations)
+    assert evaluator.accelerations.shape == (W.tree.nu,) and evaluator.accelerations.dtype == float
+
+
+def test_the_array_cannot_be_made_writeable():
+    found = W.tree.evaluator()(W.state.t, W.state.q, W.state.u)
+    with pytest.raises(ValueError, match="WRITEABLE"):
+        found.flags.writeable = True
+
+
+# What is kept for a thread
+
+
+class Asked:
+    @per_thread
+    def place(self) -> list[int]:
+        """Found once by each thread."""
+        return []
+
+    @per_thread
+    def broken(self) -> int:
+        raise AttributeError("no such thing")
+
+
+def test_a_property_of_each_thread():
+    asked = Asked()
+    assert asked.place is asked.place and Asked().place is not asked.place
+    assert in_a_thread(lambda: asked.place is asked.place)
+    assert in_a_thread(lambda: asked.place) is not asked.place
+    assert Asked.place.__doc__ == "Found once by each thread."
+    with pytest.raises(AttributeError, match="no such thing"):
+        asked.broken  # noqa: B018
+    asked.place.append(1)
+    assert pickle.loads(pickle.dumps(asked)).place == []
+
+
+def test_what_a_thread_has_goes_with_it():
+    system = fm.compile(rigid_chain(3))
+    evaluator = system.evaluator()
+    state = system.initial_state
+    evaluator(state.t, state.q, state.u)
+    kept: list[weakref.ref[Any]] = []
+
+    def work() -> None:
+        system.energy(state), system.accelerations(state), system.nested().reduced(0.0, state.y)
+        kept.extend(map(weakref.ref, (system._w, system._recursion_w, system.nested()._w)))
+        kept.append(weakref.ref(evaluator(state.t, state.q, state.u)))
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    thread.join()
+    del thread
+    gc.collect()
+    assert [each() for each in kept] == [None] * 4
+
+
+def written(kept: Any) -> bool:
+    """Whether calls write into something that is kept."""
+    if isinstance(kept, dict):
+        return any(map(written, kept.values()))
+    if isinstance(kept, list | tuple):
+        return any(map(written, kept))
+    name = type(kept).__name__
+    return isinstance(kept, Direct | Evaluator) or name in WRITTEN or name.endswith("Workspace")
+
+
+WRITTEN = {"Outputs", "Observation", "Matrices", "Joint", "Response"}
+
+
+@pytest.mark.parametrize("made", [lambda: W.scene, looped], ids=["tree", "closed"])
+def test_nothing_that_calls_write_into_is_kept_for_all_threads(made):
+    """But what runs and batches take out of the list that it is kept in, while they use it."""
+    system = fm.compile(made())
+    for ask in questions(system, system.initial_state).values():
+        ask(system, system.initial_state)
+    factors = system.factorise(system.initial_state)
+    for each in (system, system.nested(), factors):
+        shared = {name: value for name, value in vars(each).items() if name not in ("_own", "kept")}
+        assert not [name for name, value in shared.items() if written(value)], each
+        assert written(vars(each._own))  # negative control: it is there, for this thread
+
+
+def test_closures_count_their_rows_for_all_threads():
+    system = fm.compile(looped())
+    assert isinstance(system, ClosedSystem)
+    assert in_a_thread(lambda: system.rank) == system.closures.rank == in_a_thread(lambda: system.closures.rank) > 0
+    assert isinstance(in_a_thread(lambda: system.closures), Closures)
+
+
+def test_general_kernels_are_asked_for_by_one_thread_only():
+    """What compiles ahead must not change what others are compiling."""
+    with general_kernels():
+        assert features(W.tree.constants) == {GENERAL}
+        before = os.environ.get("FLEXMB_KERNELS")
+        try:
+            os.environ["FLEXMB_KERNELS"] = "exact"
+            assert features(W.tree.constants) == {GENERAL}
+            assert GENERAL not in in_a_thread(lambda: features(W.tree.constants))
+        finally:
+            os.environ["FLEXMB_KERNELS"] = before or "general"
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_process_that_is_forked_off_while_threads_work_goes_on():
+    """It has none of these threads, and no lock of theirs is held there."""
+    system, state = W.tree, W.state
+    expected, busy = system.accelerations(state), threading.Event()
+
+    def work() -> None:
+        while not busy.is_set():
+            system.accelerations(state), system.evaluator()(state.t, state.q, state.u), system.energy(state)
+
+    threads = [threading.Thread(target=work) for _ in range(3)]
+    for each in threads:
+        each.start()
+    context = multiprocessing.get_context("fork")
+    try:
+        for _ in range(5):
+            told = context.SimpleQueue()
+            child = context.Process(target=_in_a_child, args=(system, state, told))
+            child.start()
+            child.join(60)
+            assert child.exitcode == 0
+            assert np.array_equal(told.get(), expected)
+    finally:
+        busy.set()
+        for each in threads:
+            each.join()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="this system has no forks")
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_process_that_is_forked_off_while_a_thread_compiles_can_compile():
+    """It waits for the kernel, and does not inherit a lock that nobody there can release."""
+    compiling, seconds = threading.Event(), 0.3
+
+    def work() -> None:
+        with global_compiler_lock:
+            compiling.set()
+            time.sleep(seconds)
+
+    thread = threading.Thread(target=work)
+    thread.start()
+    compiling.wait()
+    child = multiprocessing.get_context("fork").Process(target=_compile_in_a_child)
+    child.start()
+    child.join(20)
+    hangs = child.is_alive()
+    if hangs:
+        child.kill()
+    thread.join()
+    assert not hangs and child.exitcode == 0
+
+
+def _compile_in_a_child() -> None:
+    with global_compiler_lock:
+        pass
+
+
+def _in_a_child(system: fm.System, state: fm.State, told: Any) -> None:
+    system.evaluator()(state.t, state.q, state.u), system.energy(state), fm.simulate(system, 1e-3, samples=2)
+    told.put(system.accelerations(state))
