@@ -43,6 +43,21 @@ def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Vector:
     return found
 
 
+def held(name: str, values: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> None:
+    """Whether a field of a result is still an array of such a shape, None for any length; TypeError or ValueError.
+
+    Results are made by the library, but whoever has one can replace their arrays, or change the shapes in place.
+    """
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in kinds:
+        wanted = "numbers" if "c" in kinds else "real numbers"
+        kind = _kind(values, values) if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
+        raise TypeError(f"{name}: an array of {wanted} is needed, not {kind}")
+    _refuse_masked(name, values)
+    if len(values.shape) != len(shape) or any(n not in (None, m) for n, m in zip(shape, values.shape, strict=True)):
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise ValueError(f"{name} has the shape {values.shape}, and belongs to others that need ({wanted})")
+
+
 def vector(name: str, values: Any, length: int) -> Vector:
     """An array (length,) of floats; whether they are finite is for the caller to ask."""
     found = array(name, values)
