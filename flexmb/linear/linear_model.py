@@ -119,14 +119,15 @@ class LinearModel:
         self._refuse_torn()
         for name in self._shapes:
             own = np.array(getattr(self, name), float)
-            arguments.finite(name, own).flags.writeable = False
+            arguments.finite(name, own)
+            own.flags.writeable = False
             object.__setattr__(self, name, own)
 
     @property
     def _shapes(self) -> dict[str, tuple[int, ...]]:
         """Of all arrays."""
         x, f, y = len(self.states), len(self.inputs), len(self.outputs)
-        n, nq = len(self.rates), len(self.state._q)
+        n, nq = len(self.rates), len(self.state.q)
         return {
             "A": (x, x), "B": (x, f), "C": (y, x), "D": (y, f), "mass": (n, n), "motion": (nq, n), "rates": (n,),
             "drift": (n,),
