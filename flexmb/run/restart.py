@@ -48,6 +48,7 @@ class Restart:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a file of NumPy (`.npz`) that is read back exactly."""
+        self._refuse_other_parts()
         with Path(path).open("wb") as file:
             np.savez(
                 file, version=VERSION, method=self.method, t=self.t,
@@ -80,11 +81,18 @@ class Restart:
 
         Whether all of it belongs to a system is for `flexmb.run.taking_up` to ask.
         """
-        if not isinstance(self.scene, Scene):
-            raise TypeError(f"scene is a {type(self.scene).__name__}: a restart holds the Scene of its run")
+        self._refuse_other_parts()
         t, memory = restart_form.memory(self.method, self.t, self.memory)
         known = None if self.controllers is None else restart_form.controllers(self.controllers)
         return replace(self, t=t, memory=memory, controllers=known)
+
+    def _refuse_other_parts(self) -> None:
+        """TypeError for anything else than a run has left."""
+        for name, part, kind in (("scene", self.scene, Scene), ("memory", self.memory, Memory)):
+            if not isinstance(part, kind):
+                raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
+        if not isinstance(self.controllers, LoopMemory | None):
+            raise TypeError(f"controllers is a {type(self.controllers).__name__}: a restart holds a LoopMemory")
 
     def taken_up(self) -> Memory:
         """A copy of the memory for an integrator that goes on from it."""

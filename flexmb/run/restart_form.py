@@ -34,11 +34,9 @@ SIZES = {STEP: "STEP", ERROR_BEFORE: "ERROR_BEFORE", DONE: "DONE", FACTORED: "FA
 MOST_STEPS = 2**53  # that a number can count
 
 
-def memory(method: Any, t: Any, given: Any) -> tuple[float, Memory]:
+def memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
     """Time (s) and memory of a method, copied; ValueError or TypeError for what no run by it has left."""
     chosen, t = integrator(method), arguments.number("t", t)
-    if not isinstance(given, Memory):
-        raise TypeError(f"memory is a {type(given).__name__}: a restart holds the Memory of its integrator")
     y = _row("y", given.y)
     rows = len(y) + 3 if chosen.keeps_jacobian else 0
     found = Memory(
@@ -49,10 +47,8 @@ def memory(method: Any, t: Any, given: Any) -> tuple[float, Memory]:
     return t, found
 
 
-def controllers(given: Any) -> LoopMemory:
+def controllers(given: LoopMemory) -> LoopMemory:
     """What controllers know, copied. Sensors that nobody reads may have said NaN."""
-    if not isinstance(given, LoopMemory):
-        raise TypeError(f"controllers is a {type(given).__name__}: a restart holds the LoopMemory of its controllers")
     state, held = _row("state", given.state), arguments.array("held", given.held)
     if held.ndim != 2:
         raise ValueError(f"held has the shape {held.shape}, and has a row for each sample")

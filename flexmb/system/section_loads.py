@@ -57,6 +57,7 @@ class SectionLoads:
         arguments.held("x", self.x, (None,))
         for name in ("EA", "EIy", "EIz", "GJ"):
             arguments.held(name, getattr(self, name), self.x.shape)
+            arguments.finite(name, getattr(self, name))
         more = getattr(self.load, "shape", ())[:-2]
         arguments.held("load", self.load, (*more, len(self.x), 6))
 
