@@ -37,6 +37,16 @@ class Campbell:
     names: tuple[str, ...]
     stability: tuple[Stability, ...]
 
+    def __post_init__(self) -> None:
+        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        self._refuse_torn()
+
+    def _refuse_torn(self) -> None:
+        size = len(self.stability), len(self.names)
+        arguments.held("rates", self.rates, size[:1])
+        arguments.held("eigenvalues", self.eigenvalues, size, "c")
+        arguments.held("mac", self.mac, size)
+
     @property
     def frequencies_hz(self) -> Real:
         """(R,n) of the damped oscillations; 0 where a mode does not oscillate."""
@@ -51,10 +61,12 @@ class Campbell:
         """Write the diagram as a picture: frequencies and growth rates of the lowest `modes`, by default of all."""
         from flexmb.linear.campbell_picture import write_campbell_plot  # loads matplotlib
 
+        self._refuse_torn()
         return write_campbell_plot(self, Path(path), modes)
 
     def to_csv(self, path: Path | str) -> Path:
         """Rates, and of every mode the frequency (Hz) and the growth rate (1/s), named as in `names`."""
+        self._refuse_torn()
         columns = ["rate [rad/s]"]
         for number, name in enumerate(self.names, 1):
             columns += [f"{number} {name} frequency [Hz]", f"{number} {name} growth [1/s]"]

@@ -96,6 +96,9 @@ class LinearModel:
 
     Of a closed chain the states are independent coordinates and their speeds, as many as the closures leave. Those that
     depend on them follow the states among the outputs, and `motion` moves all.
+
+    Arrays are copied and cannot be written to, for eigenvalues are found once: `dataclasses.replace(model, A=...)` is
+    another model. TypeError or ValueError for parts that do not belong together.
     """
 
     scene: str
@@ -112,6 +115,32 @@ class LinearModel:
     rates: Real
     drift: Real
 
+    def __post_init__(self) -> None:
+        self._refuse_torn()
+        for name in self._shapes:
+            own = np.array(getattr(self, name), float)
+            arguments.finite(name, own)
+            own.flags.writeable = False
+            object.__setattr__(self, name, own)
+
+    @property
+    def _shapes(self) -> dict[str, tuple[int, ...]]:
+        """Of all arrays."""
+        x, f, y = len(self.states), len(self.inputs), len(self.outputs)
+        n, nq = len(self.rates), len(self.state.q)
+        return {
+            "A": (x, x), "B": (x, f), "C": (y, x), "D": (y, f), "mass": (n, n), "motion": (nq, n), "rates": (n,),
+            "drift": (n,),
+        }  # fmt: skip
+
+    def _refuse_torn(self) -> None:
+        """TypeError or ValueError where the parts do not belong together."""
+        if not isinstance(self.state, State):
+            raise TypeError(f"state is a {type(self.state).__name__}: give a State")
+        arguments.held("rates", self.rates, (None,))
+        for name, shape in self._shapes.items():
+            arguments.held(name, getattr(self, name), shape)
+
     @property
     def displacements(self) -> tuple[str, ...]:
         """Names of the first half of x."""
@@ -119,6 +148,7 @@ class LinearModel:
 
     def displacements_by(self, names: Sequence[str]) -> Real:
         """(len(names), n) of x[:n]: displacements with these names, dependent ones of closed chains too; KeyError."""
+        self._refuse_torn()
         return self.C[[_place(self.outputs, name, "output") for name in names], : len(self.rates)]
 
     @cached_property
@@ -169,6 +199,7 @@ class LinearModel:
         ValueError at an undamped resonance and for frequencies that are not finite, TypeError for anything that is not
         a number.
         """
+        self._refuse_torn()
         b = self.B[:, _place(self.inputs, input, "input")]
         rows = [_place(self.outputs, name, "output") for name in outputs] or list(range(len(self.outputs)))
         frequencies = arguments.finite("omega", np.atleast_1d(arguments.array("omega", omega)))
@@ -186,8 +217,8 @@ class LinearModel:
 
     def marker_shape(self, mode: Mode, marker: str) -> Complex:
         """Displacement and rotation vector (6,) of a marker, World axes, in a mode as `Mode.shape` scales it."""
-        first = _place(self.outputs, f"{marker}.x", "output")
-        return self.C[first : first + 6, : len(self.rates)] @ self._shape(mode)
+        shape, first = self._shape(mode), _place(self.outputs, f"{marker}.x", "output")
+        return self.C[first : first + 6, : len(self.rates)] @ shape
 
     def displaced(self, mode: Mode, size: float, phase: float = 0.0) -> State:
         """The state displaced along a mode, its largest displacement `size` (rad, m), for display; `phase` in rad."""
@@ -199,6 +230,7 @@ class LinearModel:
         """As `scipy.signal.StateSpace`."""
         from scipy.signal import StateSpace
 
+        self._refuse_torn()
         return StateSpace(self.A, self.B, self.C, self.D)
 
     def to_control(self) -> Any:
@@ -207,11 +239,13 @@ class LinearModel:
             import control
         except ImportError:
             raise ImportError("python-control is not installed: pip install control, or use to_scipy()") from None
+        self._refuse_torn()
         names = {key: [name for name, _ in getattr(self, key)] for key in ("states", "inputs", "outputs")}
         return control.ss(self.A, self.B, self.C, self.D, **names)
 
     def save(self, path: Path | str) -> Path:
         """Matrices, names, units and eigenvalues as `.npz` or `.mat`; ValueError for another ending."""
+        self._refuse_torn()
         path = Path(path)
         data: dict[str, Any] = {key: getattr(self, key) for key in ("A", "B", "C", "D", "mass", "eigenvalues")}
         for key in ("states", "inputs", "outputs"):
@@ -231,8 +265,12 @@ class LinearModel:
     def _shape(self, mode: Mode) -> Complex:
         if not isinstance(mode, Mode):
             raise TypeError(f"a Mode of this model is needed, not {type(mode).__name__}: see `modes`")
+        self._refuse_torn()
+        arguments.held("the shape of the mode", mode.shape, (None,), "iufc")
         if mode.shape.shape != self.rates.shape:
             raise ValueError(f"the mode has {len(mode.shape)} displacements, this model {len(self.rates)}")
+        if not np.isfinite(mode.shape).all():
+            raise ValueError("the shape of the mode is not finite: give one of `modes`")
         return mode.shape
 
     @cached_property
@@ -242,6 +280,7 @@ class LinearModel:
         A is first balanced by powers of two, hence without rounding, because its entries differ by squares of
         frequencies.
         """
+        self._refuse_torn()
         balanced, (scale, _) = matrix_balance(self.A, permute=False, separate=1)
         values, left, right = eig(balanced, left=True, right=True)
         overlap = np.abs(np.sum(left.conj() * right, axis=0))

@@ -32,6 +32,9 @@ class SteadySpin:
 
     def linearize(self) -> LinearModel:
         """The linear model about it: displacements seen from the turning bodies. Its coefficients are constant."""
+        if not isinstance(self.equations, Equations):
+            raise TypeError(f"equations is a {type(self.equations).__name__}: give those of steady_spin")
+        self.equations.system.layout.entering(self.state)
         return linear_model(self.equations, self.state)
 
 

@@ -33,6 +33,24 @@ class BatchTrajectory:
     accepted_steps: Index
     rejected_steps: Index
 
+    def __post_init__(self) -> None:
+        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        self._refuse_torn()
+
+    def _refuse_torn(self) -> None:
+        if not isinstance(self.batch, Batch):
+            raise TypeError(f"batch is a {type(self.batch).__name__}: give the Batch of these runs")
+        arguments.held("t", self.t, (None,))
+        arguments.held("status", self.status, (None,), "i")
+        n, T = len(self.status), len(self.t)
+        shapes = {"q": (n, T, self.batch.nq), "u": (n, T, self.batch.nu), "work": (n, T), "stopped_at": (n,)}
+        for name, shape in shapes.items():
+            arguments.held(name, getattr(self, name), shape)
+        for name in ("fault", "evaluations", "accepted_steps", "rejected_steps"):
+            arguments.held(name, getattr(self, name), (n,), "i")
+        if not self.batch.shares_constants and n != len(self.batch.systems):
+            raise ValueError(f"there are {n} runs, and {len(self.batch.systems)} copies in the batch")
+
     @property
     def finished(self) -> bool:
         """Whether all runs reached the end."""
@@ -50,6 +68,7 @@ class BatchTrajectory:
 
     def message(self, copy: int) -> str:
         """How a run ended, in words; ValueError or TypeError for the number of a copy that there is not."""
+        self._refuse_torn()
         copy = arguments.index("copy", copy, len(self.status))
         status, t = Status(int(self.status[copy])), self.stopped_at[copy]
         if status is Status.OK:

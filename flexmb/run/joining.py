@@ -26,7 +26,7 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
             names = ", ".join(sorted(map(str, strange)))
             raise ValueError(f"the runs cannot be joined: only one of them has {key}: {names}")
     if len(later.t) == 0:
-        return _ended(first, later, first.work)
+        return _ended(first, later)
     kept = int(np.searchsorted(first.t, later.t[0]))
     # a run that was taken up has counted on by itself
     counted = first.work[-1] - later.work[0] if len(first.work) and later.work[0] == 0.0 else 0.0
@@ -46,15 +46,16 @@ def joined(first: Trajectory, later: Trajectory) -> Trajectory:
         momentum=both(first.momentum, later.momentum), connectors=each(first.connectors, later.connectors),
         hinge_forces=each(first.hinge_forces, later.hinge_forces),
         signals=_of_some(first, later, kept, "signals"), power=_of_some(first, later, kept, "power"),
+        work=both(first.work, later.work + counted),
     )  # fmt: skip
-    return _ended(whole, later, both(first.work, later.work + counted), _sum(first.statistics, later.statistics))
+    return _ended(whole, later)
 
 
-def _ended(whole: Trajectory, later: Trajectory, work: Real, statistics: Any = None) -> Trajectory:
+def _ended(whole: Trajectory, later: Trajectory) -> Trajectory:
     return replace(
-        whole, work=work, status=later.status, message=later.message, stopped_at=later.stopped_at,
+        whole, status=later.status, message=later.message, stopped_at=later.stopped_at,
         restart=later.restart, events=whole.events + later.events,
-        statistics=statistics or _sum(whole.statistics, later.statistics),
+        statistics=_sum(whole.statistics, later.statistics),
     )  # fmt: skip
 
 

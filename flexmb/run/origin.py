@@ -10,6 +10,7 @@ import numpy as np
 from flexmb.control.memory import LoopMemory
 from flexmb.integrate.memory import Memory
 from flexmb.run.restart import Restart
+from flexmb.run.taking_up import fitting
 from flexmb.scene.problems import closest
 from flexmb.system.tree_system import System
 from flexmb.tables import arguments
@@ -33,6 +34,8 @@ class Beginning(NamedTuple):
 
 def start_time(t_start: float | None, state: Given) -> float:
     """Time (s) at which a run begins; ValueError or TypeError for one that makes no sense."""
+    if isinstance(state, Restart):
+        state = state.examined()
     own = state.t if isinstance(state, State | Restart) else 0.0
     if t_start is None:
         return own
@@ -66,11 +69,7 @@ def origin(system: System, t: float, state: Given, method: str) -> Beginning:
 
 
 def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
-    remedy = "; to start from its last state instead, give the state `last_state` of its trajectory"
-    if restart.method != method:
-        raise ValueError(f'the run that is taken up was by method "{restart.method}": give the same{remedy}')
-    if restart.scene != system.scene:
-        raise ValueError(f'the run that is taken up was of scene "{restart.scene.name}" with other contents{remedy}')
+    restart = fitting(system, restart, method)
     y = restart.memory.y.copy()
     t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
     if system.scene.closures:
@@ -101,11 +100,13 @@ def _named(system: System, t: float, values: Values) -> State:
                 f"state: scene \"{system.scene.name}\" has no coordinate or speed {name!r}: {closest(name, places)} "
                 f"There are {', '.join(sorted(places))}"
             )
-        place = places[name]
-        y[place] = arguments.finite(
-            f'state["{name}"]', arguments.vector(f'state["{name}"]', np.atleast_1d(value), place.stop - place.start)
-        )
-        given[place] = True
+        place, called = places[name], f'state["{name}"]'
+        is_one = value.ndim == 0 if hasattr(value, "ndim") else not isinstance(value, Sequence)
+        row = [value] if is_one else value
+        numbers = arguments.finite(called, arguments.vector(called, row, place.stop - place.start))
+        if np.any(given[place] & (y[place] != numbers)):
+            raise ValueError(f"{called} is {value}, and another name gives the same coordinates other values")
+        y[place], given[place] = numbers, True
     _, whole = system.layout.whole(t, y)
     found = system._admissible(t, whole)
     _refuse_other_than_prescribed(system, whole, found, given)

@@ -22,6 +22,7 @@ from flexmb.run.interruption import interruptible
 from flexmb.run.observing import Sampler, batch
 from flexmb.run.origin import Beginning
 from flexmb.run.switching import segment_ends
+from flexmb.run.taking_up import refuse_other_division
 from flexmb.scene.tree import watches_signals
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, DynamicsAlgorithm, Route
@@ -171,6 +172,8 @@ def integrate(
     counts = np.zeros(COUNTS, np.int64)
     y, clock, accuracy = solve.begin(begin, Clock(times, ends), accuracy, counts)
     memory: Memory | None = method.memory(len(y)) if begin.memory is None else begin.memory
+    if begin.memory is not None and method.fixed:
+        refuse_other_division(begin.memory, clock.times, float(clock.segment_ends[0]), accuracy.step)
     out = np.empty((len(times), len(y)))
     if watch is not None and np.any(watch.entry < 0):
         assert solve.feedback is not None  # somebody watches signals

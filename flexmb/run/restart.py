@@ -3,17 +3,24 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import msgspec
 import numpy as np
 
 from flexmb.control.memory import LoopMemory
-from flexmb.integrate.catalogue import integrator
 from flexmb.integrate.integrator import Method
-from flexmb.integrate.memory import NUMBERS, TAKEN_UP, TIME, Memory
+from flexmb.integrate.memory import TAKEN_UP, TIME, Memory
+from flexmb.run import restart_form
+from flexmb.scene.npz import REAL, TEXT, unpacked
+from flexmb.scene.reading import Unreadable
 from flexmb.scene.schema import Scene
+
+VERSION = 1
+"""Of the file; one that says none is of version 1 too."""
+_KINDS = {"method": TEXT} | dict.fromkeys(("version", "t", "scene", *Memory._fields, *LoopMemory._fields), REAL)
+"""By name of an array in the file, what it may hold."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,32 +48,72 @@ class Restart:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a file of NumPy (`.npz`) that is read back exactly."""
+        self._refuse_other_parts()
         with Path(path).open("wb") as file:
             np.savez(
-                file, method=self.method, t=self.t, scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
+                file, version=VERSION, method=self.method, t=self.t,
+                scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
                 numbers=self.memory.numbers, y=self.memory.y, rows=self.memory.rows,
                 **{} if self.controllers is None else self.controllers._asdict(),
             )  # fmt: skip
 
     @staticmethod
     def load(path: str | os.PathLike[str]) -> Restart:
-        """Read what `save` wrote; ValueError for any other file, OSError where there is none."""
+        """Read what `save` wrote; ValueError for any other file, OSError where there is none.
+
+        Sizes are bounded before anything is unpacked. Whether it belongs to a scene is seen when it is taken up.
+        """
         try:
-            with np.load(Path(path), allow_pickle=False) as file:
-                method, t = str(file["method"]), float(file["t"])
-                scene = msgspec.json.decode(file["scene"].tobytes(), type=Scene)
-                memory = Memory(*(np.array(file[name], float) for name in Memory._fields))
-                known = [np.array(file[name], float) for name in LoopMemory._fields if name in file]
-        except (KeyError, ValueError, EOFError, TypeError):  # what NumPy says of other files is no help
-            raise ValueError(f"{path} holds no restart of a run: give the restart.npz of one") from None
-        like = integrator(method).memory(len(memory.y))
-        if [each.shape for each in memory] != [each.shape for each in like] or len(memory.numbers) != NUMBERS:
-            raise ValueError(f"{path} holds a restart of another version: run the first part again")
-        controllers = LoopMemory(*known) if known else None
-        return Restart(method, scene, t, memory, controllers)  # type: ignore[arg-type]  # one that there is
+            return _read(path).examined()
+        except KeyError as error:
+            why = f"there is no {error} in it"
+        except Unreadable as error:
+            why = error.what
+        except (ValueError, TypeError, RecursionError) as error:
+            why = str(error)
+        raise ValueError(
+            f"{os.fspath(path)} holds no restart of a run ({why}): give the restart.npz that a run has written to its "
+            "end, or run the first part again"
+        )
+
+    def examined(self) -> Restart:
+        """A copy that holds what runs write, as far as that can be told without the system; ValueError or TypeError.
+
+        Whether all of it belongs to a system is for `flexmb.run.taking_up` to ask.
+        """
+        self._refuse_other_parts()
+        t, memory = restart_form.memory(self.method, self.t, self.memory)
+        known = None if self.controllers is None else restart_form.controllers(self.controllers)
+        return replace(self, t=t, memory=memory, controllers=known)
+
+    def _refuse_other_parts(self) -> None:
+        """TypeError for anything else than a run has left."""
+        for name, part, kind in (("scene", self.scene, Scene), ("memory", self.memory, Memory)):
+            if not isinstance(part, kind):
+                raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
+        if not isinstance(self.controllers, LoopMemory | None):
+            raise TypeError(f"controllers is a {type(self.controllers).__name__}: a restart holds a LoopMemory")
 
     def taken_up(self) -> Memory:
         """A copy of the memory for an integrator that goes on from it."""
         copy = Memory(*(each.copy() for each in self.memory))
         copy.numbers[TAKEN_UP] = 1.0
         return copy
+
+
+def _read(path: str | os.PathLike[str]) -> Restart:
+    """What a file says; KeyError for what it lacks, ValueError for what is nothing of the kind."""
+    file = unpacked(path, _KINDS)
+    version = file.get("version", np.array(VERSION))
+    if version.shape or version != VERSION:
+        raise ValueError(f"it is of version {version} of the format, and this flexmb reads version {VERSION}")
+    for name in ("method", "t"):
+        if file[name].shape:
+            raise ValueError(f'"{name}" has the shape {file[name].shape}, and is one value')
+    if file["scene"].dtype != np.uint8:
+        raise ValueError(f'"scene" holds numbers of type {file["scene"].dtype}, not bytes')
+    scene = msgspec.json.decode(file["scene"].tobytes(), type=Scene)
+    memory = Memory(*(file[name] for name in Memory._fields))
+    is_controlled = any(name in file for name in LoopMemory._fields)
+    known = LoopMemory(*(file[name] for name in LoopMemory._fields)) if is_controlled else None
+    return Restart(str(file["method"]), scene, float(file["t"]), memory, known)  # type: ignore[arg-type]  # examined

@@ -17,6 +17,7 @@ from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
 from flexmb.run.restart import Restart
 from flexmb.run.situation import EventRecord
+from flexmb.run.trajectory_form import refuse_torn, refuse_torn_path
 from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
@@ -50,6 +51,7 @@ class MarkerPath:
 
         See `flexmb.scene.angles.angles_of`.
         """
+        refuse_torn_path("path", self)
         found = angles_of(self.quaternion, sequence)
         return Angles(np.unwrap(found.values, axis=0), found.singular)
 
@@ -112,6 +114,10 @@ class Trajectory:
     made_by: Making | None = field(default=None, repr=False, compare=False)
     """The system and the settings of the run; None where it was put together otherwise."""
 
+    def __post_init__(self) -> None:
+        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        refuse_torn(self)
+
     def __repr__(self) -> str:
         """What a prompt shows: how the run ended and what there is, not thousands of numbers."""
         size = f"{len(self.t)} times, {len(self.q_names)} coordinates, {len(self.markers)} markers"
@@ -133,7 +139,8 @@ class Trajectory:
         """
         system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            at = system._loads_in(float(t), y, {name: load[i] for name, load in self.loads.items()}, axes, about)
+            loads = {name: load[i] for name, load in self.loads.items()}
+            at = system._loads_in(*system.layout.whole(float(t), y), loads, axes, about)
             for name, load in at.items():
                 found[name][i] = load
         return found
@@ -154,12 +161,17 @@ class Trajectory:
         balance = SectionBalance(system, body, x)
         loads = np.zeros((len(self.t), len(balance.x), 6))
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):
-            loads[i] = balance.at(float(t), y)
+            loads[i] = balance.at(*system.layout.whole(float(t), y))
         return balance.loads(loads)
 
     def _making(self, wanted: str) -> Making:
+        refuse_torn(self)
         made_by = self.made_by
-        if made_by is None or not np.array_equal(self.t, made_by.times[: len(self.t)]):
+        if (
+            not isinstance(made_by, Making)
+            or not np.array_equal(self.t, made_by.times[: len(self.t)])
+            or (self.q_names, self.u_names) != made_by.system.state_names
+        ):
             raise ValueError(
                 f"this trajectory is not one run as simulate made it, and {wanted} needs that: ask each run for itself"
             )
@@ -176,10 +188,12 @@ class Trajectory:
 
     def state_at(self, sample: int) -> State:
         """The state at an output time, by its number; negative ones count from the end. IndexError without it."""
+        refuse_torn(self)
         return State(self.q[sample], self.u[sample], float(self.t[sample]))
 
     def values_at(self, sample: int) -> dict[str, float]:
         """The same by the names of coordinates and speeds, for a scene that shares some of them."""
+        refuse_torn(self)
         values = zip((*self.q_names, *self.u_names), (*self.q[sample], *self.u[sample]), strict=True)
         return {name: float(value) for (name, _), value in values}
 
@@ -190,6 +204,10 @@ class Trajectory:
         powers that one of them lacks are NaN there. ValueError where coordinates, markers, hinges or connectors differ,
         or the later one begins after this one has ended.
         """
+        if not isinstance(later, Trajectory):
+            raise TypeError(f"a Trajectory can follow, not a {type(later).__name__}")
+        refuse_torn(self)
+        refuse_torn(later)
         if len(later.t) and later.t[0] > self.stopped_at:
             raise ValueError(
                 f"the runs cannot be joined: one ended at {self.stopped_at:g} s, the other began at {later.t[0]:g} s"
@@ -199,6 +217,7 @@ class Trajectory:
     @property
     def total_energy(self) -> Real:
         """Sum of all kinds of energy (T,) J."""
+        refuse_torn(self)
         return np.sum(list(self.energy.values()), axis=0)
 
     @property
@@ -209,16 +228,19 @@ class Trajectory:
     @property
     def energy_scale(self) -> float:
         """The scale of a drift of energy (J): the largest change of work or of any kind of energy."""
+        refuse_torn(self)
         changes = [float(np.ptp(each)) for each in (self.work, *self.energy.values())]
         return max(*changes, float(np.max(self.energy["kinetic"])))
 
     @property
     def momentum_drift(self) -> Real:
         """Change of momentum since the start (T,6): zero only for scenes without external forces."""
+        refuse_torn(self)
         return self.momentum - self.momentum[0]
 
     def columns(self) -> Iterator[tuple[str, str, Real]]:
         """(name, unit, values (T,)) of every scalar channel, time first."""
+        refuse_torn(self)
         yield "t", "s", self.t
         for i, (name, unit) in enumerate(self.q_names):
             yield name, unit, self.q[:, i]
@@ -288,6 +310,7 @@ class Trajectory:
         """Write charts of markers, energy, loads and drives to `folder` as PNG; returns their paths."""
         from flexmb.run.plots import write_plots  # matplotlib is slow to import, and only needed here
 
+        refuse_torn(self)
         return write_plots(self, Path(folder))
 
 

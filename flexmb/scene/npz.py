@@ -1,19 +1,22 @@
-"""Named arrays from an `.npz` of unknown origin: only real numbers, sizes bounded before anything is unpacked."""
+"""Named arrays from an `.npz` of unknown origin: only of known kinds, sizes bounded before anything is unpacked."""
 
 from __future__ import annotations
 
 import math
+import os
 import zipfile
 import zlib
-from collections.abc import Collection
-from typing import IO
+from collections.abc import Collection, Mapping
+from typing import IO, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb.scene.reading import MIB, Unreadable, allowance, regular_size
 from flexmb.typing import Real
 
-REAL = "fiu"
+REAL, BOOLEAN, TEXT = "fiu", "b", "U"  # kinds of NumPy's types
+WORD = 256  # bytes of a text, at most
 HEADERS = {(1, 0): np.lib.format.read_array_header_1_0, (2, 0): np.lib.format.read_array_header_2_0}
 ENCRYPTED = 0x1
 ONE_ARRAY = np.lib.format.MAGIC_PREFIX
@@ -28,23 +31,31 @@ def read_arrays(file: str, known: Collection[str]) -> dict[str, Real]:
     from the headers, before anything is unpacked.
     """
     try:
+        found = unpacked(file, dict.fromkeys(known, REAL))
+    except Unreadable as error:
+        raise ValueError(f'"{file}": {error}') from None
+    return {name: values.astype(np.float64, order="C") for name, values in found.items()}
+
+
+def unpacked(file: str | os.PathLike[str], kinds: Mapping[str, str]) -> dict[str, NDArray[Any]]:
+    """Arrays by name, of the kinds that each may have. OSError, or Unreadable as `read_arrays` says."""
+    try:
         left = allowance(regular_size(file))
         with open(file, "rb") as stream:
             if stream.read(len(ONE_ARRAY)) == ONE_ARRAY:
                 raise Unreadable("it holds one array", "save the arrays by name with numpy.savez")
-        found: dict[str, Real] = {}
+        found: dict[str, NDArray[Any]] = {}
         with zipfile.ZipFile(file) as archive:
             for member in archive.infolist():
-                name = _name(member, known, found)
+                name = _name(member, kinds, found)
                 with archive.open(member) as stream:
-                    found[name] = _read(stream, name, left)
-                left -= found[name].nbytes
+                    found[name] = _read(stream, name, left, kinds[name])
+                left -= max(8, found[name].itemsize) * found[name].size
         return found
-    except Unreadable as error:
-        raise ValueError(f'"{file}": {error}') from None
+    except Unreadable:
+        raise
     except DAMAGED as error:
-        what = f'"{file}" is not an .npz archive of plain arrays ({error})'
-        raise ValueError(f"{what}: write it with numpy.savez") from None
+        raise Unreadable(f"it is not an .npz archive of plain arrays ({error})", "write it with numpy.savez") from None
 
 
 def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str]) -> str:
@@ -58,22 +69,22 @@ def _name(member: zipfile.ZipInfo, known: Collection[str], found: Collection[str
     return name
 
 
-def _read(stream: IO[bytes], name: str, limit: int) -> Real:
-    """One array; Unreadable where its header asks for more than `limit` bytes or is not that of real numbers."""
+def _read(stream: IO[bytes], name: str, limit: int, kinds: str) -> NDArray[Any]:
+    """One array; Unreadable where its header asks for more than `limit` bytes or is not of these kinds."""
     version = np.lib.format.read_magic(stream)
     if version not in HEADERS:
         raise Unreadable(f'"{name}" has a header of version {version}', "write it with numpy.savez")
     shape, columns_first, dtype = HEADERS[version](stream)
-    if dtype.kind not in REAL or dtype.itemsize > 8:
-        raise Unreadable(f'"{name}" holds numbers of type {dtype}', "give real numbers in double precision")
+    if dtype.kind not in kinds or dtype.itemsize > (WORD if dtype.kind == TEXT else 8):
+        wanted = "a short text" if kinds == TEXT else "real numbers in double precision"
+        raise Unreadable(f'"{name}" holds numbers of type {dtype}', f"give {wanted}")
     if any(length < 0 for length in shape):
         raise Unreadable(f'"{name}" has the shape {shape}', "write it with numpy.savez")
-    count = math.prod(shape)
-    if 8 * count > limit:
-        needed = f"would take {8 * count / MIB:.0f} MiB of memory" if count < 2**50 else "has an impossible size"
+    count, size = math.prod(shape), max(8, dtype.itemsize)
+    if size * count > limit:
+        needed = f"would take {size * count / MIB:.0f} MiB of memory" if count < 2**50 else "has an impossible size"
         raise Unreadable(f'"{name}" {needed}, more than a file of this size can hold', f"check its shape {shape}")
     data = stream.read(count * dtype.itemsize + 1)
     if len(data) != count * dtype.itemsize:
         raise Unreadable(f'"{name}" does not hold the numbers that its shape {shape} asks for', "write it anew")
-    values = np.frombuffer(data, dtype).reshape(shape, order="F" if columns_first else "C")
-    return values.astype(np.float64, order="C")
+    return np.frombuffer(data, dtype).reshape(shape, order="F" if columns_first else "C")

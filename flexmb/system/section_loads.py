@@ -49,6 +49,18 @@ class SectionLoads:
     EIz: Real
     GJ: Real
 
+    def __post_init__(self) -> None:
+        """TypeError or ValueError for parts that do not belong together; asked once more by what works with them."""
+        self._refuse_torn()
+
+    def _refuse_torn(self) -> None:
+        arguments.held("x", self.x, (None,))
+        for name in ("EA", "EIy", "EIz", "GJ"):
+            arguments.held(name, getattr(self, name), self.x.shape)
+            arguments.finite(name, getattr(self, name))
+        more = getattr(self.load, "shape", ())[:-2]
+        arguments.held("load", self.load, (*more, len(self.x), 6))
+
     @property
     def axial(self) -> Real:
         """(...,X) N, positive in tension."""
@@ -74,12 +86,14 @@ class SectionLoads:
 
         E times the strain N/EA + z My/EIy - y Mz/EIz.
         """
+        self._refuse_torn()
         E, y, z = arguments.number("E", E), arguments.number("y", y), arguments.number("z", z)
         bending = z * self.bending[..., 0] / self.EIy - y * self.bending[..., 1] / self.EIz
         return E * (self.axial / self.EA + bending)
 
     def torsion_stress(self, G: float, r: float) -> Real:
         """(...,X) Pa of shear at the radius r (m) of a round section or tube with shear modulus G (Pa): G r T / GJ."""
+        self._refuse_torn()
         return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
 
 

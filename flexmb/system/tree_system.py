@@ -192,12 +192,12 @@ class System(Mechanics):
 
     def operators(self, state: State) -> Operators:
         """The spatial operators of Jain & Rodriguez, sections II to V, as dense arrays, World axes; all speeds free."""
-        t, _ = self.layout.entering(state)
+        t, y = self.layout.entering(state)
         from flexmb.jain.operators import SpatialOperators  # with SciPy slow to import: only who asks for them waits
 
         if self._operators is None:
             self._operators = SpatialOperators(self.scene)
-        found = self._operators.at(t, state.q, state.u)
+        found = self._operators.at(t, y[: self.nq], y[self.nq : -1])
         for part in (found.M_m, found.a_m, found.b_m, found.V_m):
             finite_result(part, t)
         return found
@@ -212,12 +212,12 @@ class System(Mechanics):
         Raises DynamicsError where an inertia is not positive definite, or numbers are so large that they overflow.
         """
         if type(state) is not State or state.layout is not self.layout:
-            self.layout.owning(state)
+            state = self.layout.owning(state)
         try:
             evaluator = self._own._evaluators[algorithm]  # not by way of the property, which costs as much as the call
         except (AttributeError, KeyError):
             evaluator = self._evaluator(algorithm)
-        return evaluator(state.t, state.q, state.u).copy()
+        return evaluator(state.t, state._q, state._u).copy()
 
     def accelerations_batch(self, q: Any, u: Any, t: Any = 0.0, *, threads: int | None = None) -> BatchAccelerations:
         """udot (n,nu) of many states at once, and a status (n,) for each: see `flexmb.system.batch.Batch`.

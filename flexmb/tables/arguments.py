@@ -1,7 +1,7 @@
 """Arguments of public calls as the code behind them needs them: real numbers in arrays of the right shape, or an error.
 
 Integers and single precision are cast, sequences become arrays. What is not a real number, as complex ones, strings,
-booleans and None, is a TypeError; lengths that do not fit, NaN and infinity are a ValueError.
+booleans and None, is a TypeError; lengths that do not fit, masked entries, NaN and infinity are a ValueError.
 """
 
 from __future__ import annotations
@@ -16,12 +16,14 @@ from numpy.typing import NDArray
 
 Vector = NDArray[np.float64]
 _FLOAT = np.dtype(float)
+_DEEPEST = 3  # sequences within each other, in which masked arrays are looked for
 
 
 def array(name: str, values: Any) -> Vector:
     """An array of floats of any shape, in C's order, aligned and writable; the array itself where it is that."""
     if type(values) is np.ndarray and values.dtype is _FLOAT and values.flags.carray:
         return values
+    _refuse_masked(name, values)
     try:
         found = np.asarray(values)
     except ValueError:
@@ -31,6 +33,29 @@ def array(name: str, values: Any) -> Vector:
     if found.dtype.kind not in "iuf":
         raise TypeError(f"{name}: real numbers are needed, not {_kind(values, found)}")
     return np.array(found, float, order="C")
+
+
+def shaped(name: str, values: Any, shape: tuple[int, ...]) -> Vector:
+    """An array of floats of a shape; whether they are finite is for the caller to ask."""
+    found = array(name, values)
+    if found.shape != shape:
+        raise ValueError(f"{name} has the shape {found.shape}, and {shape} is needed")
+    return found
+
+
+def held(name: str, values: Any, shape: tuple[int | None, ...], kinds: str = "iuf") -> None:
+    """Whether a field of a result is still an array of such a shape, None for any length; TypeError or ValueError.
+
+    Results are made by the library, but whoever has one can replace their arrays, or change the shapes in place.
+    """
+    if not isinstance(values, np.ndarray) or values.dtype.kind not in kinds:
+        wanted = "numbers" if "c" in kinds else "real numbers"
+        kind = _kind(values, values) if isinstance(values, np.ndarray) else f"a {type(values).__name__}"
+        raise TypeError(f"{name}: an array of {wanted} is needed, not {kind}")
+    _refuse_masked(name, values)
+    if len(values.shape) != len(shape) or any(n not in (None, m) for n, m in zip(shape, values.shape, strict=True)):
+        wanted = ", ".join("any" if n is None else str(n) for n in shape)
+        raise ValueError(f"{name} has the shape {values.shape}, and belongs to others that need ({wanted})")
 
 
 def vector(name: str, values: Any, length: int) -> Vector:
@@ -92,6 +117,19 @@ def one_of(name: str, value: Any, known: Iterable[str]) -> str:
     if not isinstance(value, str) or value not in names:
         raise ValueError(f"{name} is {value!r}: use one of {', '.join(map(repr, names))}")
     return value
+
+
+def _refuse_masked(name: str, values: Any, place: tuple[int, ...] = ()) -> None:
+    """ValueError for an array, or sequence of arrays, in which an entry is masked: what is below a mask is no value."""
+    if isinstance(values, np.ma.MaskedArray):
+        if np.ma.is_masked(values):
+            masked = np.argwhere(np.ma.getmaskarray(values))[0]
+            where = ", ".join(map(str, (*place, *masked)))
+            raise ValueError(f"{name}[{where}] is masked: give a number in its place, as values.filled(0.0) does")
+    elif isinstance(values, list | tuple) and len(place) < _DEEPEST:
+        for i, each in enumerate(values):
+            if not isinstance(each, float | int):
+                _refuse_masked(name, each, (*place, i))
 
 
 def _kind(values: Any, found: NDArray[Any]) -> str:

@@ -36,32 +36,71 @@ class PrecisionWarning(SceneWarning):
     """Rounding leaves few digits of the accelerations at this state; the message says how many, and why."""
 
 
+class _Part:
+    """An array of a state, seen through a new view at each look.
+
+    NumPy lets anybody change shape, strides and type of an array in place. Of a view that changes nothing else: the
+    array that kernels take stays as it was made.
+    """
+
+    def __set_name__(self, owner: type, name: str) -> None:
+        self._kept = "_" + name
+
+    def __get__(self, state: State | None, owner: type) -> Real:
+        if state is None:
+            raise AttributeError  # a field of a dataclass without a default
+        part: Real = state.__dict__[self._kept][:]
+        return part
+
+    def __set__(self, state: State, values: Any) -> None:
+        state.__dict__[self._kept] = values
+
+
+class _Kept:
+    """The arrays of a state as kernels take them, which nobody else holds."""
+
+    _y: Real
+    _q: Real
+    _u: Real
+
+    def _keep(self, y: Real, nq: int, t: float) -> None:
+        """y (nq+nu+1,) = [q, u, 0], which is not copied."""
+        y = y[:]  # the `base` of what users see is its owner, not this
+        self.__dict__.update(_y=y, _q=y[:nq], _u=y[nq:-1], t=t)
+
+    @property
+    def y(self) -> Real:
+        """[q, u, 0] (nq+nu+1,), of which q and u are parts."""
+        return self._y[:]
+
+
 @dataclass(frozen=True, eq=False)
-class State:
+class State(_Kept):
     """Coordinates q (nq,), speeds u (nu,) and time t (s).
 
     q and u are copied; their entries may be changed in place, their lengths may not. Quaternions need not have unit
     length: they are scaled. `layout` says whose state it is; one that is made by hand belongs to any system whose
-    lengths it has. TypeError for what is not a row of real numbers.
+    lengths it has. TypeError for what is not a row of real numbers, ValueError for rows that are not as long as the
+    layout says.
     """
 
-    q: Real
-    u: Real
+    q: _Part = _Part()
+    u: _Part = _Part()
     t: float = 0.0
     layout: Layout | None = field(default=None, repr=False)
-    y: Real = field(init=False, repr=False)
-    """[q, u, 0], of which q and u are parts: what kernels take."""
 
     def __post_init__(self) -> None:
-        q, u = arguments.array("q", self.q), arguments.array("u", self.u)
+        q, u = arguments.array("q", self._q), arguments.array("u", self._u)
         if q.ndim != 1 or u.ndim != 1:
             raise ValueError(f"q and u are rows of numbers, got arrays of shapes {q.shape} and {u.shape}")
-        y = np.concatenate([q, u, [0.0]])
-        for name, value in (("q", y[: len(q)]), ("u", y[len(q) : -1]), ("t", arguments.number("t", self.t)), ("y", y)):
-            object.__setattr__(self, name, value)
+        if self.layout is not None:
+            if not isinstance(self.layout, Layout):
+                raise TypeError(f"layout is a {type(self.layout).__name__}: give that of a system, or leave it out")
+            self.layout.fitting(len(q), len(u))
+        self._keep(np.concatenate([q, u, [0.0]]), len(q), arguments.number("t", self.t))
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """A copy's q and u are parts of its own y."""
+        """A copy is made as the state was: q and u are parts of its own y, and as long as its layout says."""
         return State, (self.q, self.u, self.t, self.layout)
 
 
@@ -85,23 +124,48 @@ class Layout:
     def known(self, t: float, y: Real) -> State:
         """A state of what is known to fit, without asking again."""
         found = object.__new__(State)
-        found.__dict__.update(q=y[: self.nq], u=y[self.nq : -1], t=t, layout=self, y=y)
+        found.__dict__["layout"] = self
+        found._keep(y, self.nq, t)
         return found
+
+    def fitting(self, nq: int, nu: int) -> None:
+        """ValueError for rows of other lengths than these coordinates and speeds have."""
+        if (nq, nu) != (self.nq, self.nu):
+            raise ValueError(
+                f"this system has q of {self.nq} and u of {self.nu} entries, the state has {nq} and {nu}: it belongs "
+                "to another one"
+            )
 
     def entering(self, state: State) -> tuple[float, Real]:
         """Time and y = [q, u, 0], which is not copied, of a state of this system; ValueError or TypeError for others.
 
         Asked by every public call: what fits costs one comparison and one small kernel.
         """
-        self.owning(state)
-        if unsound(state.y, self.quaternions):
-            self._examine(state.y)
-        return state.t, state.y
-
-    def owning(self, state: State) -> None:
-        """ValueError or TypeError unless a state belongs here; its numbers are not looked at."""
         if type(state) is not State or state.layout is not self:
-            self._own(state)
+            state = self.owning(state)
+        if unsound(state._y, self.quaternions):
+            self._examine(state._y)
+        return state.t, state._y
+
+    def owning(self, state: Any) -> State:
+        """A state that belongs here; ValueError or TypeError for others. Its numbers are not looked at.
+
+        One whose layout is this very one was held to it when it was made.
+        """
+        if type(state) is State and state.layout is self:
+            return state
+        if not isinstance(state, State):
+            raise TypeError(f"a State is needed, not {type(state).__name__}: make one by system.state(q, u, t)")
+        if type(state) is not State:
+            state = State(state.q, state.u, state.t, state.layout)  # what others have made of it is not known
+        self.fitting(len(state._q), len(state._u))
+        if state.layout is not None and state.layout != self:
+            strange = [repr(name) for name, place in state.layout.q.items() if self.q.get(name) != place]
+            raise ValueError(
+                f"the state belongs to another system: {', '.join(strange[:3]) or 'speeds'} have no or another place "
+                "here. If its numbers are meant, give them to system.state(q, u, t)"
+            )
+        return state
 
     def packed(self, t: Any, q: Any, u: Any) -> tuple[float, Real]:
         """Time and y = [q, u, 0] of arrays, a copy; ValueError or TypeError where they do not fit."""
@@ -124,21 +188,6 @@ class Layout:
         """(nu,) numbers, finite."""
         found = arguments.vector(name, values, self.nu)
         return arguments.finite(name, found) if unsound(found, _NONE) else found
-
-    def _own(self, state: Any) -> None:
-        if not isinstance(state, State):
-            raise TypeError(f"a State is needed, not {type(state).__name__}: make one by system.state(q, u, t)")
-        if (len(state.q), len(state.u)) != (self.nq, self.nu):
-            raise ValueError(
-                f"this system has q of {self.nq} and u of {self.nu} entries, the state has {len(state.q)} and "
-                f"{len(state.u)}: it belongs to another one"
-            )
-        if state.layout is not None and state.layout != self:
-            strange = [repr(name) for name, place in state.layout.q.items() if self.q.get(name) != place]
-            raise ValueError(
-                f"the state belongs to another system: {', '.join(strange[:3]) or 'speeds'} have no or another place "
-                "here. If its numbers are meant, give them to system.state(q, u, t)"
-            )
 
     def _examine(self, y: Real) -> None:
         """ValueError for what `unsound` found."""
@@ -163,4 +212,4 @@ def finite_result(result: Real, t: float) -> Real:
 
 def pack(state: State) -> Real:
     """y = [q, u, work], a copy."""
-    return state.y.copy()
+    return state._y.copy()

@@ -2,6 +2,7 @@
 
 import json
 
+import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -206,7 +207,10 @@ def test_simulate_sets_values_begins_later_and_goes_on(scene_file, tmp_path):
     assert result.exit_code == 0 and "restart.npz" in result.output, result.output
     whole, later = ((tmp_path / name / "trajectory.csv").read_text().splitlines() for name in ("whole", "later"))
     assert whole[-1].startswith("2,") and later[-1] == whole[-1]
-    wrong = ("--set", "bob.mass=1"), ("--restart", scene_file)
-    for more, message in zip(wrong, ('did you mean "mass_kg"', "no restart"), strict=True):
+    (tmp_path / "cut.npz").write_bytes(restart.read_bytes()[:1000])  # as a run leaves it that is killed
+    with np.load(restart) as file:
+        np.savez(tmp_path / "nan.npz", **{name: file[name] for name in file} | {"numbers": np.full(11, np.nan)})
+    wrong = ("--set", "bob.mass=1"), *(("--restart", tmp_path / name) for name in ("scene.toml", "cut.npz", "nan.npz"))
+    for more, message in zip(wrong, ('did you mean "mass_kg"', *["no restart"] * 3), strict=True):
         result = invoke(*on, "--t-end", 2, *more)
         assert result.exit_code == 2 and message in result.output, result.output

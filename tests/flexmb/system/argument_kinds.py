@@ -106,6 +106,7 @@ def vectors(v: np.ndarray) -> Iterator[Variant]:
         "column": v[:, None], "0-d": np.array(1.0), "scalar": 1.0, "complex": v + 0j, "objects": v.astype(object),
         "strings": v.astype(str), "booleans": v > 0.0, "None": None, "nothing in a list": [None] * len(v),
         "text": "1.0", "ragged": [[1.0], [1.0, 2.0]], "huge integers": [10**400] * len(v),
+        "masked": np.ma.array(v, mask=np.arange(len(v)) == 0), "all masked": np.ma.array(v, mask=True),
     }  # fmt: skip
     for name, value in wrong.items():
         yield Variant(name, value)
@@ -194,6 +195,7 @@ def matrices(b: np.ndarray) -> Iterator[Variant]:
     wrong = {
         "short": b[:-1], "very long": np.zeros((10**5, 2)), "3-D": b[None], "0-d": 1.0, "complex": b + 0j,
         "objects": b.astype(object), "None": None, "empty": b[:0], "NaN": b + np.nan, "infinite": b + np.inf,
+        "masked": np.ma.masked_less(b, 1.5),
     }  # fmt: skip
     for name, value in wrong.items():
         yield Variant(name, value)

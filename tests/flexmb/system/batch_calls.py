@@ -38,6 +38,7 @@ def tables(v: np.ndarray) -> Iterator[Variant]:
         "fewer copies": v[:-1], "very many copies": np.zeros((10**5, v.shape[1])), "no copies": v[:0], "empty": [],
         "transposed": v.T, "complex": v + 0j, "objects": v.astype(object), "strings": v.astype(str),
         "booleans": v > 0.0, "ragged": [[1.0], [1.0, 2.0]], "huge integers": [[10**400] * v.shape[1]] * len(v),
+        "masked": np.ma.array(v, mask=np.arange(v.size).reshape(v.shape) == 1),
     }  # fmt: skip
     for name, value in wrong.items():
         yield Variant(name, value)

@@ -1,0 +1,91 @@
+"""What a restart may hold, whatever its scene: the right kinds of numbers, finite, and none that no run writes.
+
+A restart comes from a file that may be damaged, or from somebody who has changed it; kernels believe all of it.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from flexmb.control.memory import LoopMemory
+from flexmb.integrate.catalogue import integrator
+from flexmb.integrate.memory import (
+    DONE,
+    ERROR_BEFORE,
+    FACTORED,
+    FRESH,
+    NUMBERS,
+    RENEW,
+    RETRIED,
+    STEP,
+    STEP_BEFORE,
+    STRETCH,
+    TAKEN_UP,
+    TIME,
+    Memory,
+)
+from flexmb.tables import arguments
+from flexmb.typing import Real
+
+SWITCHES = {TAKEN_UP: "TAKEN_UP", RETRIED: "RETRIED", RENEW: "RENEW", FRESH: "FRESH"}
+SIZES = {STEP: "STEP", ERROR_BEFORE: "ERROR_BEFORE", DONE: "DONE", FACTORED: "FACTORED", STEP_BEFORE: "STEP_BEFORE"}
+MOST_STEPS = 2**53  # that a number can count
+
+
+def memory(method: Any, t: Any, given: Memory) -> tuple[float, Memory]:
+    """Time (s) and memory of a method, copied; ValueError or TypeError for what no run by it has left."""
+    chosen, t = integrator(method), arguments.number("t", t)
+    y = _row("y", given.y)
+    rows = len(y) + 3 if chosen.keeps_jacobian else 0
+    found = Memory(
+        _finite("numbers", given.numbers, (NUMBERS,)), _finite("y", y, y.shape),
+        _finite("rows", given.rows, (rows, len(y))),
+    )  # fmt: skip
+    _refuse_other_numbers(found.numbers, t)
+    return t, found
+
+
+def controllers(given: LoopMemory) -> LoopMemory:
+    """What controllers know, copied. Sensors that nobody reads may have said NaN."""
+    state, held = _row("state", given.state), arguments.array("held", given.held)
+    if held.ndim != 2:
+        raise ValueError(f"held has the shape {held.shape}, and has a row for each sample")
+    happened = float(_finite("instants", given.instants, (1,))[0])
+    if not 0.0 <= happened < MOST_STEPS or happened != int(happened):
+        raise ValueError(f"instants is {happened:g}, and counts how often controllers have acted")
+    return LoopMemory(
+        _row("signal", given.signal).copy(), _finite("state", state, state.shape), _finite("held", held, held.shape),
+        np.array([happened]),
+    )  # fmt: skip
+
+
+def _refuse_other_numbers(numbers: Real, t: float) -> None:
+    """ValueError for what no integrator leaves at the end (s) of a run."""
+    for place, name in SWITCHES.items():
+        if numbers[place] not in (0.0, 1.0):
+            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, and is 0 or 1")
+    for place, name in SIZES.items():
+        if numbers[place] < 0.0:
+            raise ValueError(f"numbers[{name}] is {numbers[place]:g}, and is not negative")
+    done = numbers[DONE]
+    if done != np.floor(done) or done >= MOST_STEPS:
+        raise ValueError(f"numbers[DONE] is {done:g}, and is a number of steps")
+    if not numbers[STRETCH] <= numbers[TIME] <= t:
+        raise ValueError(
+            f"it goes on from {numbers[TIME]:.17g} s in a stretch from {numbers[STRETCH]:.17g} s, and ended at "
+            f"{t:.17g} s: these are not in order"
+        )
+
+
+def _row(name: str, values: Any) -> Real:
+    found = arguments.array(name, values)
+    if found.ndim != 1:
+        raise ValueError(f"{name} has the shape {found.shape}, and is a row of numbers")
+    return found
+
+
+def _finite(name: str, values: Any, shape: tuple[int, ...]) -> Real:
+    """A copy."""
+    return arguments.finite(name, arguments.shaped(name, values, shape)).copy()
