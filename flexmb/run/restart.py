@@ -13,6 +13,8 @@ from flexmb.control.memory import LoopMemory
 from flexmb.integrate.catalogue import integrator
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import NUMBERS, TAKEN_UP, TIME, Memory
+from flexmb.run import event_memory
+from flexmb.run.event_memory import EventMemory
 from flexmb.scene.schema import Scene
 
 
@@ -25,7 +27,8 @@ class Restart:
     they divide the time. Methods that adapt their steps cut the last one short where a run ends: they are taken up at
     `since` (s), where that step began, and output times of the second run may begin at any time from there to `t` (s),
     where the run ended and where they begin by default. Closed chains choose the independent rows of their closures
-    anew, and are the same unless two choices are equally good. What controllers know goes on too.
+    anew, and are the same unless two choices are equally good. What controllers know goes on too, and what events do:
+    those from `since` to `t` happen once more, to the last bit as in a run that had never ended, and are shown once.
     """
 
     method: Method
@@ -33,6 +36,7 @@ class Restart:
     t: float
     memory: Memory
     controllers: LoopMemory | None = None
+    events: EventMemory | None = None
 
     @property
     def since(self) -> float:
@@ -45,7 +49,7 @@ class Restart:
             np.savez(
                 file, method=self.method, t=self.t, scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
                 numbers=self.memory.numbers, y=self.memory.y, rows=self.memory.rows,
-                **{} if self.controllers is None else self.controllers._asdict(),
+                **{} if self.controllers is None else self.controllers._asdict(), **event_memory.written(self.events),
             )  # fmt: skip
 
     @staticmethod
@@ -57,13 +61,14 @@ class Restart:
                 scene = msgspec.json.decode(file["scene"].tobytes(), type=Scene)
                 memory = Memory(*(np.array(file[name], float) for name in Memory._fields))
                 known = [np.array(file[name], float) for name in LoopMemory._fields if name in file]
+                events = event_memory.read(file, scene)
         except (KeyError, ValueError, EOFError, TypeError):  # what NumPy says of other files is no help
             raise ValueError(f"{path} holds no restart of a run: give the restart.npz of one") from None
         like = integrator(method).memory(len(memory.y))
         if [each.shape for each in memory] != [each.shape for each in like] or len(memory.numbers) != NUMBERS:
             raise ValueError(f"{path} holds a restart of another version: run the first part again")
         controllers = LoopMemory(*known) if known else None
-        return Restart(method, scene, t, memory, controllers)  # type: ignore[arg-type]  # one that there is
+        return Restart(method, scene, t, memory, controllers, events)  # type: ignore[arg-type]  # one that there is
 
     def taken_up(self) -> Memory:
         """A copy of the memory for an integrator that goes on from it."""
