@@ -26,6 +26,7 @@ from flexmb.typing import Index, Real
 
 
 NEAR = 1e-6  # m, rad: a way by which rates of signals are found where nothing is integrated yet
+NOISE = 1e-8  # of that way: what moves by less, while other things move, is at rest
 
 
 class Begun(NamedTuple):
@@ -186,7 +187,7 @@ class Feedback:
         return found
 
     def signal_rates(self, begin: Starting) -> Real:
-        """(S,) per second of what is not sampled, likewise, by a difference over a way of NEAR (m, rad)."""
+        """(S,) per second of what is not sampled, likewise, by a difference over a way of NEAR (m, rad); 0 at rest."""
         t, y = begin.state.t, self._only_at(begin)
         slope, there, ahead = np.zeros(len(y)), np.zeros(len(self.running.signal)), np.zeros(len(self.running.signal))
         loop.project(t, y.copy(), self.running)
@@ -194,12 +195,12 @@ class Feedback:
         fastest = float(np.max(np.abs(slope[: self._plant.nq]), initial=0.0))
         if not 0.0 < fastest < np.inf:
             return there
-        moved = y.copy()
-        moved[: self._plant.nq] += NEAR / fastest * slope[: self._plant.nq]
         loop.look(t, y, there, self.running)
-        loop.look(t, moved, ahead, self.running)
+        loop.look(t + NEAR / fastest, y + NEAR / fastest * slope, ahead, self.running)
         self.raise_trouble()
-        rates: Real = (ahead - there) * (fastest / NEAR)
+        change = ahead - there
+        change[np.abs(change) <= NOISE * NEAR + 64.0 * np.spacing(np.abs(ahead) + np.abs(there))] = 0.0
+        rates: Real = change * (fastest / NEAR)
         return rates
 
     def accelerations(self, begin: Starting) -> Real:

@@ -27,6 +27,7 @@ from flexmb.typing import Index, Real
 
 CROSSED = -1  # returned in place of a status code: no end of the run
 UNKNOWN = 2  # a side that is for the first step to find
+RESTED = 2  # times the side from which something came that has been at its level for a step
 
 _NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
 _NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
@@ -37,7 +38,7 @@ class Watch(NamedTuple):
     """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
     side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of what is at its
-    level where a run begins and may go either way, the side that it came from, else 0. still (k,): what moves by less
+    level where a run begins and may go either way, the side that it came from, else 0; see `RESTED`. still (k,): what moves by less
     within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at
     which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level,
     its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are
@@ -197,15 +198,18 @@ def meets(problem, watch, step, ends):
 
 @helper
 def _leave(watch, i, change, value):
-    """The side on which i leaves its level, by its first change in a step or, at rest, where it drifts to.
+    """The side on which i leaves its level, by its change in the first step or, from rest, that from which it came.
 
-    What drifts beyond the level from rest comes to it again.
+    What drifts beyond the level from rest comes to it again, also where it rests for a step before it does.
     """
     came = watch.came[i]
+    side = 1 if came > 0 else -1
     if abs(change) > watch.still[i]:
-        watch.side[i], watch.came[i] = came if came * change > 0.0 else -came, 0
+        watch.side[i], watch.came[i] = side if abs(came) == RESTED or side * change > 0.0 else -side, 0
     elif abs(value) > watch.still[i]:
-        watch.side[i], watch.came[i] = came, 0
+        watch.side[i], watch.came[i] = side, 0
+    else:
+        watch.came[i] = RESTED * side
 
 
 @helper

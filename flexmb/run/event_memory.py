@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import msgspec
 import numpy as np
 
-from flexmb.integrate.watch import UNKNOWN
+from flexmb.integrate.watch import RESTED, UNKNOWN
 from flexmb.scene.schema import Scene
 from flexmb.typing import Index
 
@@ -48,7 +48,7 @@ def read(file: Mapping[str, Any], scene: Scene) -> EventMemory | None:
     if not scene.events:
         return None
     side, came, passed = (np.array(file[_KEY + name], np.int64) for name in ("side", "came", "passed"))
-    for each, known in ((side, (-1, 0, 1, UNKNOWN)), (came, (-1, 0, 1)), (passed, (0, 1))):
+    for each, known in ((side, (-1, 0, 1, UNKNOWN)), (came, (-RESTED, -1, 0, 1, RESTED)), (passed, (0, 1))):
         if each.shape != (len(scene.events),) or not np.all(np.isin(each, known)):
             raise ValueError("sides of other events")
     until, ended, shown = float(file[_KEY + "until"]), float(file[_KEY + "ended"]), int(file[_KEY + "shown"])

@@ -493,16 +493,9 @@ class EventfulRun:
         controlled = 0 if solve.feedback is None else len(solve.feedback.state_names)
         return self.system.nq + self.system.nu + controlled + 1
 
-    def _stays(self, event: SceneEvent, y: Real) -> bool:
-        """Whether the next step sees on which side of its level something is: a signal, or what is left at rest."""
-        if self._is_signal(event):
-            return True
-        rate = self._situation.rate_of(event.watch)
-        return rate is not None and y[rate] == 0.0 and not self._situation.is_held(event.watch)
-
     def _move_sides(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
-        """After events. What was found at its level is beyond it, or back where it does not go on, or at it: 0; of a
-        signal, or of what is left at rest, the next step tells, and `came` from where it came.
+        """After events. What was found at its level is beyond it, or back where it does not go on, or at it: 0; of
+        what is left at rest the next steps tell, and `came` from where it came.
 
         By what events make of them signals pass no level.
         """
@@ -510,7 +503,7 @@ class EventfulRun:
         for event in self._watched:
             is_signal, side, came = self._is_signal(event), self._side.get(event.name, 0), self._came.get(event.name, 0)
             if event in found:
-                self._side[event.name], self._came[event.name] = self._side_after(event, side, y)
+                self._side[event.name], self._came[event.name] = self._side_after(raw, event, side, y)
                 continue
             height = heights[event.name] if is_signal else y[self._situation.places[event.watch]] - event.level
             if abs(height) > (self._near(event) if is_signal else 0.0):
@@ -518,16 +511,18 @@ class EventfulRun:
             else:
                 self._side[event.name], self._came[event.name] = UNKNOWN if is_signal else side, came
 
-    def _side_after(self, event: SceneEvent, came: int, y: Real) -> tuple[int, int]:
-        """Side, and `came`, of what was found at its level."""
-        if self._is_signal(event):
-            return UNKNOWN, came
+    def _side_after(self, raw: Raw, event: SceneEvent, came: int, y: Real) -> tuple[int, int]:
+        """Side, and `came`, of what was found at its level: it goes on, or back, or stays."""
         if self._situation.is_held(event.watch):
             return 0, 0
-        if self._stays(event, y):
-            return 0, came
-        rate = self._situation.rate_of(event.watch)
-        return -came if rate is None or -came * y[rate] > 0.0 else came, 0
+        if self._situation.rate_of(event.watch) is None and not self._is_signal(event):
+            return -came, 0
+        height, rate = self._probe(raw, event, raw.t, y)
+        if abs(height) > self._near(event):
+            return int(np.sign(height)), 0  # of a signal that jumped, or by its own event comes to jump
+        if rate == 0.0:
+            return UNKNOWN if self._is_signal(event) else 0, came
+        return (-came if came * rate < 0.0 else came), 0
 
     def _heights(self, raw: Raw, events: Sequence[SceneEvent]) -> dict[str, float]:
         """Of signals above their levels, before controllers act that are due."""
