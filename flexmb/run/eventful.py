@@ -143,7 +143,7 @@ class EventfulRun:
         """
         watched, before = self._watched, set(self._side)
         y, controlled = self._apart(raw.y)
-        arrived = found if early else self._arriving(found, levels, y)
+        arrived = found if early else self._arriving(raw, found, levels, y)
         for event in arrived:
             self._do(event, raw, y, early)
         raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
@@ -449,7 +449,7 @@ class EventfulRun:
         crossed = [self._watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
         return [event for event in self._events if event in crossed or event in due]
 
-    def _arriving(self, found: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[SceneEvent]:
+    def _arriving(self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[SceneEvent]:
         """Those that come to their levels, where coordinates are set exactly.
 
         Rounding may find one again that flies off.
@@ -459,7 +459,8 @@ class EventfulRun:
             if levels is not None and event in found:
                 if self._is_signal(event):
                     has_jumped = not levels.found[i] or self._side[event.name] * levels.value[i] < -self._near(event)
-                    rate = 0.0 if has_jumped else levels.rate[i]
+                    rate = levels.rate[i] or self._probe(raw, event, raw.t, y)[1]  # steps may be roundings of time
+                    rate = 0.0 if has_jumped else rate
                 else:
                     y[self._situation.places[event.watch]] = event.level
                     place = self._situation.rate_of(event.watch)
