@@ -24,7 +24,6 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
-
 NEAR = 1e-6  # m, rad: a way by which rates of signals are found where nothing is integrated yet
 NOISE = 1e-8  # of that way: what moves by less, while other things move, is at rest
 

@@ -21,8 +21,8 @@ from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import Integration, Raw, integrate, integration
-from flexmb.run.resting import with_stops
 from flexmb.run.restart import Restart
+from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
 from flexmb.run.standing import stand
 from flexmb.run.trajectory import Trajectory

@@ -130,7 +130,7 @@ def test_a_derivative_with_an_offset_does_not_kick() -> None:
 
 @pytest.mark.parametrize("period", [None, 0.1])
 def test_a_continuous_derivative_starts_at_what_those_before_it_say(period: float | None) -> None:
-    """Behind a filter that does not stand at zero, or a sampled gain that speaks from the start: no kick at the start."""
+    """Behind a filter that does not stand at zero, or a sampled gain that speaks from the start: no kick."""
     before = fm.StateSpace(
         name="before", inputs=("ramp[0]",), D=((3.0,),), period_s=period
     ) if period else fm.StateSpace(
@@ -161,4 +161,5 @@ def test_the_last_row_on_an_instant_is_the_value_after_it(method: Any) -> None:
         assert short.signals["law"][:, 0].tolist() == [0.0, 0.25, 0.5, 0.75]
         assert short.power["law"][-1, 0] == pytest.approx(0.75 * short.u[-1, 0], rel=1e-14)
         taken_up = fm.simulate(scene, 1.0, method, state=short.restart, samples=[0.75, 1.0], **options)
-        assert np.array_equal(taken_up.q, long.q[3:]) and np.array_equal(taken_up.signals["law"], long.signals["law"][3:])
+        assert np.array_equal(taken_up.q, long.q[3:])
+        assert np.array_equal(taken_up.signals["law"], long.signals["law"][3:])

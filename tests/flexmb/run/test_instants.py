@@ -79,9 +79,7 @@ def test_what_is_due_at_a_time_happens_once_wherever_in_a_run_it_lies(kind: str,
             if kind == "end":
                 continue
             for cut in times[1:-1]:  # before the instant, on it, after it
-                first = fm.simulate(
-                    scene, cut, method, t_start=start, samples=times[times <= cut], **options
-                )
+                first = fm.simulate(scene, cut, method, t_start=start, samples=times[times <= cut], **options)
                 second = fm.simulate(
                     first.restart.scene, end, method, state=first.restart, samples=times[times >= cut], **options
                 )
@@ -107,7 +105,8 @@ def test_what_comes_to_a_level_has_to_come_there(kind: str, watch: str) -> None:
         run = fm.simulate(moving(kind, start, event(watch, 0.5, action, crossing=crossing)), start + 1.0, t_start=start)
         check(run, kind, start, run.events[0].t, ["it"])
         assert run.events[0].t == pytest.approx(start + 0.5, abs=1e-12)
-        gone = fm.simulate(moving(kind, start, event(watch, 0.0, action, crossing=crossing)), start + 1.0, t_start=start)
+        there = moving(kind, start, event(watch, 0.0, action, crossing=crossing))
+        gone = fm.simulate(there, start + 1.0, t_start=start)
         if isinstance(action, fm.Impact):
             assert gone.events[0].t == start and gone.q[-1, 0] <= 1e-12  # a stop on which it moves into it
         else:
@@ -128,7 +127,6 @@ def test_events_of_one_instant_happen_in_the_order_of_the_scene() -> None:
         names = ["first", "second", "last"] if later else ["first", "second"]  # at the start nothing was said before
         assert [each.name for each in run.events] == names and {each.t for each in run.events} == {later}
         assert run.signals["law"][:, 0].tolist() == [float(t < later) for t in run.t]
-
 
 
 @pytest.mark.parametrize("chain", [False, True], ids=["tree", "chain"])
