@@ -24,6 +24,9 @@ from flexmb.system.tree_system import System
 from flexmb.tables.state import DynamicsError, State
 from flexmb.typing import Index, Real
 
+NEAR = 1e-6  # m, rad: a way by which rates of signals are found where nothing is integrated yet
+NOISE = 1e-8  # of that way: what moves by less, while other things move, is at rest
+
 
 class Begun(NamedTuple):
     """What an integrator is given for a run of a closed loop: y = [q, u, x, work] instead of [q, u, work]."""
@@ -83,6 +86,8 @@ class Feedback:
             where[a.ASKING] = self._called[-1].address
         self._doubt = getattr(workspace, "doubt", np.zeros(1, np.int64))  # that of others is for Python to ask for
         self._run: a.Loop | None = None
+        self._instants, self._end = instants((), 0.0, 0.0, ()), 0.0
+        """Of the last run: all up to its end, which is kept with them."""
 
     def with_retraction(self, move: Any) -> None:
         """For methods on Lie groups too: see `flexmb.integrate.problem.StiffProblem`."""
@@ -97,8 +102,10 @@ class Feedback:
         start, t_end, known = begin.state.t, float(clock.times[-1]), begin.controllers
         ends, apart = clock.segment_ends, slack(start, t_end)
         table = instants(self._plant.scene.controllers, start, t_end, ends[np.isfinite(ends)])
-        due = table[table["time"] < t_end]
-        held = np.zeros((max(int(np.sum(due["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
+        happened = 0 if known is None else int(known.instants[0])
+        self._instants, self._end = table, t_end
+        due = table[: max(happened, np.searchsorted(table["time"], t_end))]  # those of the end act after it
+        held = self._rows_for(due)
         for values in self._held.values():
             values[:] = 0.0
         self._run = made = self._loop(due, held, apart)
@@ -107,8 +114,10 @@ class Feedback:
             self._held["state"][:] = self._wiring.initial
             y = np.concatenate([begin.y[:-1], self._wiring.continuous, begin.y[-1:]])
             loop.start(start, y, made)
+            if np.any(due["time"] == start) and len(self._wiring.continuous):
+                self._start_after_samples(start, y, made)
         else:
-            y, made.following[0] = begin.y, int(known.instants[0])
+            y, made.following[0] = begin.y, happened
             self._held["state"][:], self._held["signal"][:] = known.state, known.signal
             held[: len(known.held)] = known.held[: len(held)]
         kernels = loop.rhs, loop.project, made, made
@@ -124,9 +133,74 @@ class Feedback:
         ends = _with_instants(ends, table["time"][table["time"] > start], t_end)
         return Begun(posed, y, Clock(clock.times, ends), controlled)
 
-    def look(self, begin: Starting) -> None:
-        """At one state, as at the only sample of a run that is over."""
-        self._only_at(begin)
+    def _start_after_samples(self, t: float, y: Real, made: a.Loop) -> None:
+        """What sampled controllers say from the first instant on is there when continuous ones start."""
+        loop.project(t, y, made)
+        loop.hold(t, y, made)
+        loop.start(t, y, made)
+        self.raise_trouble()
+
+    def conclude(self, t: float, y: Real, anew: bool = False) -> bool:
+        """Let sampled controllers act that are due where a run ends, at y (n,) there: whether there are any.
+
+        Integrators evaluate nothing there, unless a run goes on. anew: integration would begin there, after an event.
+        """
+        before, table = self.running, self._instants
+        if t != self._end or not np.any(table["time"][before.following[0] :] == t):
+            return False
+        held, there = self._rows_for(table), y.copy()
+        held[: len(before.held)] = before.held
+        self._run = made = self._loop(table, held, float(before.slack[0]))
+        made.following[0] = before.following[0]
+        loop.project(t, there, made)  # by which closures learn where they are
+        loop.hold(t, there if anew else y, made)
+        self.raise_trouble()
+        return True
+
+    def _rows_for(self, table: Any) -> Real:
+        """Where what is sampled waits."""
+        return np.zeros((max(int(np.sum(table["kind"] == a.SAMPLE)), 1), widest(self._wiring.controller)))
+
+    def is_sampled(self, signal: str) -> bool:
+        """Whether a signal is what a sampled controller says."""
+        place = self.place_of(signal)
+        return any(row["sampled"] and 0 <= place - row["signal"] < row["outputs"] for row in self._wiring.controller)
+
+    def look(self, begin: Starting, acts: bool, anew: bool = False) -> LoopMemory:
+        """At one state, as at the only sample of a run that is over; acts: after who is due there, see `conclude`."""
+        y = self._only_at(begin)
+        if acts:
+            self.running.replaying[0] = 0
+            self.conclude(begin.state.t, y, anew)
+        known = self.remember()
+        self.replay()
+        return known
+
+    def signals(self, begin: Starting) -> Real:
+        """(S,) at one state, before who is due there acts."""
+        y = self._only_at(begin)
+        found = np.zeros(len(self.running.signal))
+        loop.project(begin.state.t, y.copy(), self.running)
+        loop.look(begin.state.t, y, found, self.running)
+        self.raise_trouble()
+        return found
+
+    def signal_rates(self, begin: Starting) -> Real:
+        """(S,) per second of what is not sampled, likewise, by a difference over a way of NEAR (m, rad); 0 at rest."""
+        t, y = begin.state.t, self._only_at(begin)
+        slope, there, ahead = np.zeros(len(y)), np.zeros(len(self.running.signal)), np.zeros(len(self.running.signal))
+        loop.project(t, y.copy(), self.running)
+        loop.rhs(t, y, slope, self.running, self.running)
+        fastest = float(np.max(np.abs(slope[: self._plant.nq]), initial=0.0))
+        if not 0.0 < fastest < np.inf:
+            return there
+        loop.look(t, y, there, self.running)
+        loop.look(t + NEAR / fastest, y + NEAR / fastest * slope, ahead, self.running)
+        self.raise_trouble()
+        change = ahead - there
+        change[np.abs(change) <= NOISE * NEAR + 64.0 * np.spacing(np.abs(ahead) + np.abs(there))] = 0.0
+        rates: Real = change * (fastest / NEAR)
+        return rates
 
     def accelerations(self, begin: Starting) -> Real:
         """(nu,) at one state, under what controllers say there; DynamicsError where there are none."""
@@ -140,7 +214,7 @@ class Feedback:
 
     def _only_at(self, begin: Starting) -> Real:
         t = begin.state.t
-        clock = Clock(np.array([t]), np.array([np.nextafter(t, np.inf)]))
+        clock = Clock(np.array([t]), np.array([t]))
         y = self.begin(begin, clock, Accuracy(0.0, 0.0, 0, 0), None).y
         self.replay()
         return y

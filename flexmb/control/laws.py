@@ -12,7 +12,7 @@ from flexmb.tables.status import OK
 
 # Numbers of a PID controller.
 KP, KI, KD, FILTER, LOWER, UPPER, TRACKING, SETPOINT, PERIOD, PID_NUMBERS = range(10)
-INTEGRAL, FILTERED = range(2)  # its states
+INTEGRAL, FILTERED, BEGUN = range(3)  # its states; of a sampled one whether it has acted, too
 
 
 @helper
@@ -65,6 +65,8 @@ def _pid(i, s):
     p = o.number
     e, filtered = pid_error(i, s), s.state[o.state + FILTERED]
     filter_s, period = s.number[p + FILTER], s.number[p + PERIOD]
+    if o.sampled and s.state[o.state + BEGUN] == 0.0:
+        filtered = e  # before its first instant there is no error to differ from
     slope = (e - filtered) / filter_s if filter_s > 0.0 else 0.0
     if filter_s == 0.0 and o.sampled:
         slope = (e - filtered) / period
@@ -76,6 +78,7 @@ def _pid(i, s):
         s.change[o.state + INTEGRAL] = s.state[o.state + INTEGRAL] + period * gain
         left = math.exp(-period / filter_s) if filter_s > 0.0 else 0.0
         s.change[o.state + FILTERED] = e + left * (filtered - e)
+        s.change[o.state + BEGUN] = 1.0
     else:
         s.change[o.state + INTEGRAL] = gain
         s.change[o.state + FILTERED] = slope

@@ -51,16 +51,23 @@ def observe(s, same, out):
 
 @kernel
 def start(t, y, s):
-    """Begin a run at t and y, where nothing is held yet: PID controllers' filters stand at the first error.
+    """Begin a run at t and y: filters of continuous PID controllers stand at the first error, that of what those before
+    them say there. Those of sampled ones stand at the error of their first instant (`flexmb.control.laws`).
 
     Puts the continuous controllers' states into y.
     """
     take(y, s)
     measure_motion(t, s)
     for i in range(s.controller.shape[0]):
-        _gather(i, s)
-        if s.controller[i].law == a.PID:
-            s.state[s.controller[i].state + FILTERED] = pid_error(i, s)
+        o = s.controller[i]
+        if not o.sampled:
+            _gather(i, s)
+            if o.law == a.PID:
+                s.state[o.state + FILTERED] = pid_error(i, s)
+            if act(t, i, s) != OK:
+                break  # so it does in the first evaluation, which says it
+            for j in range(o.outputs):
+                s.signal[o.signal + j] = s.output[o.output + j]
     give(s.y, s.state, s, y)
 
 

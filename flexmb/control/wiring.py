@@ -176,8 +176,8 @@ def _states(controller: Controller) -> list[float]:
             return list(initial) or [0.0] * len(A)
         case UserLaw(initial=initial):
             return list(initial)
-        case Pid():
-            return [0.0, 0.0]
+        case Pid(period_s=period):
+            return [0.0] * (laws.FILTERED + 1 if period is None else laws.BEGUN + 1)
     return []
 
 

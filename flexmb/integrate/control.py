@@ -142,13 +142,13 @@ def permitted(max_steps, counts):
 def step_end(t, h, end, trouble, max_steps, counts):
     """Where a step of size h ends, after a status code: OK, or why there is no further step.
 
-    There may have been too many, or it is too short to advance time. No sliver of a step is left before the end of the
-    segment.
+    There may have been too many, or it is too short to advance time, unless it is to the end of a segment: that may be
+    as short as the rounding of time. No sliver of a step is left before it.
     """
-    status = permitted(max_steps, counts)
-    if status == OK and h < 10.0 * (np.nextafter(t, math.inf) - t):
+    status, reaches = permitted(max_steps, counts), t + 1.01 * h >= end
+    if status == OK and not reaches and h < 10.0 * (np.nextafter(t, math.inf) - t):
         status = trouble
-    return status, end if t + 1.01 * h >= end else t + h
+    return status, end if reaches else t + h
 
 
 @helper

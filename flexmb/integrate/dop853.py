@@ -33,7 +33,7 @@ from flexmb.integrate.dop853_tableau import E3, E5, STAGES, STAGES_DENSE, A, C, 
 from flexmb.integrate.integrator import Integrator
 from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
-from flexmb.integrate.watch import Ends, Within, end_at_crossing, meets
+from flexmb.integrate.watch import Ends, Within, end_at_crossing, keep_sides, meets
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, OK, STEP_TOO_SMALL
 
@@ -214,6 +214,8 @@ def dop853(problem, y, clock, accuracy, out, counts, memory, watch):
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if not kept and (status != OK or (is_last and t_new == end)):
                 keep(memory, t, y, h, error_before, rejected, counts)
+                if watch is not None:
+                    keep_sides(watch)
                 kept = True
             if status != OK:
                 return status, t

@@ -42,7 +42,7 @@ from flexmb.integrate.leap import leap, may_leap, pause_in_leap, store_leapt
 from flexmb.integrate.linear_flow import LEVELS, TERMS, Flow, at_fraction, at_quarters, prepare, respond
 from flexmb.integrate.memory import ERROR_BEFORE, RETRIED, STEP, begin, keep
 from flexmb.integrate.settling import prepare_settling, settle
-from flexmb.integrate.watch import Ends, pause
+from flexmb.integrate.watch import Ends, keep_sides, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NONFINITE, NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -243,6 +243,8 @@ def exponential(problem, y, clock, accuracy, out, counts, memory, watch):
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if not kept and (status != OK or (is_last and t_new == end)):
                 keep(memory, t, y, h, error_before, rejected, counts)
+                if watch is not None:
+                    keep_sides(watch)
                 kept = True
             if status != OK:
                 return status, t

@@ -35,7 +35,7 @@ from flexmb.integrate.memory import ERROR_BEFORE, FACTORED, FRESH, RENEW, RETRIE
 from flexmb.integrate.radau5_stages import ITERATIONS, evaluate_polynomial, factorise, guess, newton, scratch
 from flexmb.integrate.radau5_tableau import REAL, E
 from flexmb.integrate.settling import settle
-from flexmb.integrate.watch import Ends, pause
+from flexmb.integrate.watch import Ends, keep_sides, pause
 from flexmb.jit.kernel import helper, kernel
 from flexmb.tables.status import NOT_CONVERGED, OK, STEP_TOO_SMALL
 
@@ -213,6 +213,8 @@ def radau5(problem, y, clock, accuracy, out, counts, memory, watch):
             status, t_new = step_end(t, h, end, trouble, accuracy.max_steps, counts)
             if not kept and (status != OK or (is_last and t_new == end)):
                 keep(memory, t, y, h, error_before, rejected, counts)
+                if watch is not None:
+                    keep_sides(watch)
                 keep_stages(memory, s, h_factored, h_before, renew, fresh)
                 kept = True
             if status != OK:

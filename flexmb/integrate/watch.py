@@ -27,6 +27,7 @@ from flexmb.typing import Index, Real
 
 CROSSED = -1  # returned in place of a status code: no end of the run
 UNKNOWN = 2  # a side that is for the first step to find
+RESTED = 2  # times the side from which something came that has been at its level for a step
 
 _NEAR = 2.0**-13  # of a step: over so much of it rates are found as differences
 _NARROW = 2.0**-20  # of a step: a turning point that is found so well is found to rounding, as values are flat there
@@ -37,12 +38,13 @@ class Watch(NamedTuple):
     """entry (k,) of y, or -1 - j for signal j; level (k,); direction (k,): 1 rising, -1 falling, 0 either.
 
     side (k,): -1 where it is below its level, 1 above, 0 at it, kept from step to step. came (k,): of what is at its
-    level where a run begins and may go either way, the side that it came from, else 0. still (k,): what moves by less
+    level where a run begins and may go either way, the side that it came from, else 0; see `RESTED`. still (k,): what moves by less
     within a step is at rest; 0 for entries of y, which are exact. found (k,): 1 where a level is reached at the time at
     which a run paused, and rate (k,) per second there, of signals. value, after, reach (k,): scratch: above its level,
     its side at the end of a step, and what becomes of it there. signal (S,): scratch; empty where only entries are
     watched. leap (2,): start and end (s) of the leap in which a level is reached, NaN if it is none; before (n,): y at
-    its start.
+    its start. kept (1,): 1 where the run can be taken up from before a step that its end cut short, and kept_side,
+    kept_came (k,) as they were there.
     look(t, y, signal, constants) finds all signals and returns a status code.
     """
 
@@ -60,6 +62,9 @@ class Watch(NamedTuple):
     signal: Real
     leap: Real
     before: Real
+    kept: Index
+    kept_side: Index
+    kept_came: Index
     look: Pointer
 
 
@@ -105,6 +110,27 @@ def _side(value, still):
 
 
 @helper
+def _first_side(value, change, still):
+    """The same where nothing is known yet; what is at zero is on the side to which it moves within a step."""
+    side = _side(value, still)
+    return _side(change, still) if side == 0 else side
+
+
+@helper
+def _has_jumped(side, value, still):
+    """Whether a signal is beyond its level where a step begins: a controller acted there, or a function switched."""
+    return still > 0.0 and side * value < -still
+
+
+@helper
+def keep_sides(watch):
+    """Beside `flexmb.integrate.memory.keep`."""
+    watch.kept[0] = 1
+    for i in range(watch.entry.shape[0]):
+        watch.kept_side[i], watch.kept_came[i] = watch.side[i], watch.came[i]
+
+
+@helper
 def _look(problem, watch, t, y):
     """watch.value of all at t and y (n,); a status code."""
     status = OK
@@ -142,10 +168,11 @@ def meets(problem, watch, step, ends):
     """Whether a step may come to a level: (status, whether). If it does not, sides are those of its end."""
     h, count, trial = step.end - step.start, watch.entry.shape[0], np.empty(ends.y.shape[0])
     status = _rates(problem, watch, step.start, ends.y, ends.dy, _NEAR * h, trial)
-    before = watch.rate.copy()
+    before, begun = watch.rate.copy(), watch.value.copy()
     for i in range(count):
         if watch.side[i] == UNKNOWN:
-            watch.side[i] = 0 if watch.came[i] != 0 else _side(watch.value[i], watch.still[i])
+            side = _first_side(watch.value[i], before[i] * h, watch.still[i])
+            watch.side[i] = 0 if watch.came[i] != 0 else side
     if status == OK:
         status = _rates(problem, watch, min(step.end, step.last), ends.y_new, ends.dy_new, -_NEAR * h, trial)
     if status != OK:
@@ -157,7 +184,8 @@ def meets(problem, watch, step, ends):
             _leave(watch, i, before[i] * h, value)
         side = watch.side[i]
         watch.reach[i] = _NOWHERE
-        if crosses(side, value, watch.direction[i]):
+        jumped = _has_jumped(side, begun[i], watch.still[i]) and crosses(side, begun[i], watch.direction[i])
+        if jumped or crosses(side, value, watch.direction[i]):
             watch.reach[i] = _PASSES
         elif side != 0 and not crosses(side, value, 0) and side * before[i] < 0.0 and side * watch.rate[i] > 0.0:
             watch.reach[i] = _TURNS
@@ -170,15 +198,18 @@ def meets(problem, watch, step, ends):
 
 @helper
 def _leave(watch, i, change, value):
-    """The side on which i leaves its level, by its first change in a step or, at rest, where it drifts to.
+    """The side on which i leaves its level, by its change in the first step or, from rest, that from which it came.
 
-    What drifts beyond the level from rest comes to it again.
+    What drifts beyond the level from rest comes to it again, also where it rests for a step before it does.
     """
     came = watch.came[i]
+    side = 1 if came > 0 else -1
     if abs(change) > watch.still[i]:
-        watch.side[i], watch.came[i] = came if came * change > 0.0 else -came, 0
+        watch.side[i], watch.came[i] = side if abs(came) == RESTED or side * change > 0.0 else -side, 0
     elif abs(value) > watch.still[i]:
-        watch.side[i], watch.came[i] = came, 0
+        watch.side[i], watch.came[i] = side, 0
+    else:
+        watch.came[i] = RESTED * side
 
 
 @helper
@@ -247,6 +278,8 @@ def _value_at(within, i, t):
     status = OK
     if t >= step.end:
         copy(ends.y_new, trial)
+    elif t <= step.start:
+        copy(ends.y, trial)
     else:
         status = state_at(problem, step, ends, s, t, trial, run)
     if status == OK:
@@ -293,6 +326,8 @@ def _arrival(within, i, low, high):
     """
     side, last_side, count = within.watch.side[i], 0, 0
     status, below = _value_at(within, i, low)
+    if _has_jumped(side, below, within.watch.still[i]):
+        return status, low
     above = 0.0
     if status == OK:
         status, above = _value_at(within, i, high)
@@ -348,6 +383,7 @@ def watch(
     return Watch(
         whole[0], np.array(levels, float), *whole[1:], np.array(still, float), np.zeros(count, np.int64),
         np.zeros(count), np.zeros(count), np.zeros(count, np.int64), np.zeros(count, np.int64), np.zeros(0),
-        np.full(2, math.nan), np.zeros(size),
+        np.full(2, math.nan), np.zeros(size), np.zeros(1, np.int64), np.zeros(count, np.int64),
+        np.zeros(count, np.int64),
         pointer(_no_signals, STATUS, REAL, VECTOR, VECTOR, AnyBundle._numba_type_),
     )  # fmt: skip

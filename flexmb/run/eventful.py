@@ -11,14 +11,20 @@ from typing import NamedTuple
 import numpy as np
 from msgspec import structs
 
+from flexmb.control.schedule import slack
+from flexmb.integrate.control import COUNTS
+from flexmb.integrate.memory import STRETCH, TIME, Memory, memory
 from flexmb.integrate.settings import Settings
 from flexmb.integrate.watch import UNKNOWN, Watch, watch
+from flexmb.run.event_memory import EventMemory
 from flexmb.run.joining import joined
 from flexmb.run.origin import Beginning
 from flexmb.run.outputs import observed
 from flexmb.run.propagate import Integration, Raw, integrate, integration
+from flexmb.run.restart import Restart
 from flexmb.run.resting import with_stops
 from flexmb.run.situation import EventRecord, Situation
+from flexmb.run.standing import stand
 from flexmb.run.trajectory import Trajectory
 from flexmb.run.within_leaps import ends_within, goes_on, longest_leap, placed
 from flexmb.scene.events import EndRun
@@ -59,18 +65,34 @@ class _Piece(NamedTuple):
     early: float
 
 
+def _unmoved(begin: Beginning) -> Raw:
+    """A run that starts, as if a piece of it had ended there."""
+    nothing = np.empty((0, len(begin.y)))
+    return Raw(
+        nothing, Status.OK, 0, begin.state.t, [0] * COUNTS, 0.0, 0.0, interrupted=False, y=begin.y,
+        memory=memory(len(begin.y), 0),
+    )  # fmt: skip
+
+
 class EventfulRun:
     """One run of a scene with events."""
 
     def __init__(
-        self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float
-    ) -> None:
+        self, system: System, times: Real, settings: Settings, algorithm: Algorithm, stabilise: float,
+        taken_up: EventMemory | None = None,
+    ) -> None:  # fmt: skip
         """times (T,) s of the output."""
         scene = with_stops(system.scene)
         whole = system if scene == system.scene else assembled(scene)
-        self._situation, self._times, self._settings = Situation(whole, settings), times, settings
+        self._situation = Situation(whole, settings, None if taken_up is None else taken_up.given)
+        self._times, self._settings, self._taken_up = times, settings, taken_up
         self._algorithm, self._stabilise = algorithm, stabilise
+        self._together = slack(float(times[0]), float(times[-1]))
         self._events = _by_what_they_watch(whole)
+        self._side, self._came = dict[str, int](), dict[str, int]()
+        """By name of an event: see `Watch`."""
+        self._done = set[str]()
+        """Names of events on time that have happened, or were due before the run."""
         self._happened: list[EventRecord] = []
         self._paused_at: list[float] = []
         self._idle: list[float] = []
@@ -78,6 +100,10 @@ class EventfulRun:
         self._passed, self._until = set[str](), -np.inf
         """Names of events that happened before their instant, and the time (s) up to which they are not watched."""
         self._whole: Trajectory | None = None
+        self._cut: Restart | None = None
+        """From before the step in which an event was found though the end of the run had cut it short."""
+        self.restart: Restart | None = None
+        """Where the run can be taken up, once it is over."""
 
     @property
     def system(self) -> System:
@@ -86,33 +112,210 @@ class EventfulRun:
 
     def __call__(self, begin: Beginning) -> tuple[Trajectory, Raw]:
         """The trajectory, and the last piece of the run as the integrator left it."""
-        watched = self._watched
-        sides, came = self._sides(watched, begin.y), [0] * len(watched)
-        while True:
-            piece = self._piece(begin, watched, sides, came)
-            raw, levels = piece.raw, piece.levels
-            if not (piece.found or self._is_armed_again(raw)):
-                return self._ended(raw), raw
-            y, controlled = self._apart(raw.y)
-            arrived = piece.found if piece.early else self._arriving(piece.found, watched, levels, y)
-            if piece.found:
-                self._count(begin, raw)
-            for event in arrived:
-                records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
-                self._happened += [replace(record, early=piece.early) for record in records]
-            raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
-            ends = any(isinstance(action, EndRun) for event in arrived for action in event.actions)
-            if ends or self._chatters() or raw.t >= self._times[-1]:
-                return self._ended(self._last(raw, ends)), raw
-            names = [event.name for event in watched]
-            side_of = dict(zip(names, self._sides_after(watched, levels, y), strict=True))
-            came_of = dict(zip(names, self._came(watched, levels, y), strict=True))
-            self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
-            watched = self._watched
-            anew = zip(watched, self._sides(watched, y), strict=True)
-            sides = [side_of.get(event.name, side) for event, side in anew]
-            came = [came_of.get(event.name, 0) for event in watched]
+        if begin.events is None:
+            raw = _unmoved(begin)
+            raw, ends = self._at_instant(raw, self._due_at_start(raw.t), None)
+            if ends:
+                return self._over(raw, ends, anew=True)
             begin = self._going_on(raw)
+        else:
+            self._recall(begin.events)
+        while True:
+            piece = self._piece(begin)
+            raw, found = piece.raw, piece.found
+            if raw.status is Status.OK and not raw.interrupted and not found and raw.t == self._times[-1]:
+                raw = self._acted(raw, anew=False)
+                found = self._jumped(raw)
+            if not (found or self._is_armed_again(raw)):
+                return self._over(raw, ends=False, anew=False)
+            if found:
+                self._count(begin, raw)
+            raw, ends = self._at_instant(raw, found, piece.levels, piece.early)
+            if ends or self._chatters() or raw.t >= self._times[-1]:
+                return self._over(raw, ends, anew=True)
+            begin = self._going_on(raw)
+
+    def _at_instant(
+        self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, early: float = 0.0
+    ) -> tuple[Raw, bool]:
+        """All that happens at one time, in its order: events that are found, in that of the scene, then what stands on
+        stops. Controllers that are due act where a run goes on, or is over. Returns what is left, and whether it ends.
+        """
+        watched, before = self._watched, set(self._side)
+        y, controlled = self._apart(raw.y)
+        arrived = found if early else self._arriving(raw, found, levels, y)
+        for event in arrived:
+            self._do(event, raw, y, early)
+        raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
+        if self._whole is None:  # the run starts
+            self._side = {event.name: self._first_side(event, y) for event in watched}
+            self._came = dict.fromkeys(self._side, 0)
+        else:
+            self._move_sides(raw, found, y)
+        struck = self._stand(raw, found, y)
+        raw = raw._replace(y=np.concatenate([y[:-1], controlled, y[-1:]]))
+        self._events = _by_what_they_watch(self.system)  # rest on a stop adds one
+        for event in self._watched:
+            if event.name not in before and event.name not in self._side:
+                self._side[event.name], self._came[event.name] = -DIRECTIONS[event.crossing], 0
+        return raw, any(isinstance(action, EndRun) for event in (*arrived, *struck) for action in event.actions)
+
+    def _do(self, event: SceneEvent, raw: Raw, y: Real, early: float) -> None:
+        records = self._situation.happen(event, raw.t, y, partial(self._accelerations, raw))
+        self._happened += [replace(record, early=early) for record in records]
+        if event.watch == "time":
+            self._done.add(event.name)
+
+    def _stand(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> list[SceneEvent]:
+        """See `flexmb.run.standing`; which events happened."""
+        struck = []
+        for event in self._watched:
+            is_new = event not in found and self._came.get(event.name, 0) == 0
+            if is_new and (self._whole is None or self._side.get(event.name, 0) in (0, UNKNOWN)):
+                stood = stand(
+                    self._situation, event, raw.t, y, self._near(event), partial(self._probe, raw),
+                    partial(self._accelerations, raw),
+                )  # fmt: skip
+                if stood is not None:
+                    self._happened += stood.records
+                    self._side[event.name], self._came[event.name] = stood.side, stood.came
+                    struck += [event] * any(record.name == event.name for record in stood.records)
+        return struck
+
+    def _probe(self, raw: Raw, event: SceneEvent, t: float, y: Real) -> tuple[float, float]:
+        """See `flexmb.run.standing.Probe`."""
+        rate = self._situation.rate_of(event.watch)
+        if not self._is_signal(event):
+            return float(y[self._situation.places[event.watch]] - event.level), 0.0 if rate is None else float(y[rate])
+        begin = self._going_on(self._elsewhere(raw, y))
+        with self._integration() as solve:
+            assert solve.feedback is not None
+            place = solve.feedback.place_of(event.watch)
+            height = solve.feedback.signals(begin)[place] - event.level
+            return float(height), float(solve.feedback.signal_rates(begin)[place])
+
+    def _due_at_start(self, t: float) -> list[SceneEvent]:
+        """Events on time that are due where the run starts; earlier ones are gone."""
+        timed = [event for event in self._events if event.watch == "time"]
+        self._done |= {event.name for event in timed if event.level < t - self._together}
+        return [event for event in timed if abs(event.level - t) <= self._together]
+
+    def _acted(self, raw: Raw, anew: bool) -> Raw:
+        """After controllers acted that are due where the run is over. anew: integration would begin there."""
+        if not self._samples:
+            return raw
+        with self._integration() as solve:
+            assert solve.feedback is not None
+            known = solve.feedback.look(self._going_on(raw), acts=True, anew=anew)
+        return raw._replace(controllers=known)
+
+    @property
+    def _samples(self) -> bool:
+        return any(each.period_s for each in self.system.scene.controllers)
+
+    def _jumped(self, raw: Raw) -> list[SceneEvent]:
+        """Events on what controllers said only where the run was over already."""
+        found: list[SceneEvent] = []
+        if raw.controllers is None:
+            return found
+        with self._integration() as solve:
+            assert solve.feedback is not None
+            for event in self._watched:
+                if self._is_signal(event) and solve.feedback.is_sampled(event.watch):
+                    height = raw.controllers.signal[solve.feedback.place_of(event.watch)] - event.level
+                    side, direction = self._side[event.name], DIRECTIONS[event.crossing]
+                    if side in (-1, 1) and side * height < -self._near(event) and side * direction <= 0:
+                        found.append(event)
+        return found
+
+    def _near(self, event: SceneEvent) -> float:
+        """What is nearer to its level is at it: no run tells it from there."""
+        return self._settings.atol + self._settings.rtol * abs(event.level)
+
+    def _first_side(self, event: SceneEvent, y: Real) -> int:
+        """On which side of its level something is where a run starts; at it, on that to which it moves.
+
+        It has been at it before. Of signals the first step tells.
+        """
+        if self._is_signal(event):
+            return UNKNOWN
+        height, rate = y[self._situation.places[event.watch]] - event.level, self._situation.rate_of(event.watch)
+        if abs(height) > self._near(event):
+            return int(np.sign(height))
+        return 0 if rate is None or self._situation.is_held(event.watch) else int(np.sign(y[rate]))
+
+    def _remember(self, ended: float, anew: bool) -> EventMemory:
+        """As things are; sides of the events that are watched are those of the moment."""
+        events = self.system.scene.events
+        side = [1 if event.name in self._done else self._side.get(event.name, 0) for event in events]
+        came = [self._came.get(event.name, 0) for event in events]
+        passed = [int(event.name in self._passed) for event in events]
+        whole = (np.array(each, np.int64) for each in (side, came, passed))
+        return EventMemory(*whole, self._until, anew, ended, 0, self._situation.given)
+
+    def _recall(self, memory: EventMemory) -> None:
+        self._until = memory.until
+        for i, event in enumerate(self._events):
+            if memory.passed[i]:
+                self._passed.add(event.name)
+            if event.watch != "time":
+                self._side[event.name], self._came[event.name] = int(memory.side[i]), int(memory.came[i])
+            elif memory.side[i]:
+                self._done.add(event.name)
+
+    def _keep_cut(self, raw: Raw, levels: Watch, watched: Sequence[SceneEvent]) -> None:
+        """Before a step that the end of the run cut short, and in which an event was found all the same: it is found
+        otherwise, in the last bits, by a run that goes on."""
+        if self._cut is None and raw.memory is not None:
+            names = [event.name for event in watched]
+            now = self._side, self._came
+            self._side = dict(zip(names, levels.kept_side.tolist(), strict=True))
+            self._came = dict(zip(names, levels.kept_came.tolist(), strict=True))
+            self._cut = self._restart(raw, raw.memory, anew=False)
+            self._side, self._came = now
+
+    def _restart(self, raw: Raw, memory: Memory, anew: bool) -> Restart:
+        events = self._remember(raw.t, anew)
+        return Restart(self._settings.method, self.system.scene, raw.t, memory, raw.controllers, events)
+
+    def _restart_of(self, raw: Raw, ends: bool, anew: bool) -> Restart | None:
+        """Of a run that is over: from before what its end has cut short, or from where it is."""
+        if raw.memory is None:
+            return None
+        if self._cut is not None and self._cut.events is not None and not ends:
+            shown = sum(record.t >= raw.t - self._together for record in self._happened)
+            return replace(self._cut, t=raw.t, events=self._cut.events._replace(ended=raw.t, shown=shown))
+        if not anew:
+            return self._restart(raw, raw.memory, anew)
+        memory = self._settings.integrator.memory(len(raw.y))
+        memory.numbers[TIME] = memory.numbers[STRETCH] = raw.t
+        memory.y[:] = raw.y
+        return self._restart(raw, memory, anew)
+
+    def _over(self, raw: Raw, ends: bool, anew: bool) -> tuple[Trajectory, Raw]:
+        """The end of the run, with what controllers say there; anew: events happened there."""
+        chatters = anew and not ends and raw.t < self._times[-1]
+        if anew and not chatters:
+            raw = self._acted(raw, anew=True)
+        if anew or (self._samples and raw.status is Status.OK and raw.t == self._times[-1]):
+            self._last(raw, ends, chatters)
+        if not chatters and raw.status in (Status.OK, Status.MAX_STEPS, Status.INTERRUPTED):
+            self.restart = self._restart_of(raw, ends, anew)
+        assert self._whole is not None  # there was a piece
+        return replace(self._whole, events=self._new_events()), raw
+
+    def _new_events(self) -> tuple[EventRecord, ...]:
+        """Those that the run that was taken up has not shown."""
+        if self._taken_up is None:
+            return tuple(self._happened)
+        new, left = list[EventRecord](), self._taken_up.shown
+        for record in self._happened:
+            is_there = abs(record.t - self._taken_up.ended) <= self._together
+            if is_there and left > 0:
+                left -= 1
+            elif is_there or record.t > self._taken_up.ended:
+                new.append(record)
+        return tuple(new)
 
     @property
     def _watched(self) -> list[SceneEvent]:
@@ -124,10 +327,15 @@ class EventfulRun:
 
     def _accelerations(self, raw: Raw, t: float, y: Real) -> Real:
         """Under what controllers say where a piece ended, with another motion y = [q, u, work] there."""
-        there = raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
+        begin = self._going_on(self._elsewhere(raw, y))
         with self._integration() as solve:
-            assert solve.feedback is not None  # of a scene with stops to rest on
-            return solve.feedback.accelerations(self._going_on(there))
+            if solve.feedback is None:
+                return self.system.accelerations(begin.state, self._algorithm)
+            return solve.feedback.accelerations(begin)
+
+    def _elsewhere(self, raw: Raw, y: Real) -> Raw:
+        """Where a piece ended, with another motion y = [q, u, work]."""
+        return raw._replace(y=np.concatenate([y[:-1], self._apart(raw.y)[1], y[-1:]]))
 
     def _apart(self, y: Real) -> tuple[Real, Real]:
         """[q, u, work], and the states of controllers, which events do not touch."""
@@ -139,15 +347,15 @@ class EventfulRun:
         state = self.system.layout.known(raw.t, np.r_[self._apart(raw.y)[0][:-1], 0.0])
         return Beginning(state, raw.y, None, raw.controllers)
 
-    def _piece(
-        self, begin: Beginning, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int]
-    ) -> _Piece:
+    def _piece(self, begin: Beginning) -> _Piece:
         """Run to the next event, or to the next time at which one is due, or to the end; outputs are joined."""
-        t, again = begin.state.t, begin._replace(y=begin.y.copy())
-        timed = [event for event in self._armed if event.watch == "time" and t < event.level < self._times[-1]]
-        stop = min([*(event.level for event in timed), *[self._until] * (t < self._until), self._times[-1]])
-        due = [event for event in timed if event.level == stop]
-        watching = partial(self._watch, watched, sides, came)
+        t, t_end, again = begin.state.t, float(self._times[-1]), begin._replace(y=begin.y.copy())
+        timed = [event for event in self._armed if event.watch == "time" and event.name not in self._done]
+        first = min((max(event.level, t) for event in timed), default=np.inf)
+        stop = min(first if first < t_end - self._together else t_end, self._until if t < self._until else np.inf)
+        due = [event for event in timed if event.level <= stop + self._together]
+        watched = self._watched
+        watching = partial(self._watch, watched)
         piece = self._run_to(stop, begin, watching, due)
         early = longest_leap(self.system, piece.raw) if due and self.system.scene.closures else np.inf
         if early < stop - t and self._is_singular(piece.raw, stop, early):
@@ -160,7 +368,22 @@ class EventfulRun:
             self._passed |= {event.name for event in piece.found}
             self._until = piece.raw.t + 2.5 * piece.early
         self._join(piece.part)
+        if piece.levels is not None:
+            if piece.raw.paused and piece.levels.kept[0]:
+                self._keep_cut(piece.raw, piece.levels, watched)
+            self._side, self._came = self._sides_of(piece, watched)
         return piece
+
+    def _sides_of(self, piece: _Piece, watched: Sequence[SceneEvent]) -> tuple[dict[str, int], dict[str, int]]:
+        """Where things are at the end of a piece; or, where nothing was found, where it is taken up, which differs
+        where a step was cut short."""
+        levels = piece.levels
+        assert levels is not None
+        is_cut = bool(levels.kept[0]) and not piece.raw.paused
+        both = (levels.kept_side, levels.kept_came) if is_cut else (levels.side, levels.came)
+        names = [event.name for event in watched]
+        side, came = (dict(zip(names, each.tolist(), strict=True)) for each in both)
+        return side, came
 
     def _run_to(
         self, stop: float, begin: Beginning, watching: Callable[[Integration], Watch | None],
@@ -173,10 +396,13 @@ class EventfulRun:
         times, early = np.unique([start, *wanted, stop]), 0.0
         with self._integration() as solve:
             levels = watching(solve)
-            raw = integrate(self.system, solve, begin, times, self._left(), levels, not is_last, beyond)
-            found = self._found(raw, levels, due if raw.t == stop else ())
+            breaks, left = not is_last or bool(due), self._left()
+            raw = integrate(self.system, solve, begin, times, left, levels, breaks, beyond, goes_on=True)
+            found = self._found(raw, levels, due if raw.t >= stop - self._together else ())
             if levels is not None and not all(isinstance(each, EndRun) for event in found for each in event.actions):
                 raw, early = placed(raw, levels, times, self._further, self._speeds)
+            elif levels is not None and levels.leap[0] < raw.t < levels.leap[1]:
+                raw = raw._replace(memory=None)  # nothing goes on from there
             kept = np.isin(times[: len(raw.states)], wanted)
             shown = raw._replace(states=raw.states[kept])
             part = observed(self.system, times[: len(raw.states)][kept], shown, self._algorithm, solve)
@@ -193,7 +419,7 @@ class EventfulRun:
         begin = self._going_on(raw._replace(y=raw.y.copy()))
         with self._integration() as solve:
             nothing = watch((), (), (), (), (), (), self._size(solve))
-            return integrate(self.system, solve, begin, np.array([raw.t, t]), self._left(), nothing)
+            return integrate(self.system, solve, begin, np.array([raw.t, t]), self._left(), nothing, goes_on=True)
 
     def _integration(self) -> AbstractContextManager[Integration]:
         return integration(self.system, self._algorithm, self._stabilise, self._settings.integrator)
@@ -223,32 +449,30 @@ class EventfulRun:
         crossed = [self._watched[i] for i in np.flatnonzero(levels.found)] if levels is not None and raw.paused else []
         return [event for event in self._events if event in crossed or event in due]
 
-    def _arriving(
-        self, found: Sequence[SceneEvent], watched: Sequence[SceneEvent], levels: Watch | None, y: Real
-    ) -> list[SceneEvent]:
+    def _arriving(self, raw: Raw, found: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[SceneEvent]:
         """Those that come to their levels, where coordinates are set exactly.
 
         Rounding may find one again that flies off.
         """
         off = []
-        for i, event in enumerate(watched):
+        for i, event in enumerate(self._watched):
             if levels is not None and event in found:
                 if self._is_signal(event):
-                    rate = levels.rate[i]
+                    has_jumped = not levels.found[i] or self._side[event.name] * levels.value[i] < -self._near(event)
+                    rate = levels.rate[i] or self._probe(raw, event, raw.t, y)[1]  # steps may be roundings of time
+                    rate = 0.0 if has_jumped else rate
                 else:
                     y[self._situation.places[event.watch]] = event.level
                     place = self._situation.rate_of(event.watch)
                     rate = 0.0 if place is None else y[place]
-                if levels.side[i] * rate > 0.0:
+                if self._side[event.name] * rate > 0.0:
                     off.append(event)
         return [event for event in found if event not in off]
 
     def _is_signal(self, event: SceneEvent) -> bool:
         return event.watch not in self._situation.places
 
-    def _watch(
-        self, watched: Sequence[SceneEvent], sides: Sequence[int], came: Sequence[int], solve: Integration
-    ) -> Watch | None:
+    def _watch(self, watched: Sequence[SceneEvent], solve: Integration) -> Watch | None:
         if not watched:
             return None
         entries, still = [], []
@@ -256,12 +480,13 @@ class EventfulRun:
             if self._is_signal(event):
                 assert solve.feedback is not None
                 entries.append(-1 - solve.feedback.place_of(event.watch))
-                still.append(self._settings.atol + self._settings.rtol * abs(event.level))
+                still.append(self._near(event))
             else:
                 entries.append(self._situation.places[event.watch])
                 still.append(0.0)
         directions = [DIRECTIONS[event.crossing] for event in watched]
-        levels = [event.level for event in watched]
+        levels, names = [event.level for event in watched], [event.name for event in watched]
+        sides, came = [self._side[name] for name in names], [self._came[name] for name in names]
         return watch(entries, levels, directions, sides, came, still, self._size(solve))
 
     def _size(self, solve: Integration) -> int:
@@ -269,43 +494,45 @@ class EventfulRun:
         controlled = 0 if solve.feedback is None else len(solve.feedback.state_names)
         return self.system.nq + self.system.nu + controlled + 1
 
-    def _sides(self, watched: Sequence[SceneEvent], y: Real) -> list[int]:
-        """On which side of its level everything is; 0 at it. Those of signals are seen in the first step."""
-        places = self._situation.places
-        return [
-            UNKNOWN if self._is_signal(event) else int(np.sign(y[places[event.watch]] - event.level))
-            for event in watched
-        ]
+    def _move_sides(self, raw: Raw, found: Sequence[SceneEvent], y: Real) -> None:
+        """After events. What was found at its level is beyond it, or back where it does not go on, or at it: 0; of
+        what is left at rest the next steps tell, and `came` from where it came.
 
-    def _came(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
-        """From which side what is at its level came, where its rate does not tell where it goes on to; 0 for others."""
-        return [
-            int(levels.side[i]) if levels is not None and levels.found[i] and self._stays(event, y) else 0
-            for i, event in enumerate(watched)
-        ]
-
-    def _stays(self, event: SceneEvent, y: Real) -> bool:
-        """Whether the next step sees on which side of its level something is: a signal, or what is left at rest."""
-        if self._is_signal(event):
-            return True
-        rate = self._situation.rate_of(event.watch)
-        return rate is not None and y[rate] == 0.0 and not self._situation.is_held(event.watch)
-
-    def _sides_after(self, watched: Sequence[SceneEvent], levels: Watch | None, y: Real) -> list[int]:
-        """After an event. What was found at its level is beyond it, or back where it does not go on; else at it: 0."""
-        sides = self._sides(watched, y)
-        for i, event in enumerate(watched):
-            came = int(levels.side[i]) if levels is not None else 0
-            if self._is_signal(event):
+        By what events make of them signals pass no level.
+        """
+        heights = self._heights(raw, [event for event in self._watched if self._is_signal(event)])
+        for event in self._watched:
+            is_signal, side, came = self._is_signal(event), self._side.get(event.name, 0), self._came.get(event.name, 0)
+            if event in found:
+                self._side[event.name], self._came[event.name] = self._side_after(raw, event, side, y)
                 continue
-            if levels is not None and levels.found[i]:
-                rate = self._situation.rate_of(event.watch)
-                goes_on = rate is None or -came * y[rate] > 0.0
-                is_at_it = self._situation.is_held(event.watch) or self._stays(event, y)
-                sides[i] = 0 if is_at_it else -came if goes_on else came
-            elif sides[i] == 0:
-                sides[i] = came
-        return sides
+            height = heights[event.name] if is_signal else y[self._situation.places[event.watch]] - event.level
+            if abs(height) > (self._near(event) if is_signal else 0.0):
+                self._side[event.name], self._came[event.name] = int(np.sign(height)), 0
+            else:
+                self._side[event.name], self._came[event.name] = UNKNOWN if is_signal else side, came
+
+    def _side_after(self, raw: Raw, event: SceneEvent, came: int, y: Real) -> tuple[int, int]:
+        """Side, and `came`, of what was found at its level: it goes on, or back, or stays."""
+        if self._situation.is_held(event.watch):
+            return 0, 0
+        if self._situation.rate_of(event.watch) is None and not self._is_signal(event):
+            return -came, 0
+        height, rate = self._probe(raw, event, raw.t, y)
+        if abs(height) > self._near(event):
+            return int(np.sign(height)), 0  # of a signal that jumped, or by its own event comes to jump
+        if rate == 0.0:
+            return UNKNOWN if self._is_signal(event) else 0, came
+        return (-came if came * rate < 0.0 else came), 0
+
+    def _heights(self, raw: Raw, events: Sequence[SceneEvent]) -> dict[str, float]:
+        """Of signals above their levels, before controllers act that are due."""
+        if not events:
+            return {}
+        with self._integration() as solve:
+            assert solve.feedback is not None
+            signals = solve.feedback.signals(self._going_on(raw))
+            return {event.name: float(signals[solve.feedback.place_of(event.watch)] - event.level) for event in events}
 
     def _count(self, begin: Beginning, raw: Raw) -> None:
         """An event that ends a piece; it is idle if neither speeds at the piece's ends nor time led anywhere."""
@@ -323,28 +550,20 @@ class EventfulRun:
             for times, many in ((self._idle, FEW), (self._paused_at, MANY))
         )
 
-    def _last(self, raw: Raw, ends: bool) -> Raw:
-        """The state after the last event is an output too."""
-        last = raw._replace(states=raw.y[None])
-        if not ends and raw.t < self._times[-1]:
-            last = last._replace(status=Status.CHATTERING)
-        system = self.system
+    def _last(self, raw: Raw, ends: bool, chatters: bool) -> None:
+        """The state after all that happens at the end is an output too."""
+        last = raw._replace(states=raw.y[None], status=Status.CHATTERING if chatters else raw.status)
         with self._integration() as solve:
             if solve.feedback is not None:
-                solve.feedback.look(self._going_on(raw))
-            found = observed(system, np.array([raw.t]), last, self._algorithm, solve)
+                solve.feedback.look(self._going_on(raw), acts=False)
+            found = observed(self.system, np.array([raw.t]), last, self._algorithm, solve)
         if ends:
             found = replace(found, message=f'ended by event "{self._happened[-1].name}" at t = {raw.t:g} s')
-        elif last.status is Status.CHATTERING:
+        elif chatters:
             names = dict.fromkeys(f'"{event.name}"' for event in self._happened[-FEW:])
             found = replace(found, message=f"{found.message}; the last were {' and '.join(names)}")
         cost = {name: 0 for name in vars(found.statistics)}
         self._join(replace(found, statistics=replace(found.statistics, **cost)))
-        return last
 
     def _join(self, part: Trajectory) -> None:
         self._whole = part if self._whole is None else joined(self._whole, part)
-
-    def _ended(self, raw: Raw) -> Trajectory:
-        assert self._whole is not None  # there was a piece
-        return replace(self._whole, events=tuple(self._happened))

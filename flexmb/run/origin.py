@@ -9,6 +9,7 @@ import numpy as np
 
 from flexmb.control.memory import LoopMemory
 from flexmb.integrate.memory import Memory
+from flexmb.run.event_memory import EventMemory
 from flexmb.run.restart import Restart
 from flexmb.run.taking_up import fitting
 from flexmb.scene.problems import closest
@@ -24,12 +25,13 @@ SAME = 1e-9  # relative difference of a value that is given and one that a presc
 
 class Beginning(NamedTuple):
     """state: what the run starts from, with its time; y (nq+nu+1,) = [q, u, work], a copy; of one taken up its memory,
-    that of its controllers, and their states before the work in y."""
+    those of its controllers and events, and states of controllers before the work in y."""
 
     state: State
     y: Real
     memory: Memory | None
     controllers: LoopMemory | None = None
+    events: EventMemory | None = None
 
 
 def start_time(t_start: float | None, state: Given) -> float:
@@ -74,9 +76,11 @@ def _taken_up(system: System, restart: Restart, method: str) -> Beginning:
     t, motion = system.layout.whole(restart.since, np.r_[y[: system.nq + system.nu], y[-1]])
     if system.scene.closures:
         _count_rows(system, t, motion)
+    is_anew = restart.events is not None and restart.events.anew
     return Beginning(
-        system.layout.known(t, np.r_[motion[:-1], 0.0]), y, restart.taken_up(), restart.controllers
-    )
+        system.layout.known(t, np.r_[motion[:-1], 0.0]), y, None if is_anew else restart.taken_up(),
+        restart.controllers, restart.events,
+    )  # fmt: skip
 
 
 def _count_rows(system: System, t: float, motion: Real) -> None:

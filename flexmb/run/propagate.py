@@ -112,18 +112,27 @@ class Integration:
             return begin.y, clock, accuracy
         self._problem, y, clock, accuracy = self.feedback.begin(begin, clock, accuracy, self._linear)
         if self._batched:
-            self.batch = batch(self.feedback, self.feedback.motion, self.feedback.observing, len(y))
+            self._batch_outputs(len(y))
         self.feedback.heed(counts[STOP : STOP + 1])
         return y, clock, accuracy
 
-    def ended(self) -> LoopMemory | None:
-        """What controllers know at the end of a run, which is looked at from now on; raises what they raised."""
+    def ended(self, acting: tuple[float, Real] | None) -> LoopMemory | None:
+        """What controllers know at the end of a run, which is looked at from now on; raises what they raised.
+
+        acting: time (s) and state where the run is over, at which sampled ones may be due; None where it may go on.
+        """
         if self.feedback is None:
             return None
         self.feedback.raise_trouble()
+        if acting is not None and self.feedback.conclude(*acting) and self._batched:
+            self._batch_outputs(len(acting[1]))
         known = self.feedback.remember()
         self.feedback.replay()
         return known
+
+    def _batch_outputs(self, n: int) -> None:
+        assert self.feedback is not None
+        self.batch = batch(self.feedback, self.feedback.motion, self.feedback.observing, n)
 
     @property
     def noticed(self) -> tuple[float, int] | None:
@@ -160,12 +169,13 @@ def integration(
 
 def integrate(
     system: System, solve: Integration, begin: Beginning, times: Real, settings: Settings, watch: Watch | None = None,
-    breaks: bool = False, beyond: float = 0.0,
+    breaks: bool = False, beyond: float = 0.0, goes_on: bool = False,
 ) -> Raw:  # fmt: skip
     """Run over the whole time, after what has to be compiled for it.
 
     breaks: something is due at its end, where even a method of equal steps has to end one, and every method a leap.
-    beyond (s): how much further it may go, to leap over where it ends.
+    beyond (s): how much further it may go, to leap over where it ends. goes_on: it is a piece of a run, at whose end
+    sampled controllers do not act yet.
     """
     method, accuracy = settings.integrator, settings.accuracy(system.nq, system.nu)
     ends = segment_ends(system, begin.state.t, times[-1] + beyond, method.fixed, breaks)
@@ -184,9 +194,11 @@ def integrate(
     begun = perf_counter()
     (status, t), interrupted = interruptible(solve, given, counts[STOP : STOP + 1])
     end = perf_counter()
-    controllers, paused = solve.ended(), status == CROSSED
+    paused = status == CROSSED
     if t > times[-1] and (paused or status == OK):
         t, y, memory, paused, status = times[-1], out[-1].copy(), None, False, OK
+    is_over = status == OK and t == times[-1] and not interrupted and not goes_on
+    controllers = solve.ended((t, y) if is_over else None)
     return Raw(
         out[: counts[SAMPLES]], Status.OK if paused else Status(status), solve.fault, t, counts.tolist(),
         begun - start, end - begun, interrupted, y, memory, paused, controllers,

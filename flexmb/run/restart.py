@@ -12,14 +12,16 @@ import numpy as np
 from flexmb.control.memory import LoopMemory
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import TAKEN_UP, TIME, Memory
-from flexmb.run import restart_form
+from flexmb.run import event_memory, restart_form
+from flexmb.run.event_memory import EventMemory
 from flexmb.scene.npz import REAL, TEXT, unpacked
 from flexmb.scene.reading import Unreadable
 from flexmb.scene.schema import Scene
 
 VERSION = 1
 """Of the file; one that says none is of version 1 too."""
-_KINDS = {"method": TEXT} | dict.fromkeys(("version", "t", "scene", *Memory._fields, *LoopMemory._fields), REAL)
+_NUMBERS = ("version", "t", "scene", *Memory._fields, *LoopMemory._fields, *event_memory.NAMES)
+_KINDS = {"method": TEXT} | dict.fromkeys(_NUMBERS, REAL)
 """By name of an array in the file, what it may hold."""
 
 
@@ -32,7 +34,8 @@ class Restart:
     they divide the time. Methods that adapt their steps cut the last one short where a run ends: they are taken up at
     `since` (s), where that step began, and output times of the second run may begin at any time from there to `t` (s),
     where the run ended and where they begin by default. Closed chains choose the independent rows of their closures
-    anew, and are the same unless two choices are equally good. What controllers know goes on too.
+    anew, and are the same unless two choices are equally good. What controllers know goes on too, and what events do:
+    those from `since` to `t` happen once more, to the last bit as in a run that had never ended, and are shown once.
     """
 
     method: Method
@@ -40,6 +43,7 @@ class Restart:
     t: float
     memory: Memory
     controllers: LoopMemory | None = None
+    events: EventMemory | None = None
 
     @property
     def since(self) -> float:
@@ -54,7 +58,7 @@ class Restart:
                 file, version=VERSION, method=self.method, t=self.t,
                 scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
                 numbers=self.memory.numbers, y=self.memory.y, rows=self.memory.rows,
-                **{} if self.controllers is None else self.controllers._asdict(),
+                **{} if self.controllers is None else self.controllers._asdict(), **event_memory.written(self.events),
             )  # fmt: skip
 
     @staticmethod
@@ -84,7 +88,8 @@ class Restart:
         self._refuse_other_parts()
         t, memory = restart_form.memory(self.method, self.t, self.memory)
         known = None if self.controllers is None else restart_form.controllers(self.controllers)
-        return replace(self, t=t, memory=memory, controllers=known)
+        events = None if self.events is None else event_memory.examined(self.events, self.scene)
+        return replace(self, t=t, memory=memory, controllers=known, events=events)
 
     def _refuse_other_parts(self) -> None:
         """TypeError for anything else than a run has left."""
@@ -93,6 +98,8 @@ class Restart:
                 raise TypeError(f"{name} is a {type(part).__name__}: a restart holds the {kind.__name__} of its run")
         if not isinstance(self.controllers, LoopMemory | None):
             raise TypeError(f"controllers is a {type(self.controllers).__name__}: a restart holds a LoopMemory")
+        if not isinstance(self.events, EventMemory | None):
+            raise TypeError(f"events is a {type(self.events).__name__}: a restart holds an EventMemory")
 
     def taken_up(self) -> Memory:
         """A copy of the memory for an integrator that goes on from it."""
@@ -116,4 +123,5 @@ def _read(path: str | os.PathLike[str]) -> Restart:
     memory = Memory(*(file[name] for name in Memory._fields))
     is_controlled = any(name in file for name in LoopMemory._fields)
     known = LoopMemory(*(file[name] for name in LoopMemory._fields)) if is_controlled else None
-    return Restart(str(file["method"]), scene, float(file["t"]), memory, known)  # type: ignore[arg-type]  # examined
+    events = event_memory.read(file) if scene.events else None
+    return Restart(str(file["method"]), scene, float(file["t"]), memory, known, events)  # type: ignore[arg-type]  # examined

@@ -126,10 +126,10 @@ def simulate(
                 trajectory = observed(system, times, raw, algorithm, solve)
         trajectory = replace(trajectory, made_by=made_by)
     else:
-        run = EventfulRun(system, times, chosen, algorithm, stabilise)
+        run = EventfulRun(system, times, chosen, algorithm, stabilise, begin.events)
         trajectory, raw = run(begin)
-        system = run.system
-    trajectory = replace(trajectory, restart=_restart(system, raw, method))
+    restart = run.restart if system.scene.events else _restart(system, raw, method)
+    trajectory = replace(trajectory, restart=restart)
     if start is not None and start.is_low:
         warnings.warn(start.warning, PrecisionWarning, stacklevel=2)
         trajectory = replace(trajectory, message=f"{trajectory.message}; at the start {start.warning}")

@@ -50,10 +50,11 @@ class EventRecord:
 class Situation:
     """The scene as events have left it, with its system; systems that come back are not built again."""
 
-    def __init__(self, system: System, settings: Settings) -> None:
+    def __init__(self, system: System, settings: Settings, given: Scene | None = None) -> None:
+        """given: of a run that is taken up, the scene as changes alone have left it."""
         self.system = system
         self._settings = settings
-        self._given = system.scene
+        self.given = given or system.scene
         self._paths = scalar_paths(system.scene)
         self._built = [system]
         q, u = system.state_names
@@ -69,9 +70,23 @@ class Situation:
             if isinstance(action, Impact) and action.rests:
                 push = -int(np.sign(before[self._rate_place(action.coordinate)]))
                 if self._is_spent(action.coordinate, push, t, y, accelerations):
-                    rest = partial(self._rest, event, action.coordinate, push)
-                    found.append(self._recorded(f"{event.name}: at rest", t, y, [rest]))
+                    found.append(self.rest(event, action, push, t, y))
         return found
+
+    def rest(self, event: SceneEvent, impact: Impact, push: int, t: float, y: Real) -> EventRecord:
+        """Have what stands on a stop rest on it; push: the sign of its loads."""
+        rest = partial(self._rest, event, impact.coordinate, push)
+        return self._recorded(f"{event.name}: at rest", t, y, [rest])
+
+    def at_rest(self, coordinate: str, t: float, y: Real) -> Real:
+        """A copy of y = [q, u, work] after an impulse that takes the speed of a coordinate away."""
+        stopped = y.copy()
+        self._strike(t, stopped, coordinate, 0.0, {}, {})
+        return stopped
+
+    def speed(self, coordinate: str, y: Real) -> float:
+        """Of a scalar coordinate."""
+        return float(y[self._rate_place(coordinate)])
 
     def _recorded(self, name: str, t: float, y: Real, actions: Sequence[Callable[..., None]]) -> EventRecord:
         before, work = self._state(t, y), float(y[-1])
@@ -85,10 +100,9 @@ class Situation:
 
         What presses is that on a body at rest there: loads that change with the rebound are no longer what they were.
         """
-        place, at_rest = self._rate_place(name), y.copy()
+        place = self._rate_place(name)
         rebound = push * y[place]
-        self._strike(t, at_rest, name, 0.0, {}, {})
-        pressed = -push * accelerations(t, at_rest)[place - self.system.nq]
+        pressed = -push * accelerations(t, self.at_rest(name, t, y))[place - self.system.nq]
         allowed = self._settings.atol + self._settings.rtol * abs(y[self.places[name]])
         return bool(pressed > 0.0 and rebound**2 <= 2.0 * pressed * allowed)
 
@@ -131,7 +145,7 @@ class Situation:
             case Change(path=path, value=value):
                 energy = self._energy(t, y)
                 self._become(self.system.scene.with_values({path: value}), t, y)
-                self._given = self._given.with_values({path: value})
+                self.given = self.given.with_values({path: value})
                 y[-1] += self._energy(t, y) - energy
             case EndRun():
                 pass
@@ -161,7 +175,7 @@ class Situation:
 
     def _freed(self, name: str):  # type: ignore[no-untyped-def]
         found: list[Coordinate | Wheel] = []
-        changed_at(self._given, self._paths[name], lambda item: found.append(item) or item)
+        changed_at(self.given, self._paths[name], lambda item: found.append(item) or item)
         motion = _keys(found[0])[3]
         return lambda _: replace(found[0], **{motion: None})
 

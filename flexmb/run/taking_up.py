@@ -29,6 +29,9 @@ def fitting(system: System, given: Restart, method: str) -> Restart:
     has_loop = bool(system.scene.controllers) or watches_signals(system.scene)
     if has_loop != (known is not None):
         raise ValueError(f"the restart says {'nothing' if has_loop else 'something'} of controllers: it is damaged")
+    if bool(system.scene.events) != (restart.events is not None):
+        said = "nothing" if system.scene.events else "something"
+        raise ValueError(f"the restart says {said} of events: it is damaged")
     states = 0 if known is None else _refuse_other_controllers(system, restart, known)
     if len(restart.memory.y) != motion + states:
         raise ValueError(

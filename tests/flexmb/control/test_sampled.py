@@ -100,7 +100,7 @@ def test_outputs_see_what_is_held_from_an_instant_on() -> None:
     _, log = exact(0.1, 0.0, 2.0)
     held = [torque for _, torque in log]
     assert run.signals["law"][:-1, 0] == pytest.approx(held, abs=1e-8)
-    assert run.signals["law"][-1, 0] == run.signals["law"][-2, 0]  # nothing acts at the very end
+    assert run.signals["law"][-1, 0] == -float(GAINS @ [run.q[-1, 0], run.u[-1, 0]])  # at the very end, too
     assert run.loads["pivot"][:-1, 2] == pytest.approx(-STIFFNESS * run.q[:-1, 0] + held, abs=1e-8)
 
 
@@ -113,7 +113,7 @@ def test_a_recursive_controller_keeps_its_state_between_samples() -> None:
         fm.StateSpace(name="smooth", inputs=("angle",), A=((0.5,),), B=((1.0,),), C=((1.0,),), period_s=0.25),
     )
     run = fm.simulate(rotor(*parts, stiffness=STIFFNESS), 2.0, samples=np.linspace(0.0, 2.0, 9))
-    assert run.signals["count"][:, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 7]
+    assert run.signals["count"][:, 0].tolist() == [0, 1, 2, 3, 4, 5, 6, 7, 8]
     x, expected = 0.0, []
     for angle in run.q[:-1, 0]:
         expected.append(x)

@@ -1,0 +1,92 @@
+"""What a run with events knows where it is taken up."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import msgspec
+import numpy as np
+
+from flexmb.integrate.watch import RESTED, UNKNOWN
+from flexmb.scene.schema import Scene
+from flexmb.tables import arguments
+from flexmb.typing import Index
+
+_KEY = "events_"  # before the names of its entries in a file
+SIDES, CAMES = (-1, 0, 1, UNKNOWN), (-RESTED, -1, 0, 1, RESTED)
+MOST = 2**53  # that a number can count
+
+
+class EventMemory(NamedTuple):
+    """By event (k,), in the order of the scene: side, came as in `flexmb.integrate.watch.Watch`, side of one on time 1
+    where it has happened; passed 1 where it happened before its instant, within a leap, and is not watched up to the
+    time `until` (s).
+
+    anew: whether the integration begins anew, as it does after an event. ended (s): where the run ended; events before
+    that are in its trajectory, and so many of those at that time as `shown` says. given: the scene whose coordinates
+    come back where they are released, as changes alone have left it.
+    """
+
+    side: Index
+    came: Index
+    passed: Index
+    until: float
+    anew: bool
+    ended: float
+    shown: int
+    given: Scene
+
+
+NAMES = tuple(_KEY + name for name in EventMemory._fields)
+"""Of its arrays in a file."""
+
+
+def written(memory: EventMemory | None) -> dict[str, Any]:
+    """Arrays for a file."""
+    if memory is None:
+        return {}
+    given = np.frombuffer(msgspec.json.encode(memory.given), np.uint8)
+    return dict(zip(NAMES, memory._replace(anew=int(memory.anew), given=given), strict=True))  # type: ignore[arg-type]
+
+
+def read(file: Mapping[str, Any]) -> EventMemory:
+    """What a file says, to be examined; KeyError for what it lacks, ValueError for what is nothing of the kind."""
+    side, came, passed, *numbers, given = (file[name] for name in NAMES)
+    until, anew, ended, shown = (each.item() for each in numbers)
+    if anew not in (0, 1):
+        raise ValueError(f"{_KEY}anew is {anew:g}, and is 0 or 1")
+    scene = msgspec.json.decode(given.tobytes(), type=Scene)
+    return EventMemory(side, came, passed, until, bool(anew), ended, shown, scene)
+
+
+def examined(memory: EventMemory, scene: Scene) -> EventMemory:
+    """A copy that runs of this scene may have left; ValueError or TypeError where none has."""
+    events, rows = len(scene.events), dict[str, Index]()
+    for name, known in (("side", SIDES), ("came", CAMES), ("passed", (0, 1))):
+        row = arguments.shaped(name, getattr(memory, name), (events,))
+        if not np.all(np.isin(row, known)):
+            raise ValueError(f"{name} of the events is {row}, and each is one of {known}")
+        rows[name] = row.astype(np.int64)
+    ended, shown = arguments.number("ended", memory.ended), arguments.number("shown", memory.shown)
+    if not isinstance(memory.until, float) or math.isnan(memory.until):
+        raise ValueError(f"until is {memory.until!r}, and is a time, or -inf")
+    if not isinstance(memory.anew, bool) or not isinstance(memory.given, Scene):
+        raise TypeError("anew is True or False, given a scene")
+    if not 0.0 <= shown <= MOST or shown != int(shown):
+        raise ValueError(f"shown is {shown:g}, and counts events")
+    if not _alike(msgspec.to_builtins(memory.given), msgspec.to_builtins(scene)):
+        raise ValueError("what changes have left of the scene differs from the scene in more than numbers")
+    return EventMemory(**rows, until=memory.until, anew=memory.anew, ended=ended, shown=int(shown), given=memory.given)
+
+
+def _alike(one: Any, other: Any) -> bool:
+    """Whether two scenes as plain data differ in nothing but finite numbers, which events may have changed."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        return one.keys() == other.keys() and all(_alike(value, other[key]) for key, value in one.items())
+    if isinstance(one, list | tuple) and isinstance(other, list | tuple):
+        return len(one) == len(other) and all(map(_alike, one, other))
+    if isinstance(one, float) and isinstance(other, float):
+        return math.isfinite(one)
+    return bool(one == other)
