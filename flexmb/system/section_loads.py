@@ -8,7 +8,8 @@ converge slowly, if at all: no clamped eigenmode has a shear force at its tip.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -24,6 +25,7 @@ from flexmb.system.frames import Pose, body_pose, closure_frames_of, hinge_frame
 from flexmb.system.turning_points import turning
 from flexmb.tables import arguments
 from flexmb.tables.arrays import NODE_AXES, TORQUE, Workspace
+from flexmb.tables.state import finite_result
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -83,6 +85,16 @@ class SectionLoads:
         return arguments.number("G", G) * arguments.number("r", r) * self.torsion / self.GJ
 
 
+class AllLoads(NamedTuple):
+    """What is exerted on the bodies of a system at one state. Where the motion does not determine all of it, `changes`:
+    other loads (6,) of hinges and closures that go with the same motion, less those in `exerted`, by name; changes of
+    `rounding` or less are none."""
+
+    exerted: Evaluation
+    changes: Sequence[dict[str, Real]] = ()
+    rounding: float = 0.0
+
+
 class _Outer(NamedTuple):
     """What acts on the part beyond some of the cuts besides inertia: on the parts beyond the first `beyond` cuts."""
 
@@ -106,17 +118,30 @@ class SectionBalance:
         self.sections = beam_sections(self._beam, self._cuts)
 
     def at(self, t: float, y: Real) -> Real:
-        """Loads (X,6) as `SectionLoads` has them at y = [q, u, work]."""
+        """Loads (X,6) as `SectionLoads` has them at y = [q, u, work], NaN what the motion does not determine.
+
+        DynamicsError where a number is not finite.
+        """
         system, k = self._system, self._k
-        found = system._all_loads(t, y)
+        exerted, changes, rounding = system._all_loads(t, y)
         w = system._w
         pose = body_pose(system, w, k)
         m = system._links[k].mode_count
         eta, etad, etadd = w.eta[k, :m], w.etad[k, :m], w.etadd[k, :m]
-        needed = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
-        for outer in self._outer(w, pose, found):
-            needed[: outer.beyond] -= outer.wrench
-        return self._in_sections(needed, eta)[self._places]
+        inertial = self._inertial(_motion_in(pose, link_pose(w, k), w, k), eta, etad, etadd)
+
+        def transmitted(exerted: Evaluation) -> Real:
+            needed = inertial.copy()
+            for outer in self._outer(w, pose, exerted):
+                needed[: outer.beyond] -= outer.wrench
+            return self._in_sections(needed, eta)[self._places]
+
+        found = finite_result(transmitted(exerted), t)
+        is_open = np.zeros(found.shape, bool)
+        for change in changes:
+            other = {name: load + change[name] for name, load in exerted.loads.items()}
+            is_open |= np.abs(transmitted(replace(exerted, loads=other)) - found) > rounding
+        return np.where(is_open, np.nan, found)
 
     def loads(self, values: Real) -> SectionLoads:
         """Loads (...,X,6) with what belongs to them."""

@@ -34,7 +34,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
-from flexmb.system.section_loads import SectionBalance, SectionLoads
+from flexmb.system.section_loads import AllLoads, SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.state import State, finite_result
@@ -315,13 +315,13 @@ class System(Mechanics):
         """
         t, y = self.layout.entering(state)
         balance = SectionBalance(self, body, x)
-        return balance.loads(finite_result(balance.at(t, y), t))
+        return balance.loads(balance.at(t, y))
 
-    def _all_loads(self, t: float, y: Real) -> Evaluation:
-        """With loads of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
+    def _all_loads(self, t: float, y: Real) -> AllLoads:
+        """Of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
         found = self._evaluate(t, y, "articulated")
         self._inverse(t, y, found.accelerations)
-        return found
+        return AllLoads(found)
 
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.
