@@ -258,6 +258,17 @@ class Closures:
         dynamics.move(t, y, x, dynamics.SPEEDS, self._chain)
         return y
 
+    def moving(self, t: float, y: Real) -> Real:
+        """(nu,nu) how speeds change with every x of `pushed`, at the state y that was linearised last."""
+        c = self.constants[0]
+        still, found = y.copy(), np.empty((len(c.speed), len(c.speed)))
+        place = slice(len(y) - 1 - len(c.speed), len(y) - 1)
+        still[place] = 0.0
+        for j, x in enumerate(np.eye(len(c.speed))):
+            found[:, j] = self.pushed(t, still, x)[place]
+        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, self._chain)
+        return found
+
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
         """Distance and (sine of the) angle by which every closure is open."""
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
+from flexmb.closure.asked import NOTHING_ASKED, Asked
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
 from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread
@@ -22,13 +24,15 @@ from flexmb.closure.tables import Closed
 from flexmb.entry import articulated
 from flexmb.integrate.problem import Leaping, Linear
 from flexmb.scene import schema as s
+from flexmb.scene.problems import SceneWarning
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.asking import asked, everything
 from flexmb.system.evaluator import Evaluator
 from flexmb.system.load_axes import Axes
 from flexmb.system.observables import Evaluation
 from flexmb.system.section_loads import AllLoads
-from flexmb.system.tree_system import System
+from flexmb.system.tree_system import Given, System
 from flexmb.tables import arguments
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
@@ -70,10 +74,13 @@ class ClosedSystem(System):
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
 
         Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates
-        first, then speeds. Prescribed ones are their functions'.
+        first, then speeds. Prescribed ones are their functions'. What the scene gives is kept to the last digit where
+        the rest can follow (see `flexmb.scene.hinges.AngularCoordinate`); else it warns (`SceneWarning`) from what to
+        what, and ClosureError where it is marked as given.
         """
         if self._start is None:
-            y = consistent(self.closures, 0.0, pack(super().initial_state))
+            y = pack(super().initial_state)
+            y = self._as_asked(0.0, y, asked(self, y))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 
@@ -98,7 +105,21 @@ class ClosedSystem(System):
     def _is_prescribed(self) -> NDArray[np.bool_]:
         return self.constants.speed["prescribed"] >= 0
 
-    def _admissible(self, t: float, y: Real) -> State:
+    def _as_asked(self, t: float, y: Real, wish: Asked) -> Real:
+        """y = [q, u, work] with closed closures; warns of what it does not keep."""
+        found = consistent(self.closures, t, y, wish)
+        broken = wish.broken(y, found)
+        if broken:
+            warnings.warn(
+                f'scene "{self.scene.name}": closures do not allow these values together, and the nearest that they allow '
+                f"are taken: {broken}. Correct them, leave out what follows from the others (zero), or mark by given = "
+                "true what is to be kept",
+                SceneWarning,
+                stacklevel=4,
+            )
+        return found
+
+    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
         """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
         rough = super()._admissible(t, y).y
         self.closures.linearise(t, rough)
@@ -108,8 +129,19 @@ class ClosedSystem(System):
                 f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
                 "it at least roughly, or leave those out that the closures determine"
             )
-        y = consistent(self.closures, t, rough)
-        return self.layout.known(t, y)
+        return self.layout.known(t, self._as_asked(t, rough, self._wish(rough, given)))
+
+    def _wish(self, y: Real, given: Given) -> Asked:
+        if isinstance(given, np.ndarray):
+            return asked(self, y, given)
+        match given:
+            case "guess":
+                return NOTHING_ASKED
+            case "scene":
+                return asked(self, y)
+            case "state":
+                return everything(self)
+        assert_never(given)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.

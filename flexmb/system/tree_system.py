@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb.building.assemble import assemble
 from flexmb.building.connector_arrays import between_nodes
@@ -45,6 +46,9 @@ if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.system.batch import Batch, BatchAccelerations
+
+Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
+"""What of values of a state is asked for: nothing, what a scene gives, all of it, or (nq+nu+1,) those that are named."""
 
 _NO_CLOSURES = np.zeros((0, 6))
 
@@ -126,10 +130,11 @@ class System(Mechanics):
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         return self.layout.known(0.0, self._at_start.copy())
 
-    def _admissible(self, t: float, y: Real) -> State:
+    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
         """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
 
-        Of closed chains the nearest one that closes all closures; ClosureError where that is far.
+        Of closed chains the nearest one that closes all closures; ClosureError where that is far. It keeps what is
+        given where it can, and warns where not.
         """
         y = np.r_[y[:-1], 0.0]
         self.project(t, y, self.constants)
