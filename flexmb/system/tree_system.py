@@ -316,7 +316,8 @@ class System(Mechanics):
 
         By the momentum balance of the part beyond each section, not by the modes' curvature. A body of level `linear`
         is taken as `full`; at level `stiffened` the balance differs from the dynamics in the fourth order of the
-        deformation. ValueError for anything but a beam, and positions off it.
+        deformation. Warns (`SceneWarning`) where the mass is lumped, which steps at nodes. NaN what redundant closures
+        leave open. ValueError for anything but a beam, and positions off it.
         """
         t, y = self.layout.entering(state)
         balance = SectionBalance(self, body, x)

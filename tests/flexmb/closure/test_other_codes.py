@@ -140,7 +140,7 @@ def bound(scene: s.Scene, markers: dict[str, MarkerMotion]) -> float:
 
 
 def largest(arrays: Iterable[np.ndarray]) -> float:
-    return max(float(np.max(np.abs(array))) for array in arrays)
+    return max(float(np.nanmax(np.abs(array))) for array in arrays)
 
 
 LOOPS = {
