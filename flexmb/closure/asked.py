@@ -36,7 +36,8 @@ class Wishes(NamedTuple):
 
 
 class Asked(NamedTuple):
-    """modes: numbers of their speeds; prescribed: of those that move by themselves. names: of all places in [q, u].
+    """modes: all of them, as values; prescribed: numbers of speeds that move by themselves. names: of all places in
+    [q, u].
 
     is_marked: what is insisted on is so in the scene, and not to keep it is an error.
     """
@@ -44,15 +45,16 @@ class Asked(NamedTuple):
     coordinates: Wishes
     speeds: Wishes
     coordinate_count: int
-    modes: tuple[int, ...]
+    modes: tuple[Value, ...]
     prescribed: frozenset[int]
     names: tuple[str, ...]
     is_marked: bool
 
     def hold(self, values: tuple[Value, ...], *, modes: bool) -> Hold:
         """Of these values, with all modes too if these are not to move."""
+        values = (*values, *self.modes) if modes else values
         places = [place for value, _ in values for place in value]
-        fixed = {speed for _, speeds in values for speed in speeds} | (set(self.modes) if modes else set())
+        fixed = {speed for _, speeds in values for speed in speeds}
         return Hold(
             np.array([place for place in places if place < self.coordinate_count], np.int64),
             np.array([place for place in places if place >= self.coordinate_count], np.int64),

@@ -42,14 +42,14 @@ def consistent(closures: Closures, t: float, y: Real, asked: Asked = NOTHING_ASK
 
 
 Closing = Callable[[Closures, float, Real, Hold], Real]
-Opening = Callable[[Closures, float, Real], float]
+Opening = Callable[[Closures, float, Real, Real], float]
 
 
 def _as_asked(
     closures: Closures, t: float, y: Real, wishes: Wishes, asked: Asked, closing: Closing, opening: Opening
 ) -> Real:
-    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far y is from closed."""
-    if opening(closures, t, y) <= CLOSED:
+    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far y is from closed, beside another."""
+    if opening(closures, t, y, y) <= CLOSED:
         return y
     for wish in dict.fromkeys((wishes.given, wishes.insisted)):
         for hold in _holds(closures, t, y, wish, asked, closing) if wish else ():
@@ -57,7 +57,7 @@ def _as_asked(
                 kept = closing(closures, t, y, hold)
             except ClosureError:
                 continue
-            if opening(closures, t, kept) <= NEARLY_CLOSED and not any(turned for _, turned in closures.half_turned()):
+            if opening(closures, t, kept, y) <= NEARLY_CLOSED and not any(turned for _, turned in closures.half_turned()):
                 return kept
     nearest = closing(closures, t, y, NO_HOLD)
     if wishes.insisted and asked.is_marked:
@@ -119,6 +119,7 @@ def _moving(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
     start = y
     closures.linearise_stiff(t, y)
     rates, largest = closures.rates()
+    taken = _largest(rates)
     for _ in range(3):
         if largest <= CLOSED:
             break
@@ -126,7 +127,7 @@ def _moving(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
         y = closures.pushed(t, y, -found.damped(rates, 0.0))
         y[hold.speeds] = start[hold.speeds]
         rates, largest = closures.rates()
-    if not largest <= MOVING_APART:
+    if not (largest <= MOVING_APART or _largest(rates) <= NEARLY_CLOSED * taken):  # the latter where it is at rest
         where = closures.worst(rates, rates=True)
         raise ClosureError(
             f"{where}: no speeds keep it closed; the nearest leave this. Prescribed motions ask for what the closures "
@@ -229,13 +230,17 @@ def _all_errors(closures: Closures, t: float, y: Real) -> Real:
     return closures.errors()
 
 
-def _errors(closures: Closures, t: float, y: Real) -> float:
+def _errors(closures: Closures, t: float, y: Real, _: Real) -> float:
     return _largest(_all_errors(closures, t, y))
 
 
-def _rates(closures: Closures, t: float, y: Real) -> float:
+def _rates(closures: Closures, t: float, y: Real, before: Real) -> float:
+    """Beside the speeds now, or at rest, where rounding is all of these, beside what was taken away."""
+    closures.linearise_stiff(t, before)
+    taken = _largest(closures.rates()[0])
     closures.linearise_stiff(t, y)
-    return closures.rates()[1]
+    rates, largest = closures.rates()
+    return min(largest, _largest(rates) / taken) if taken > 0.0 else largest
 
 
 def _largest(errors: Real) -> float:

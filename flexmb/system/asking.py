@@ -43,8 +43,8 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
 
     names = tuple(name for names in system.state_names for name, _ in names)
     return Asked(
-        wishes(coordinates), wishes(speeds), system.nq, tuple(np.flatnonzero(system._is_modal).tolist()), prescribed,
-        names, is_marked=named is None,
+        wishes(coordinates), wishes(speeds), system.nq, tuple(_modes(system)), prescribed, names,
+        is_marked=named is None,
     )  # fmt: skip
 
 
@@ -70,6 +70,12 @@ def _items(system: System) -> Iterator[_Item]:
         yield _Item(_all(system.coordinate(modes)), _all(system.speed(modes)))
     for wheel in system.scene.wheels:
         yield _Item(_all(system.coordinate(wheel.name)), _all(system.speed(wheel.name)))
+
+
+def _modes(system: System) -> Iterator[Value]:
+    for link in system._links:
+        q, u = (_all(place(f"{link.name}.modes")) for place in (system.coordinate, system.speed))
+        yield (*q, *(system.nq + j for j in u)), u
 
 
 def _of_hinge(link: BodyLink, q: int, u: int) -> Iterator[_Item]:
