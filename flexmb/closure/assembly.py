@@ -48,7 +48,8 @@ Opening = Callable[[Closures, float, Real, Real], float]
 def _as_asked(
     closures: Closures, t: float, y: Real, wishes: Wishes, asked: Asked, closing: Closing, opening: Opening
 ) -> Real:
-    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far y is from closed, beside another."""
+    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far one y is from closed, beside
+    another."""
     if opening(closures, t, y, y) <= CLOSED:
         return y
     for wish in dict.fromkeys((wishes.given, wishes.insisted)):
@@ -57,7 +58,8 @@ def _as_asked(
                 kept = closing(closures, t, y, hold)
             except ClosureError:
                 continue
-            if opening(closures, t, kept, y) <= NEARLY_CLOSED and not any(turned for _, turned in closures.half_turned()):
+            turned = any(turned for _, turned in closures.half_turned())
+            if opening(closures, t, kept, y) <= NEARLY_CLOSED and not turned:
                 return kept
     nearest = closing(closures, t, y, NO_HOLD)
     if wishes.insisted and asked.is_marked:

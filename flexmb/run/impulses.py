@@ -4,8 +4,8 @@ With A = [E; J], E picking these speeds, J u the rates of closures' rows, M = F 
 
     M (u+ - u-) = A' p,    A u+ = [given; 0],
 
-and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x. Impulses that the
-motion does not determine, of redundant rows and what is held beside them, are NaN.
+and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x. Impulses that
+the motion does not determine, of redundant rows and what is held beside them, are NaN.
 """
 
 from __future__ import annotations

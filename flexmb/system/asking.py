@@ -38,7 +38,9 @@ def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> As
     def wishes(values: list[tuple[Value, _Item]]) -> Wishes:
         free = [(value, item) for value, item in values if value[0] and not prescribed.issuperset(value[1])]
         insisted = [value for value, item in free if (item.marked if named is None else np.any(known[list(value[0])]))]
-        given = [value for value, item in free if value in insisted or item.marked or _is_given(y, value, item, system.nq)]
+        given = [
+            value for value, item in free if value in insisted or item.marked or _is_given(y, value, item, system.nq)
+        ]
         return Wishes(tuple(given), tuple(insisted))
 
     names = tuple(name for names in system.state_names for name, _ in names)

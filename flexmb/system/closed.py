@@ -111,9 +111,9 @@ class ClosedSystem(System):
         broken = wish.broken(y, found)
         if broken:
             warnings.warn(
-                f'scene "{self.scene.name}": closures do not allow these values together, and the nearest that they allow '
-                f"are taken: {broken}. Correct them, leave out what follows from the others (zero), or mark by given = "
-                "true what is to be kept",
+                f'scene "{self.scene.name}": closures do not allow these values together, and the nearest that they '
+                f"allow are taken: {broken}. Correct them, leave out what follows from the others (zero), or mark by "
+                "given = true what is to be kept",
                 SceneWarning,
                 stacklevel=4,
             )
@@ -206,9 +206,10 @@ class ClosedSystem(System):
             found[name] = np.where(motion.spread.leaves_open(np.array([each[name] for each in changes])), np.nan, load)
         return found
 
-    def _by_load(self, hinges: Real, closures: Real) -> dict[str, Real]:
-        """Loads (N,6) and (C,6) by the names of hinges and closures."""
-        return self._by_hinge(hinges) | {each.name: load for each, load in zip(self.scene.closures, closures, strict=True)}
+    def _by_load(self, hinges: NDArray[Any], closures: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """What hinges (N,6) and closures (C,6) have, by their names."""
+        names = [closure.name for closure in self.scene.closures]
+        return self._by_hinge(hinges) | dict(zip(names, closures, strict=True))
 
     def _changes(self, spread: Spread) -> list[dict[str, Real]]:
         """By null load, how loads change by name (6,), World axes."""
@@ -264,8 +265,13 @@ class ClosedSystem(System):
         articulated.rhs(t, y, slope, self.constants, self.workspace())
         sides = [self.closures.beside(t, y, slope[: self.nq], side) for side in (-1, 1)]
         before, after = (self._motion(*each, algorithm) for each in sides)
-        means = (0.5 * (one + other) for one, other in zip(before[:-1], after[:-1], strict=True))
-        return ClosedMotion(*means, spread=_of_both(before.spread, after.spread))
+        return ClosedMotion(
+            0.5 * (before.accelerations + after.accelerations),
+            0.5 * (before.drives + after.drives),
+            0.5 * (before.hinges + after.hinges),
+            0.5 * (before.closures + after.closures),
+            _of_both(before.spread, after.spread),
+        )
 
     def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> None:
         """Fills the outputs, all but the loads of closures."""
@@ -361,5 +367,9 @@ def _of_both(one: Spread | None, other: Spread | None) -> Spread | None:
     """What either leaves open."""
     if one is None or other is None:
         return one or other
-    parts = (np.concatenate(each) for each in zip(one[:-1], other[:-1], strict=True))
-    return Spread(*parts, rounding=max(one.rounding, other.rounding))
+    return Spread(
+        np.concatenate([one.drives, other.drives]),
+        np.concatenate([one.hinges, other.hinges]),
+        np.concatenate([one.closures, other.closures]),
+        max(one.rounding, other.rounding),
+    )

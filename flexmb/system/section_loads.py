@@ -268,9 +268,9 @@ def _lumped(beam: BeamBody) -> str:
     n = beam.elements
     return (
         f'beam "{beam.name}" has its mass lumped at the nodes of {n} elements: at every node the section loads step by '
-        f"what an element needs, so that forces are off by up to half of it, {50.0 / n:.2g} % of that at the root under "
-        f"an even load, and moments by {25.0 / n**2:.2g} %; they are right half-way between nodes, and everywhere with "
-        'mass = "consistent"'
+        f"what an element needs, so that forces are off by up to half of it, {50.0 / n:.2g} % of that at the root "
+        f"under an even load, and moments by {25.0 / n**2:.2g} %; they are right half-way between nodes, and "
+        'everywhere with mass = "consistent"'
     )
 
 

@@ -48,7 +48,7 @@ if TYPE_CHECKING:
     from flexmb.system.batch import Batch, BatchAccelerations
 
 Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
-"""What of values of a state is asked for: nothing, what a scene gives, all of it, or (nq+nu+1,) those that are named."""
+"""What of a state is asked for: nothing, what a scene gives, all of it, or the values (nq+nu+1,) that are named."""
 
 _NO_CLOSURES = np.zeros((0, 6))
 

@@ -145,9 +145,9 @@ def _peak(place: Place, law: Mapping[str, float]) -> Iterator[Doubt]:
     if peak < (1.0 - LOST) * static:
         most = LOST * stribeck / sqrt(2.0 * (1.0 - sliding / static))
         what = (
-            f"smoothed by {law['smoothing']:g} beside a Stribeck speed of {stribeck:g}, friction rises to {peak:.4g} at "
-            f"most (at {at:.3g}), {peak / static:.1%} of the static {static:g}: a load between them, which would be held, "
-            "does not creep but runs away"
+            f"smoothed by {law['smoothing']:g} beside a Stribeck speed of {stribeck:g}, friction rises to {peak:.4g} "
+            f"at most (at {at:.3g}), {peak / static:.1%} of the static {static:g}: a load between them, which would be "
+            "held, does not creep but runs away"
         )
         remedy = f"take a smoothing of {most:.2g} at most, which comes within {LOST:.0%} of it"
         yield Doubt(str(place), what, remedy, "friction_peak")

@@ -1,5 +1,5 @@
-"""Loads of closed chains where several sets go with the same motion: the least, which are NaN in what is given to users,
-for tests that balance them."""
+"""The least loads of closed chains where several sets go with the same motion, and users see NaN: for tests that
+balance them."""
 
 from __future__ import annotations
 
