@@ -153,9 +153,9 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     Frame A is the node frame of `body_a` ("ground" too) displaced by `position_a_m`, `quaternion_a` (fixed offsets in
     node axes), frame B likewise on `body_b`. The closure lets B move relative to A as the hinge of that `type` lets its
     outboard frame move relative to its inboard one; `axis` has the same components in both frames. Initial coordinates
-    need to fit only roughly: a near state that closes all loops is found, with what is `given` (see AngularCoordinate).
-    Its load is an output: on `body_b`, about B. A gimbal of two axes is a universal closure between turned frames, one of
-    three a spherical one.
+    need to fit only roughly: a near state that closes all loops is found, that keeps what is given (see
+    AngularCoordinate). Its load is an output: on `body_b`, about B. A gimbal of two axes is a universal closure between
+    turned frames, one of three a spherical one.
     """
 
     name: str
