@@ -71,15 +71,15 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
         return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, {})
     others = np.linalg.svd(half / size)[2][rank:] / size  # impulses that change no speed
     wrenches = np.array([rows.wrenches(each[len(places) :]) for each in others]).reshape(len(others), -1, 6)
-    closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches)
-    held = _determined(held, others[:, : len(places)])
+    rounding = SAME * float(np.max(np.abs(others), initial=0.0))
+    closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches, rounding)
+    held = _determined(held, others[:, : len(places)], rounding)
     return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, _by_name(system, closures))
 
 
-def _determined(values: Real, others: Real) -> Real:
-    """NaN where one of several other sets (k,...) of impulses, which go with the same motion, would change a value."""
-    moved = np.max(np.abs(others), axis=0, initial=0.0)
-    return np.where(moved > SAME * np.max(moved, initial=0.0), np.nan, values)
+def _determined(values: Real, others: Real, rounding: float) -> Real:
+    """NaN where one of several sets (k,...) of impulses that change no motion would change a value."""
+    return np.where(np.max(np.abs(others), axis=0, initial=0.0) > rounding, np.nan, values)
 
 
 def _rows(system: System, state: State) -> RowMotion:
