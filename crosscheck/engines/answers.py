@@ -34,6 +34,7 @@ RUNGS = 3
 LATER = ("connectors", "controllers", "events")
 """Collections of a scene that came after the first contract: an engine says in `takes` that it knows them."""
 NO_START = "begins all runs at t = 0"
+LOAD_PARTS = {"torque": slice(0, 3), "force": slice(3, 6)}
 LONGEST_TEXT = 4000
 LARGEST_COUNT = 2**63 - 1  # what a record can hold
 UNIT = 8 * float(np.finfo(np.float32).eps)
@@ -131,6 +132,7 @@ def checked_run(found: Any, times: Real, scene: Scene) -> Trajectory:
         **{name: _output(getattr(found, name), name, count, known.get(name)) for name in OUTPUTS},
         wall_s=_number(found.wall_s, "wall_s"),
         evaluations=_count(found.evaluations),
+        undetermined=_undetermined(found),
     )
     good = _finite_samples(run, finished)
     run = run if good == count else first_samples(run, good)
@@ -223,6 +225,25 @@ def _finite_samples(run: Trajectory, finished: bool) -> int:
     return count
 
 
+def _undetermined(found: Trajectory) -> tuple[str, ...]:
+    """Names of channels of loads and drives that there are."""
+    _instance(found.undetermined, tuple, "undetermined")
+    there = {f"load:{name}.{part}" for name in found.loads for part in LOAD_PARTS}
+    there |= {f"drive:{name}" for name in found.drives}
+    for each in found.undetermined:
+        right = isinstance(each, str) and each in there
+        _require(right, f"undetermined has {each!r:.80}: it names channels of loads and drives that the run has")
+    return tuple(sorted(set(found.undetermined)))
+
+
+def _determined(run: Trajectory, output: str, name: str, values: Real) -> Real:
+    """The columns of a load or drive that the motion determines."""
+    if output == "loads":
+        known = [part for key, part in LOAD_PARTS.items() if f"load:{name}.{key}" not in run.undetermined]
+        return np.hstack([values[:, :0], *(values[:, part] for part in known)])
+    return values[:, :0] if output == "drives" and f"drive:{name}" in run.undetermined else values
+
+
 def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
     for name, path in run.markers.items():
         for part in fields(path):
@@ -230,7 +251,8 @@ def _signals(run: Trajectory) -> Iterator[tuple[str, Real]]:
     for output in OUTPUTS:
         found = getattr(run, output)
         if isinstance(found, dict):
-            yield from ((f"{output}[{name!r}]", values) for name, values in found.items())
+            for name, values in found.items():
+                yield f"{output}[{name!r}]", _determined(run, output, name, values)
         elif found is not None:
             yield output, found
 

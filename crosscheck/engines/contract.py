@@ -120,7 +120,9 @@ class Trajectory:
     does not offer.
     `loads`, `wheel_loads`, `connectors` (T,6); `drives` (T,n); `hinge_forces` (T,1); `energy` of each kind (T,);
     `momentum` (T,6); `work` (T,) is the work done so far by drives, motors, dampers, friction, actuators and loads,
-    where the engine integrates it. `wall_s` times only the solve.
+    where the engine integrates it. `wall_s` times only the solve. `undetermined`: channels, "load:<name>.torque",
+    "load:<name>.force" or "drive:<name>", that the motion leaves open where closures suppress what others suppress
+    already; they may hold NaN, and nobody is compared in them.
     """
 
     status: Status
@@ -137,6 +139,7 @@ class Trajectory:
     work: Real | None = _single()
     wall_s: float = 0.0
     evaluations: int = 0
+    undetermined: tuple[str, ...] = ()
 
 
 OUTPUTS: dict[str, tuple[int | None, ...]] = {

@@ -11,10 +11,12 @@ scenes: a curve of their own in a work-precision chart.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from importlib.metadata import PackageNotFoundError, version
 
 import numpy as np
 
+from crosscheck.engines.answers import LOAD_PARTS
 from crosscheck.engines.contract import (
     OUTPUTS,
     Effort,
@@ -220,8 +222,20 @@ class NativeModel:
             **{name: getattr(done, name) for name in OUTPUTS},
             wall_s=done.statistics.run_s,
             evaluations=done.statistics.evaluations,
+            undetermined=tuple(_undetermined(done)),
         )
         return first_samples(found, int(np.isin(done.t, run.times).sum()))  # events that chatter end a run in between
+
+
+def _undetermined(done: NativeTrajectory) -> Iterator[str]:
+    """Channels with a component that the motion leaves open."""
+    for name, is_open in done.undetermined.items():
+        if name.endswith(".drive") and name not in done.loads:
+            yield f"drive:{name.removesuffix('.drive')}"
+            continue
+        for part, place in LOAD_PARTS.items():
+            if np.any(is_open[place]):
+                yield f"load:{name}.{part}"
 
 
 def _approximation(scene: Scene, algorithm: Algorithm) -> str:

@@ -17,7 +17,7 @@ from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.sizes import Sizes
 from crosscheck.judging.uncertainty import Uncertainty
-from crosscheck.judging.verdict import Finding, Signal, Verdict, compare
+from crosscheck.judging.verdict import Finding, Signal, Verdict, compare, not_determined
 from crosscheck.library.case import ComparisonSide
 from crosscheck.library.patterns import most_specific
 from crosscheck.library.reference import StoredReference
@@ -110,6 +110,8 @@ def hold(
             scale = asked.scales[scaled] if scaled is not None else None
             own = at_samples(result.control_signal(channel, like or result, across=False), places)
             yield channel, goal, compare(channel, own, reference.signal(channel), goal, scale)
+        elif channel in result.undetermined:
+            yield channel, goal, not_determined(result.engine)
         elif not channel.startswith("energy."):
             yield channel, goal, Finding("refused", f"{result.engine} does not offer {channel}")
 

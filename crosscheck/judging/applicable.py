@@ -1,5 +1,7 @@
 """What engines that have joined a case cannot represent of it: *not applicable*, which is no verdict.
 
+Nor is there a verdict on what the motion itself leaves open, whoever gives numbers for it: loads of redundant closures.
+
 A case expects something only of the engines that it names. One that it names nowhere has joined by `--engine`; that it
 refuses the scene, or does not offer a channel, is no finding about it, and is listed with its own reason. It stays a
 verdict where somebody expected more: of an engine that the case names, or for which it has accepted figures.
@@ -10,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 
+from crosscheck.judging.against_reference import REFERENCE
 from crosscheck.judging.results import CaseResults, Result
 from crosscheck.judging.verdict import Verdict
 
@@ -37,6 +40,12 @@ def set_apart(case: CaseResults, verdicts: Iterable[Verdict]) -> tuple[list[Verd
     found = {_inapplicable(case, result, ""): None for result in refused}
     counting: list[Verdict] = []
     for verdict in verdicts:
+        open_ = case.undetermined(verdict.variant_a, verdict.variant_b)
+        if verdict.status == "refused" and verdict.channel in open_:
+            for variant, engine in dict.fromkeys(verdict.sides):
+                apart = Inapplicable(case.case.case, variant, engine, verdict.channel, verdict.reason)
+                found |= {apart: None} if engine != REFERENCE else {}
+            continue
         refusing = _refusing(case, verdict)
         if verdict.ok or not refusing or any(result.engine not in joined for result in refusing):
             counting.append(verdict)

@@ -10,7 +10,7 @@ from crosscheck.judging.against_reference import judge_reference
 from crosscheck.judging.expectation import outside
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
-from crosscheck.judging.verdict import GRAVITY, Finding, Verdict, compare, conserve
+from crosscheck.judging.verdict import GRAVITY, Finding, Verdict, compare, conserve, not_determined
 from crosscheck.library.accepted import key
 from crosscheck.library.case import Comparison, ComparisonSide, Conservation, Control
 from crosscheck.library.channels import CONSERVED
@@ -39,7 +39,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
     question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason)
     a, b = (case.get(side.variant, side.engine) for side in item.sides)
     across = question.a.variant != question.b.variant
-    for channel, goal, finding in _channels(item.goals, a, b):
+    for channel, goal, finding in _channels(item.goals, a, b, case):
         if finding is None:
             scale = _scale(item.scales, channel)
             finding = compare(channel, a.signal(channel, across), b.signal(channel, across), goal, scale)
@@ -47,7 +47,7 @@ def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
         yield question.verdict(channel, goal, finding, beyond)
     if _missing(a, b) is None and _elsewhere(a, b) is None:
         patterns: dict[str, Iterable[str]] = {"scale": item.scales, "band": item.band}
-        for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(question, item, a, b)):
+        for pattern, finding in (*_unused(item.goals, patterns, a, b), *_vanished(question, item, a, b, case)):
             yield question.verdict(pattern, 0.0, finding, finding.reason)
 
 
@@ -55,7 +55,8 @@ def _unused(
     goals: Iterable[str], given: Mapping[str, Iterable[str]], a: Result, b: Result
 ) -> Iterator[tuple[str, Finding]]:
     """Scales and bands whose pattern names no channel that is judged: a misspelt one must not be ignored silently."""
-    judged = [name for name in _union(a.channels, b.channels) if most_specific(goals, name) is not None]
+    there = _union(_union(a.channels, b.channels), _union(a.undetermined, b.undetermined))
+    judged = [name for name in there if most_specific(goals, name) is not None]
     for what, patterns in given.items():
         for pattern in patterns if judged else ():
             if not any(matches(pattern, name) for name in judged):
@@ -63,9 +64,11 @@ def _unused(
                 yield pattern, Finding("unresolved", text)
 
 
-def _vanished(question: Question, item: Comparison, a: Result, b: Result) -> Iterator[tuple[str, Finding]]:
+def _vanished(
+    question: Question, item: Comparison, a: Result, b: Result, case: CaseResults
+) -> Iterator[tuple[str, Finding]]:
     """Channels with accepted figures that no engine offers any more, and energies that only one engine still offers."""
-    judged = {channel for channel, _, _ in _channels(item.goals, a, b)}
+    judged = {channel for channel, _, _ in _channels(item.goals, a, b, case)}
     for place in question.case.accepted.get(item.name, {}):
         channel = place.partition(" | ")[0]
         ours = place == key(channel, (a.engine, a.variant), (b.engine, b.variant))
@@ -81,7 +84,7 @@ def _control(case: CaseResults, item: Control) -> Iterator[Verdict]:
     faulty = case.get(item.a.variant, item.a.engine, f"control:{item.name}")
     twin, b = case.get(item.a.variant, item.a.engine), case.get(item.b.variant, item.b.engine)
     across = item.a.variant != item.b.variant
-    for channel, goal, finding in _channels(item.goals, faulty, b):
+    for channel, goal, finding in _channels(item.goals, faulty, b, case):
         if finding is None:
             finding = _absent(twin, channel)
         if finding is None:
@@ -129,18 +132,23 @@ def _energy_drift(result: Result) -> tuple[np.ndarray, float]:
     return drift - drift[:1], float(np.max(sizes, initial=0.0))
 
 
-def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[str, float, Finding | None]]:
+def _channels(
+    goals: dict[str, float], a: Result, b: Result, case: CaseResults
+) -> Iterator[tuple[str, float, Finding | None]]:
     """Every channel to judge, with its goal, and with the finding where there is nothing to compare.
 
     Where a result is missing, the pattern itself stands for its channels. A kind of energy that only one engine knows
-    is left out, any other channel that only one offers is a refusal of the other.
+    is left out, any other channel that only one offers is a refusal of the other. What the motion does not determine is
+    not compared, whatever engines offer.
     """
     missing = _missing(a, b) or _elsewhere(a, b)
+    undetermined = case.undetermined(a.variant, b.variant)
     for pattern, goal in goals.items():
         if missing is not None:
             yield pattern, goal, missing
             continue
-        offered = [name for name in _union(a.channels, b.channels) if _belongs(name, pattern, goals)]
+        there = _union(_union(a.channels, b.channels), undetermined)
+        offered = [name for name in there if _belongs(name, pattern, goals)]
         if pattern not in offered:
             shared = set(a.channels) & set(b.channels)
             offered = [name for name in offered if name in shared or not name.startswith("energy.")]
@@ -148,7 +156,10 @@ def _channels(goals: dict[str, float], a: Result, b: Result) -> Iterator[tuple[s
             text = f'neither {a.engine} nor {b.engine} has a channel "{pattern}"'
             yield pattern, goal, Finding("did not run", text)
         for name in offered:
-            yield name, goal, _absent(a, name) or _absent(b, name)
+            if name in undetermined:
+                yield name, goal, not_determined(undetermined[name])
+            else:
+                yield name, goal, _absent(a, name) or _absent(b, name)
 
 
 def _belongs(channel: str, pattern: str, goals: Iterable[str]) -> bool:

@@ -54,6 +54,11 @@ class Result:
         return tuple(self.finest.channels) if self.status == "finished" else ()
 
     @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Names of channels that the finest run says the motion leaves open."""
+        return self.finest.undetermined if self.status == "finished" else ()
+
+    @property
     def times(self) -> Real:
         """Sample times of the finest run (s)."""
         assert self.finest.times is not None
@@ -160,6 +165,12 @@ class CaseResults:
     def get(self, variant: str, engine: str, role: str = "main") -> Result:
         """A result; one that was never recorded "did not run"."""
         return self.results.get((variant, engine, role)) or _never_recorded(variant, engine)
+
+    def undetermined(self, *variants: str) -> dict[str, str]:
+        """Channels that the motion of some of these variants leaves open, and an engine that says so: what others give
+        there is one choice out of infinitely many."""
+        said = (result for (variant, _, _), result in self.results.items() if variant in variants)
+        return {channel: result.engine for result in said for channel in result.undetermined}
 
 
 @dataclass(frozen=True)

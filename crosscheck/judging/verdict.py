@@ -162,6 +162,12 @@ def compare(channel: str, a: Signal, b: Signal, goal: float, scale: float | None
     return Finding("agree", f"{apart:.2g} of the range apart, within the uncertainty {doubt:.2g}", apart, doubt, size)
 
 
+def not_determined(engine: str) -> Finding:
+    """A channel that the motion leaves open, by what an engine says: nobody is compared in it."""
+    what = "closures suppress what others suppress already, and infinitely many loads go with the same motion"
+    return Finding("refused", f"not determined, as {engine} says: {what}")
+
+
 def conserve(drift: Real, scale: float, limit: float) -> Finding:
     """Judge a conserved quantity: drift (T,) in SI relative to `scale` against `limit`, at its worst. Never raises."""
     if drift.size == 0 or not np.all(np.isfinite(drift)):

@@ -79,6 +79,7 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
 
     `status`: "finished"; "diverged", as the engine says; "failed" where the adapter raised or broke the contract;
     "crashed" where its process died; "did not finish" within its limits of time and memory; "refused"; "did not run".
+    `undetermined`: channels that the motion leaves open, of which nothing is kept.
     """
 
     case: str
@@ -102,6 +103,7 @@ class RunRecord(_OneRecord, frozen=True, kw_only=True, tag="run"):
     evaluations: int = 0
     times: Packed | None = None
     channels: dict[str, Packed] = {}
+    undetermined: tuple[str, ...] = ()
 
     @property
     def key(self) -> tuple[str, ...]:

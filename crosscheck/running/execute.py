@@ -23,11 +23,11 @@ from crosscheck.engines.answers import (
 )
 from crosscheck.engines.contract import Effort, Engine, EngineMissing, Model, Run, Trajectory
 from crosscheck.engines.registry import home
+from crosscheck.engines.trajectories import determined_channels
 from crosscheck.records.kinds import Confirmed, RunRecord
 from crosscheck.records.made_by import made_by
 from crosscheck.records.packing import pack
 from crosscheck.running.plan import Done, Job
-from flexmb.run.channels import channels_of
 from flexmb.scene.schema import Scene
 
 Emit = Callable[[RunRecord | Confirmed | str], None]
@@ -150,7 +150,7 @@ def _run(
                 again = _solved(model, job, scene, effort)
                 _require_the_same(run, again)
                 wall = min(wall, again.wall_s)
-        channels = channels_of(run) if len(run.times) else {}
+        channels = determined_channels(run) if len(run.times) else {}
     except KeyboardInterrupt:
         raise
     except BaseException as error:  # as in `execute`, but the other efforts may still work
@@ -163,6 +163,7 @@ def _run(
         evaluations=run.evaluations,
         times=pack(run.times) if len(run.times) else None,
         channels={name: pack(values) for name, values in channels.items() if kept is None or name in kept},
+        undetermined=run.undetermined,
     )
 
 
@@ -175,7 +176,7 @@ def _require_the_same(first: Trajectory, again: Trajectory) -> None:
     """A run that is repeated with the same effort must give the same, or its uncertainty means nothing."""
     if again.status != first.status:
         raise BrokenContract(f"not reproducible: the same effort finished once and {again.status} the next time")
-    others = channels_of(again)
-    for name, values in channels_of(first).items():
+    others = determined_channels(again)
+    for name, values in determined_channels(first).items():
         if name not in others or not np.array_equal(values, others[name]):
             raise BrokenContract(f"not reproducible: {name} is another when the same effort is run again")

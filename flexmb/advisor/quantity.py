@@ -80,6 +80,11 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[
     for quantity in wanted:
         named = [name for name in reference if matches(quantity.pattern, name)]
         for name in named:
+            if np.any(np.isnan(reference[name])):
+                raise ValueError(
+                    f"{name} is not determined by the motion: closures suppress what others suppress already, and "
+                    "infinitely many loads go with it; ask for another quantity, or let bodies bend"
+                )
             if quantity.scale is not None:
                 found[name] = quantity.scale
                 continue
@@ -95,10 +100,14 @@ def scales(wanted: tuple[Quantity, ...], reference: Mapping[str, Real]) -> dict[
 
 
 def error(a: Mapping[str, Real], b: Mapping[str, Real], scale: Mapping[str, float]) -> float:
-    """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter."""
+    """Largest distance of two runs over channels and times, relative to the scales; infinite if one is shorter, or
+    does not determine a load that the other does."""
     worst = 0.0
     for name, size in scale.items():
         if len(a[name]) != len(b[name]):
             return np.inf
-        worst = max(worst, float(np.max(distance(name, a[name], b[name]), initial=0.0)) / size)
+        apart = float(np.max(distance(name, a[name], b[name]), initial=0.0))
+        if np.isnan(apart):
+            return np.inf
+        worst = max(worst, apart / size)
     return worst

@@ -4,14 +4,19 @@ Coordinates by damped Gauss-Newton steps (Levenberg and Marquardt), then the spe
 of kinetic energy, with modes so much heavier, in proportion to their stiffness, that they only move where hinges cannot
 close the loop. Prescribed coordinates and speeds stay as they are. Rows are weighed with a length of the scene, and
 compared with the size of their closure.
+
+What a user has asked for is held where the rest can close the loops (`flexmb.closure.asked`): first everything given,
+modes at rest; modes may move where hinges alone would not do; then what is insisted on; then nothing.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from typing import NamedTuple
 
 import numpy as np
 
+from flexmb.closure.asked import NO_HOLD, NOTHING_ASKED, Asked, Hold, Value, Wishes
 from flexmb.closure.closures import ClosureError, Closures, GroupResponse
 from flexmb.closure.factor import DEPENDENT
 from flexmb.closure.projection import CLOSED, MOVING_APART, OPEN
@@ -19,28 +24,82 @@ from flexmb.tables.status import OK
 from flexmb.typing import Real
 
 STEPS = 200
+NEARLY_CLOSED = 2.0**-40  # of what is held: as closed as rounding leaves what few speeds have to close
 STRONGEST = 1e12  # damping beyond which no step makes the errors smaller
 
 
-def consistent(closures: Closures, t: float, y: Real) -> Real:
-    """y = [q, u, work] with closed closures, close to the one given; ClosureError where there is none."""
-    y = _closed(closures, t, y.copy())
+def consistent(closures: Closures, t: float, y: Real, asked: Asked = NOTHING_ASKED) -> Real:
+    """y = [q, u, work] with closed closures, close to the one given, that keeps what is asked for to the last digit.
+
+    Where that cannot be kept, the nearest one; ClosureError where there is none, or where what is insisted on in the
+    scene cannot be kept.
+    """
+    y = _as_asked(closures, t, y.copy(), asked.coordinates, asked, _closed, _errors)
     closures.linearise(t, y)
     closures.count_rows()
     _refuse_half_a_turn(closures)
-    return _moving(closures, t, y)
+    return _as_asked(closures, t, y, asked.speeds, asked, _moving, _rates)
 
 
-def _closed(closures: Closures, t: float, y: Real) -> Real:
-    errors, damping = _errors(closures, t, y), 1e-3
+Closing = Callable[[Closures, float, Real, Hold], Real]
+Opening = Callable[[Closures, float, Real, Real], float]
+
+
+def _as_asked(
+    closures: Closures, t: float, y: Real, wishes: Wishes, asked: Asked, closing: Closing, opening: Opening
+) -> Real:
+    """By `closing`, which takes a hold and may raise ClosureError; `opening`: how far one y is from closed, beside
+    another."""
+    if opening(closures, t, y, y) <= CLOSED:
+        return y
+    for wish in dict.fromkeys((wishes.given, wishes.insisted)):
+        for hold in _holds(closures, t, y, wish, asked, closing) if wish else ():
+            try:
+                kept = closing(closures, t, y, hold)
+            except ClosureError:
+                continue
+            turned = any(turned for _, turned in closures.half_turned())
+            if opening(closures, t, kept, y) <= NEARLY_CLOSED and not turned:
+                return kept
+    nearest = closing(closures, t, y, NO_HOLD)
+    if wishes.insisted and asked.is_marked:
+        names = ", ".join(f'"{asked.name(each)}"' for each in wishes.insisted)
+        raise ClosureError(
+            f"marked as given, but closures do not allow these values: {names}. Correct them, or leave out the mark of "
+            "one, which then follows from the others"
+        )
+    return nearest
+
+
+def _holds(
+    closures: Closures, t: float, y: Real, wish: tuple[Value, ...], asked: Asked, closing: Closing
+) -> Iterator[Hold]:
+    """Modes give way only where hinges alone do not close the loops, whatever is asked for."""
+    yield asked.hold(wish, modes=True)
+    if asked.modes and not _closes(closing, closures, t, y, asked.hold((), modes=True)):
+        yield asked.hold(wish, modes=False)
+
+
+def _closes(closing: Closing, closures: Closures, t: float, y: Real, hold: Hold) -> bool:
+    try:
+        closing(closures, t, y, hold)
+    except ClosureError:
+        return False
+    return True
+
+
+def _closed(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
+    start, y = y, y.copy()
+    errors, damping = _all_errors(closures, t, y), 1e-3
     for _ in range(STEPS):
         if _largest(errors) <= CLOSED or damping > STRONGEST:
             break
-        found = decomposed(closures)
+        found = decomposed(closures, t, y, hold)
         # the damping fades with the errors: convergence is quadratic, even where redundant rows become dependent
         fading = damping * min(1.0, float(np.linalg.norm(errors)))
         floor = fading * found.largest**2 + np.finfo(float).tiny
         trial = closures.moved(t, y, -found.damped(errors, floor))
+        trial[hold.coordinates] = start[hold.coordinates]
         smaller = np.linalg.norm(closures.errors()) < np.linalg.norm(errors)
         if smaller and closures.linearise_stiff(t, trial) == OK:
             y, errors, damping = trial, closures.errors(), damping / 10.0
@@ -57,17 +116,20 @@ def _closed(closures: Closures, t: float, y: Real) -> Real:
     return y
 
 
-def _moving(closures: Closures, t: float, y: Real) -> Real:
+def _moving(closures: Closures, t: float, y: Real, hold: Hold) -> Real:
     """Speeds in the range that the closures leave."""
+    start = y
     closures.linearise_stiff(t, y)
     rates, largest = closures.rates()
+    taken = _largest(rates)
     for _ in range(3):
         if largest <= CLOSED:
             break
-        found = decomposed(closures)
+        found = decomposed(closures, t, y, hold)
         y = closures.pushed(t, y, -found.damped(rates, 0.0))
+        y[hold.speeds] = start[hold.speeds]
         rates, largest = closures.rates()
-    if not largest <= MOVING_APART:
+    if not (largest <= MOVING_APART or _largest(rates) <= NEARLY_CLOSED * taken):  # the latter where it is at rest
         where = closures.worst(rates, rates=True)
         raise ClosureError(
             f"{where}: no speeds keep it closed; the nearest leave this. Prescribed motions ask for what the closures "
@@ -117,11 +179,36 @@ class Decomposed(NamedTuple):
         return x
 
 
-def decomposed(closures: Closures) -> Decomposed:
-    """At the state that was linearised last."""
-    return Decomposed(
-        len(closures.constants[0].speed), [[_decomposed(of) for of in groups] for groups in closures.responses()]
-    )
+class Held(NamedTuple):
+    """The responses of all rows to what moves nothing of what is held, B'P = U s V'."""
+
+    U: Real
+    s: Real
+    Vt: Real
+
+    @property
+    def largest(self) -> float:
+        """The largest singular value."""
+        return float(self.s[0]) if len(self.s) else 0.0
+
+    def damped(self, values: Real, floor: float) -> Real:
+        """As of `Decomposed`."""
+        kept = self.s > (0.0 if floor > 0.0 else DEPENDENT * self.largest)
+        s = self.s[kept]
+        found: Real = self.Vt[kept].T @ (s / (s * s + floor) * (self.U[:, kept].T @ values))
+        return found
+
+
+def decomposed(closures: Closures, t: float, y: Real, hold: Hold) -> Decomposed | Held:
+    """At the state y that was linearised last."""
+    speeds, responses = len(closures.constants[0].speed), closures.responses()
+    if not len(hold.fixed):
+        return Decomposed(speeds, [[_decomposed(of) for of in groups] for groups in responses])
+    half = np.zeros((sum(len(of.half) for groups in responses for of in groups), speeds))
+    for of in (each for groups in responses for each in groups):
+        half[of.rows, of.columns] = of.half
+    Q = np.linalg.qr(closures.moving(t, y)[hold.fixed].T)[0]
+    return Held(*np.linalg.svd(half - (half @ Q) @ Q.T, full_matrices=False))
 
 
 def _decomposed(of: GroupResponse) -> Group:
@@ -139,10 +226,23 @@ def _refuse_half_a_turn(closures: Closures) -> None:
             )
 
 
-def _errors(closures: Closures, t: float, y: Real) -> Real:
+def _all_errors(closures: Closures, t: float, y: Real) -> Real:
     closures.linearise(t, y)  # raises where the tree itself has no dynamics
     closures.linearise_stiff(t, y)
     return closures.errors()
+
+
+def _errors(closures: Closures, t: float, y: Real, _: Real) -> float:
+    return _largest(_all_errors(closures, t, y))
+
+
+def _rates(closures: Closures, t: float, y: Real, before: Real) -> float:
+    """Beside the speeds now, or at rest, where rounding is all of these, beside what was taken away."""
+    closures.linearise_stiff(t, before)
+    taken = _largest(closures.rates()[0])
+    closures.linearise_stiff(t, y)
+    rates, largest = closures.rates()
+    return min(largest, _largest(rates) / taken) if taken > 0.0 else largest
 
 
 def _largest(errors: Real) -> float:

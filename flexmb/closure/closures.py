@@ -32,13 +32,32 @@ class ClosureError(ValueError):
     """Closures that cannot be closed, or leave no motion; the message names the closure, the gap and the remedy."""
 
 
+class Spread(NamedTuple):
+    """How loads change with each of k null loads of the rows, which move nothing: drives (k,nu), hinges (k,N,6),
+    closures (k,C,6), World axes. A change of `rounding` or less is none."""
+
+    drives: Real
+    hinges: Real
+    closures: Real
+    rounding: float
+
+    def leaves_open(self, changes: Real) -> NDArray[np.bool_]:
+        """Which components the motion does not determine, of changes (k,...)."""
+        found: NDArray[np.bool_] = np.any(np.abs(changes) > self.rounding, axis=0)
+        return found
+
+
 class ClosedMotion(NamedTuple):
-    """Accelerations (nu,), drive loads (nu,), loads (N,6) of hinges and (C,6) of closures, World axes."""
+    """Accelerations (nu,), drive loads (nu,), loads (N,6) of hinges and (C,6) of closures, World axes.
+
+    The loads are those of the least loads of the rows; `spread`, None where they are the only ones.
+    """
 
     accelerations: Real
     drives: Real
     hinges: Real
     closures: Real
+    spread: Spread | None = None
 
 
 class GroupResponse(NamedTuple):
@@ -166,10 +185,26 @@ class Closures:
         status = dynamics.closure_loads(s.w, s.cc, s.cw)
         self.is_singular = status == CLOSURE_SINGULAR
         self._check(status, int(s.fault[0]))
-        least = s.cw.row["load"].copy()
-        for rows, null in null_loads(s.cc, s.cw):
-            least[rows] -= null @ (null.T @ least[rows])  # without their shadow on null loads they are the least of all
-        return self._under(s, least)
+        least, null = s.cw.row["load"].copy(), self._null_loads(s)
+        least -= null @ (null.T @ least)  # without their shadow on null loads they are the least of all
+        if not null.shape[1]:
+            return self._under(s, least)
+        size = max(1.0, float(np.max(np.abs(least))))
+        others = [self._under_anew(t, y, s, least + size * each) for each in null.T]
+        motion = self._under_anew(t, y, s, least)
+        return motion._replace(
+            spread=Spread(
+                np.array([other.drives - motion.drives for other in others]),
+                np.array([other.hinges - motion.hinges for other in others]),
+                np.array([other.closures - motion.closures for other in others]),
+                SAME * size,
+            )
+        )
+
+    def _under_anew(self, t: float, y: Real, s: Closed, loads: Real) -> ClosedMotion:
+        """The same as `_under`, where another motion has been evaluated since."""
+        self._check(dynamics.linearise(*self._layout.whole(t, y), s), int(s.fault[0]))
+        return self._under(s, loads)
 
     def _under(self, s: Closed, loads: Real) -> ClosedMotion:
         """The motion under these loads (G,) of the rows, at the state that was linearised last."""
@@ -239,6 +274,17 @@ class Closures:
         dynamics.move(t, y, x, dynamics.SPEEDS, self._chain)
         return y
 
+    def moving(self, t: float, y: Real) -> Real:
+        """(nu,nu) how speeds change with every x of `pushed`, at the state y that was linearised last."""
+        c = self.constants[0]
+        still, found = y.copy(), np.empty((len(c.speed), len(c.speed)))
+        place = slice(len(y) - 1 - len(c.speed), len(y) - 1)
+        still[place] = 0.0
+        for j, x in enumerate(np.eye(len(c.speed))):
+            found[:, j] = self.pushed(t, still, x)[place]
+        dynamics.move(t, y, np.zeros(0), dynamics.NOTHING, self._chain)
+        return found
+
     def gaps(self, t: float, y: Real) -> dict[str, tuple[float, float]]:
         """Distance and (sine of the) angle by which every closure is open."""
         dynamics.move(*self._layout.whole(t, y), np.zeros(0), dynamics.NOTHING, self._chain)
@@ -297,21 +343,28 @@ class Closures:
 
     def determined(self, t: float, y: Real) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Whether each component of the hinges' (N,6) and closures' (C,6) loads is the same for all null loads."""
-        found = [self.motion(t, y)]
-        last = self._own.row["load"].copy()
-        size = max(1.0, float(np.max(np.abs(last))))
-        for null in self.null_loads().T:
-            self.linearise(t, y)
-            found.append(self._under(self._chain, last + size * null))
-        return (
-            np.ptp([each.hinges for each in found], axis=0) <= SAME * size,
-            np.ptp([each.closures for each in found], axis=0) <= SAME * size,
-        )
+        motion = self.motion(t, y)
+        if motion.spread is None:
+            return np.ones(motion.hinges.shape, bool), np.ones(motion.closures.shape, bool)
+        spread = motion.spread
+        return ~spread.leaves_open(spread.hinges), ~spread.leaves_open(spread.closures)
+
+    def opening(self, t: float, y: Real) -> tuple[Real, Real]:
+        """Accelerations (G,) of the rows without loads of closures, and B' (G,nu) of all rows."""
+        self.linearise(t, y)
+        c, own = self.constants[0], self._own
+        half = np.zeros((len(own.row), len(c.speed)))
+        for group in blocks(self.constants[1], own):
+            half[group.rows, group.columns] = group.half
+        return own.row["acceleration"].copy(), half
 
     def null_loads(self) -> Real:
         """Orthonormal loads (G,k) of the rows that move nothing, at the state evaluated last."""
-        found = null_loads(self.constants[1], self._own)
-        out = np.zeros((len(self._own.row), sum(null.shape[1] for _, null in found)))
+        return self._null_loads(self._chain)
+
+    def _null_loads(self, s: Closed) -> Real:
+        found = null_loads(s.cc, s.cw)
+        out = np.zeros((len(s.cw.row), sum(null.shape[1] for _, null in found)))
         first = 0
         for rows, null in found:
             out[rows, first : first + null.shape[1]] = null

@@ -46,7 +46,7 @@ def closed_loop(system: System, state: State, model: Callable[[Equations, State]
     NotImplementedError for controllers that are sampled.
     """
     if isinstance(system, ClosedSystem):
-        state = system._admissible(*system.layout.entering(state))
+        state = system._admissible(*system.layout.entering(state), "state")
     loop = ClosedLoop(system, state)
     found = loop.at(state, loop.initial, model)
     return replace(

@@ -208,7 +208,7 @@ def entering(system: System | Scene, state: State | None) -> tuple[Equations, St
         return equations, equations.system.initial_state
     t, y = equations.system.layout.entering(state)
     if isinstance(equations.system, ClosedSystem):
-        return equations, equations.system._admissible(t, y)
+        return equations, equations.system._admissible(t, y, "state")
     return equations, state
 
 

@@ -4,8 +4,8 @@ With A = [E; J], E picking these speeds, J u the rates of closures' rows, M = F 
 
     M (u+ - u-) = A' p,    A u+ = [given; 0],
 
-and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x: of impulses of
-closures that the motion does not determine, those of redundant rows, the least.
+and x = F' (u+ - u-) is the shortest with (F^-1 A')' x = A u+ - A u-, p the shortest with F^-1 A' p = x. Impulses that
+the motion does not determine, of redundant rows and what is held beside them, are NaN.
 """
 
 from __future__ import annotations
@@ -24,12 +24,13 @@ if TYPE_CHECKING:
     from flexmb.closure.impulses import RowMotion
 
 ROUNDING = 2.0**-52
+SAME = 1e-7  # impulses that differ by less, beside the largest that do, are the same
 
 
 class Struck(NamedTuple):
     """u (nu,) afterwards; impulses by place in u (N s or N m s), on the outboard side; energy gained (J).
 
-    closures: (6,) [N m s; N s] on body_b about frame B, World axes, by name.
+    closures: (6,) [N m s; N s] on body_b about frame B, World axes, by name. NaN what the motion does not determine.
     """
 
     u: Real
@@ -65,10 +66,20 @@ def struck(system: System, state: State, speeds: Mapping[int, float]) -> Struck:
     if rank == system.nu and not np.any(u[places]):
         u[:] = 0.0  # no freedom is left: of rounding alone closures would seem to open
     held = impulses[: len(places)]
-    closures = {} if rows is None else _by_name(system, rows.wrenches(impulses[len(places) :]))
-    return Struck(
-        u, dict(zip(places, held.tolist(), strict=True)), 0.5 * float(held @ (u[places] + state.u[places])), closures
-    )
+    energy = 0.5 * float(held @ (u[places] + state.u[places]))
+    if rows is None:
+        return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, {})
+    others = np.linalg.svd(half / size)[2][rank:] / size  # impulses that change no speed
+    wrenches = np.array([rows.wrenches(each[len(places) :]) for each in others]).reshape(len(others), -1, 6)
+    rounding = SAME * float(np.max(np.abs(others), initial=0.0))
+    closures = _determined(rows.wrenches(impulses[len(places) :]), wrenches, rounding)
+    held = _determined(held, others[:, : len(places)], rounding)
+    return Struck(u, dict(zip(places, held.tolist(), strict=True)), energy, _by_name(system, closures))
+
+
+def _determined(values: Real, others: Real, rounding: float) -> Real:
+    """NaN where one of several sets (k,...) of impulses that change no motion would change a value."""
+    return np.where(np.max(np.abs(others), axis=0, initial=0.0) > rounding, np.nan, values)
 
 
 def _rows(system: System, state: State) -> RowMotion:

@@ -59,10 +59,10 @@ def origin(system: System, t: float, state: Given, method: str) -> Beginning:
     if isinstance(state, Restart):
         return _taken_up(system, state, method)
     if state is None:
-        found = system.initial_state if t == 0.0 else system._admissible(t, system._scene_state(t))
+        found = system.initial_state if t == 0.0 else system._admissible(t, system._scene_state(t), "scene")
     elif isinstance(state, State):
         system.layout.entering(state)
-        found = system._admissible(t, pack(state))
+        found = system._admissible(t, pack(state), "state")
     elif isinstance(state, Mapping):
         found = _named(system, t, state)
     else:
@@ -112,7 +112,7 @@ def _named(system: System, t: float, values: Values) -> State:
             raise ValueError(f"{called} is {value}, and another name gives the same coordinates other values")
         y[place], given[place] = numbers, True
     _, whole = system.layout.whole(t, y)
-    found = system._admissible(t, whole)
+    found = system._admissible(t, whole, given)
     _refuse_other_than_prescribed(system, whole, found, given)
     return found
 

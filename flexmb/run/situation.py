@@ -33,7 +33,7 @@ class EventRecord:
 
     impulses: by coordinate, what its hinge or wheel exerted along it (N s or N m s), of held ones too; energy_change
     (J), which the work of the trajectory counts; before, after: the states. closures: by closure, what it exerted,
-    (6,) [N m s; N s] on body_b about frame B, World axes; the least, where redundant closures leave it open. early (s):
+    (6,) [N m s; N s] on body_b about frame B, World axes. NaN what redundant closures leave open. early (s):
     by how much it happened before its instant, not zero only where that is at a singular position of a closed chain.
     """
 

@@ -35,6 +35,9 @@ def errors_table(trajectory: Trajectory, errors: Mapping[str, Real]) -> Table:
     for name, justify in (("channel", "left"), ("largest error", "right"), ("relative", "right")):
         table.add_column(name, justify=justify)  # type: ignore[arg-type]
     for name, values in channels_of(trajectory).items():
+        if np.any(np.isnan(values)):
+            table.add_row(name, "not determined", "")
+            continue
         largest, scale = float(np.max(errors[name], initial=0.0)), signal_range(name, values)
         relative = f"{largest / scale:.1e}" if scale > 0.0 else ""
         table.add_row(name, f"{largest:.1e} {'rad' if name.endswith('.orientation') else unit(name)}", relative)
@@ -50,6 +53,8 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("status", Text(trajectory.message, style="green" if trajectory.finished else "bold red")),
         ("output", f"{len(trajectory.t)} times, {len(trajectory.markers)} markers, {len(trajectory.loads)} hinges"),
     ]
+    if trajectory.undetermined:
+        rows.append(("not determined", _undetermined(trajectory)))
     if trajectory.events:
         rows.append(("events", _events(trajectory)))
     if len(trajectory.t):
@@ -59,6 +64,16 @@ def _rows(trajectory: Trajectory) -> list[tuple[str, Text | str]]:
         ("steps", steps),
         ("time", f"{cost.compile_s:.2f} s compile, {cost.run_s:.4f} s run, {cost.output_s:.2f} s output"),
     ]
+
+
+def _undetermined(trajectory: Trajectory) -> str:
+    """Loads that closures leave open, component by component: "pin (torque x, y; force z)"."""
+    found = []
+    for name, is_open in trajectory.undetermined.items():
+        letters = [[axis for axis, each in zip("xyz", is_open[i : i + 3], strict=False) if each] for i in (0, 3)]
+        parts = [f"{part} {', '.join(axes)}" for part, axes in zip(("torque", "force"), letters, strict=True) if axes]
+        found.append(f"{name} ({'; '.join(parts)})" if name in trajectory.loads else name)
+    return ", ".join(found)
 
 
 def _events(trajectory: Trajectory) -> str:

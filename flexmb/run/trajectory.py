@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from flexmb.run import exports
 from flexmb.run.joining import joined
@@ -22,7 +22,7 @@ from flexmb.scene.angles import Angles, angles_of
 from flexmb.scene.open_loop import refuse_feedback
 from flexmb.scene.quaternions import quaternion_of
 from flexmb.system.load_axes import Axes
-from flexmb.system.observables import ENERGIES, Observation
+from flexmb.system.observables import ENERGIES, Observation, undetermined_loads
 from flexmb.system.section_loads import SectionBalance, SectionLoads
 from flexmb.tables.state import State
 from flexmb.tables.status import Status
@@ -85,7 +85,8 @@ class Trajectory:
     if it finished. connectors by name (T,6) [torque; force] on body_b about frame B, World axes; hinge_forces (T,1) of
     connectors along hinges, along their coordinates. `restart`: how the run is taken up there, None if it failed.
     `events`: what happened, in the order of time. signals (T,k) by sensor and controller, power (T,k) W that each
-    output of a controller puts into the motion, of a scene that has some.
+    output of a controller puts into the motion, of a scene that has some. Loads and drives that the motion does not
+    determine, of redundant closures, are NaN: see `undetermined`.
     """
 
     scene: str
@@ -123,6 +124,15 @@ class Trajectory:
         size = f"{len(self.t)} times, {len(self.q_names)} coordinates, {len(self.markers)} markers"
         return f"<Trajectory of {self.scene!r}: {self.message}; {size}>"
 
+    @property
+    def undetermined(self) -> dict[str, NDArray[np.bool_]]:
+        """What the motion does not determine, where closures suppress what others suppress already (docs/notation.md).
+
+        By name of a hinge or closure, which components (6,) of `loads` are NaN, at one output time or more; by
+        "<name>.drive" which (n,) of `drives`. Empty where all loads are determined.
+        """
+        return undetermined_loads(self.loads, self.drives)
+
     def error_estimate(self) -> dict[str, Real]:
         """Error (T,) of every channel, in its unit (orientations: rad), by a second, tighter run from start to end.
 
@@ -135,7 +145,7 @@ class Trajectory:
     def loads_in(self, axes: Axes = "world", about: tuple[str, str] | None = None) -> dict[str, Real]:
         """`loads` (T,6) in the axes of each hinge's own frame "inboard" or "outboard", and about a node (body, node).
 
-        See `System.hinge_loads`.
+        NaN what the motion does not determine in these axes. See `System.hinge_loads`.
         """
         system, found = self._making("a hinge's frame").system, {name: load.copy() for name, load in self.loads.items()}
         for i, (t, y) in enumerate(zip(self.t, self._states, strict=True)):

@@ -31,10 +31,16 @@ class _Hinge(SceneStruct, frozen=True, kw_only=True, tag_field="kind"):
 
 
 class AngularCoordinate(SceneStruct, frozen=True, kw_only=True):
-    """One angle: initial value and rate, spring, damper, motor, or prescribed motion."""
+    """One angle: initial value and rate, spring, damper, motor, or prescribed motion.
+
+    With closures, initial values other than zero are kept to the last digit where the others can follow, and changed
+    with a warning where they contradict each other. `given = true`: both are meant, zero too; where they cannot be kept
+    there is an error, and angles and displacements without it are guesses that say which way the loop is assembled.
+    """
 
     angle_rad: float = 0.0
     rate_rad_s: float = 0.0
+    given: bool = False
     stiffness_Nm_rad: float = 0.0
     damping_Nms_rad: float = 0.0
     rest_rad: float = 0.0
@@ -43,10 +49,14 @@ class AngularCoordinate(SceneStruct, frozen=True, kw_only=True):
 
 
 class LinearCoordinate(SceneStruct, frozen=True, kw_only=True):
-    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion."""
+    """One displacement: initial value and rate, spring, damper, motor, or prescribed motion.
+
+    `given` as of an angle.
+    """
 
     position_m: float = 0.0
     rate_m_s: float = 0.0
+    given: bool = False
     stiffness_N_m: float = 0.0
     damping_Ns_m: float = 0.0
     rest_m: float = 0.0
@@ -99,10 +109,11 @@ class Gimbal(_Hinge, frozen=True, kw_only=True, tag="gimbal"):
 
 class Spherical(_Hinge, frozen=True, kw_only=True, tag="spherical"):
     """Three rotations; coordinate: quaternion (scalar first) of outboard relative to inboard axes; speeds: relative
-    angular velocity in outboard axes. The spring torque is -stiffness * rotation vector."""
+    angular velocity in outboard axes. The spring torque is -stiffness * rotation vector. `given` as of an angle."""
 
     quaternion: Quaternion = IDENTITY
     angular_velocity_rad_s: Vector = ZERO
+    given: bool = False
     stiffness_Nm_rad: float = 0.0
     damping_Nms_rad: float = 0.0
 
@@ -119,12 +130,14 @@ class Free(_Hinge, frozen=True, kw_only=True, tag="free"):
     """Six freedoms. Coordinates: position of the outboard origin in inboard axes, quaternion.
 
     Speeds: [angular velocity; velocity of the outboard origin], relative to the inboard frame, in outboard axes.
+    `given` as of an angle.
     """
 
     position_m: Vector = ZERO
     quaternion: Quaternion = IDENTITY
     angular_velocity_rad_s: Vector = ZERO
     velocity_m_s: Vector = ZERO
+    given: bool = False
 
 
 Hinge = Weld | Revolute | Prismatic | Cylindrical | Universal | Gimbal | Spherical | Planar | Free
@@ -140,8 +153,9 @@ class Closure(SceneStruct, frozen=True, kw_only=True):
     Frame A is the node frame of `body_a` ("ground" too) displaced by `position_a_m`, `quaternion_a` (fixed offsets in
     node axes), frame B likewise on `body_b`. The closure lets B move relative to A as the hinge of that `type` lets its
     outboard frame move relative to its inboard one; `axis` has the same components in both frames. Initial coordinates
-    need to fit only roughly: the nearest state that closes all loops is found. Its load is an output: on `body_b`,
-    about B. A gimbal of two axes is a universal closure between turned frames, one of three a spherical one.
+    need to fit only roughly: a near state that closes all loops is found, that keeps what is given (see
+    AngularCoordinate). Its load is an output: on `body_b`, about B. A gimbal of two axes is a universal closure between
+    turned frames, one of three a spherical one.
     """
 
     name: str

@@ -34,11 +34,13 @@ class Placement(TypedDict, total=False):
 
 
 class Angle(TypedDict, total=False):
-    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), spring `stiffness` (N m/rad) about `rest` (rad),
-    `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as functions of time."""
+    """An angular coordinate: initial `angle` (rad) and `rate` (rad/s), `given` where both are kept, spring
+    `stiffness` (N m/rad) about `rest` (rad), `damping` (N m s/rad), motor `torque` (N m) or `prescribed` angle (rad) as
+    functions of time."""
 
     angle: float
     rate: float
+    given: bool
     stiffness: float
     damping: float
     rest: float
@@ -47,11 +49,13 @@ class Angle(TypedDict, total=False):
 
 
 class Displacement(TypedDict, total=False):
-    """A linear coordinate: initial `position` (m) and `rate` (m/s), spring `stiffness` (N/m) about `rest` (m),
-    `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of time."""
+    """A linear coordinate: initial `position` (m) and `rate` (m/s), `given` where both are kept, spring `stiffness`
+    (N/m) about `rest` (m), `damping` (N s/m), motor `force` (N) or `prescribed` displacement (m) as functions of
+    time."""
 
     position: float
     rate: float
+    given: bool
     stiffness: float
     damping: float
     rest: float

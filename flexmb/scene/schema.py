@@ -148,6 +148,7 @@ Waiver = Literal[
     "modal_frequency",
     "negative_stiffness",
     "negative_damping",
+    "friction_peak",
 ]
 
 
@@ -157,7 +158,8 @@ class Scene(SceneStruct, frozen=True, kw_only=True):
     Numbers that no usual structure has are warned of, because a slip of units looks like that. `allow` lists what is
     meant. Of beams: "wave_speed", sqrt(EA / mass per length) outside 50 to 20,000 m/s; "thick_section", sqrt(EI / EA)
     above half the length; "shear_stiffness", GJ or GA far above EI or EA. Of raw modes: "modal_frequency", the lowest
-    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". A scene without
+    frequency times the size. Of hinges, wheels and modes: "negative_stiffness", "negative_damping". Of friction:
+    "friction_peak", smoothed to less than 99 % of its static value. A scene without
     dimensions or in other units than SI, which have to fit each other (mm, tonne, s, N), lists the first four.
     """
 

@@ -2,36 +2,46 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, assert_never
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flexmb.closure import dynamics as closed_dynamics
 from flexmb.closure import jacobian as closed_jacobian
+from flexmb.closure.asked import NOTHING_ASKED, Asked
 from flexmb.closure.assembly import consistent
 from flexmb.closure.branch import noticed, watch_steps
-from flexmb.closure.closures import ClosedMotion, ClosureError, Closures
+from flexmb.closure.closures import ClosedMotion, ClosureError, Closures, Spread
 from flexmb.closure.constants import closure_constants, slowest_mode
 from flexmb.closure.jacobian import chain_tangent
 from flexmb.closure.leap import back, beside, leap
+from flexmb.closure.operators import ClosureOperators, closure_operators
 from flexmb.closure.tables import Closed
 from flexmb.entry import articulated
 from flexmb.integrate.problem import Leaping, Linear
 from flexmb.scene import schema as s
+from flexmb.scene.problems import SceneWarning
 from flexmb.system import algorithms
 from flexmb.system.algorithm import Algorithm, Route
+from flexmb.system.asking import asked, everything
 from flexmb.system.evaluator import Evaluator
-from flexmb.system.load_axes import Axes, referred
+from flexmb.system.load_axes import Axes
 from flexmb.system.observables import Evaluation
-from flexmb.system.tree_system import System
+from flexmb.system.section_loads import AllLoads
+from flexmb.system.tree_system import Given, System
 from flexmb.tables import arguments
 from flexmb.tables.per_thread import per_thread
 from flexmb.tables.state import DynamicsError, State, finite_result, pack
 from flexmb.tables.status import Status
 from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.frisch.nested_system import NestedSystem
+    from flexmb.jain.operators import Operators
 
 # In the size of a closure: a state that is given opens it by less. At a distance of d sizes from where branches cross
 # they differ by d^2 in the gap: beyond a tenth of the size the nearest is the one that is meant. Three digits do.
@@ -39,7 +49,11 @@ FAR = 1e-2
 
 
 class ClosedSystem(System):
-    """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone."""
+    """A tree with closures. Mass matrix, bias and inverse dynamics are those of the tree alone.
+
+    What closures add to them is `closure_operators`; operators and partitions, which have accelerations of their own,
+    are refused.
+    """
 
     def __init__(self, scene: s.Scene) -> None:
         super().__init__(scene)
@@ -67,10 +81,13 @@ class ClosedSystem(System):
         """The state closest to the scene's at t = 0 that closes all closures; ClosureError where there is none.
 
         Closest in the metric of kinetic energy, bodies bending only where hinges cannot close a loop; coordinates
-        first, then speeds. Prescribed ones are their functions'.
+        first, then speeds. Prescribed ones are their functions'. What the scene gives is kept to the last digit where
+        the rest can follow (see `flexmb.scene.hinges.AngularCoordinate`); else it warns (`SceneWarning`) from what to
+        what, and ClosureError where it is marked as given.
         """
         if self._start is None:
-            y = consistent(self.closures, 0.0, pack(super().initial_state))
+            y = pack(super().initial_state)
+            y = self._as_asked(0.0, y, asked(self, y))
             self._start = State(y[: self.nq], y[self.nq : -1], 0.0, self.layout)
         return State(self._start.q, self._start.u, 0.0, self.layout)
 
@@ -95,7 +112,21 @@ class ClosedSystem(System):
     def _is_prescribed(self) -> NDArray[np.bool_]:
         return self.constants.speed["prescribed"] >= 0
 
-    def _admissible(self, t: float, y: Real) -> State:
+    def _as_asked(self, t: float, y: Real, wish: Asked) -> Real:
+        """y = [q, u, work] with closed closures; warns of what it does not keep."""
+        found = consistent(self.closures, t, y, wish)
+        broken = wish.broken(y, found)
+        if broken:
+            warnings.warn(
+                f'scene "{self.scene.name}": closures do not allow these values together, and the nearest that they '
+                f"allow are taken: {broken}. Correct them, leave out what follows from the others (zero), or mark by "
+                "given = true what is to be kept",
+                SceneWarning,
+                stacklevel=4,
+            )
+        return found
+
+    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
         """The nearest state that closes all closures; ClosureError where y leaves them open by more than `FAR`."""
         rough = super()._admissible(t, y).y
         self.closures.linearise(t, rough)
@@ -105,8 +136,19 @@ class ClosedSystem(System):
                 f"{self.closures.worst(errors)}: the state that is given leaves this open: give coordinates that close "
                 "it at least roughly, or leave those out that the closures determine"
             )
-        y = consistent(self.closures, t, rough)
-        return self.layout.known(t, y)
+        return self.layout.known(t, self._as_asked(t, rough, self._wish(rough, given)))
+
+    def _wish(self, y: Real, given: Given) -> Asked:
+        if isinstance(given, np.ndarray):
+            return asked(self, y, given)
+        match given:
+            case "guess":
+                return NOTHING_ASKED
+            case "scene":
+                return asked(self, y)
+            case "state":
+                return everything(self)
+        assert_never(given)
 
     def accelerations(self, state: State, algorithm: Algorithm = "articulated") -> Real:
         """udot (nu,) of the closed chain under all loads, at a state that closes all closures.
@@ -145,52 +187,134 @@ class ClosedSystem(System):
                 f'scene "{self.scene.name}": the loads of forced accelerations are those of a tree; '
                 "leave accelerations out, or prescribe coordinates"
             )
-        loads = self._evaluate(*self.layout.entering(state), "articulated").loads
-        return referred(self, self._w, loads, axes, about)
+        t, y = self.layout.entering(state)
+        return self._referred(self._motion(t, y, "articulated"), t, y, axes, about)
 
-    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
-        """With the closures' loads too."""
-        closures = self._observe(t, y, algorithm)
-        found = self._observation.evaluation(t)
+    def _loads_in(
+        self, t: float, y: Real, loads: dict[str, Real], axes: Axes, about: tuple[str, str] | None
+    ) -> dict[str, Real]:
+        """Where some are not determined, what is in other axes is found anew, but not where controllers act."""
+        if self.scene.controllers or all(np.all(np.isfinite(load)) for load in loads.values()):
+            return super()._loads_in(t, y, loads, axes, about)
+        return self._referred(self._motion_or_across(t, y, "articulated"), t, y, axes, about)
+
+    def _referred(
+        self, motion: ClosedMotion, t: float, y: Real, axes: Axes, about: tuple[str, str] | None
+    ) -> dict[str, Real]:
+        """Loads of a motion in other axes about a node, NaN what it does not determine."""
+        found = super()._loads_in(t, y, self._by_load(motion.hinges, motion.closures), axes, about)
+        if motion.spread is None:
+            return {name: finite_result(load, t) for name, load in found.items()}
+        changes = [
+            super(ClosedSystem, self)._loads_in(t, y, each, axes, about) for each in self._changes(motion.spread)
+        ]
+        for name, load in found.items():
+            finite_result(load, t)
+            found[name] = np.where(motion.spread.leaves_open(np.array([each[name] for each in changes])), np.nan, load)
+        return found
+
+    def _by_load(self, hinges: NDArray[Any], closures: NDArray[Any]) -> dict[str, NDArray[Any]]:
+        """What hinges (N,6) and closures (C,6) have, by their names."""
+        names = [closure.name for closure in self.scene.closures]
+        return self._by_hinge(hinges) | dict(zip(names, closures, strict=True))
+
+    def _changes(self, spread: Spread) -> list[dict[str, Real]]:
+        """By null load, how loads change by name (6,), World axes."""
+        return [self._by_load(*each) for each in zip(spread.hinges, spread.closures, strict=True)]
+
+    def _all_loads(self, t: float, y: Real) -> AllLoads:
+        """With the loads that may be others; those of `exerted` are the least."""
+        motion = self._motion(t, y, "articulated")
+        self._outputs(t, y, motion)
+        found = self._with_closures(self._observation.evaluation(t), motion.closures, t)
+        self._inverse(t, y, found.accelerations)
+        spread = motion.spread
+        return AllLoads(found) if spread is None else AllLoads(found, self._changes(spread), spread.rounding)
+
+    def _with_closures(self, found: Evaluation, closures: Real, t: float) -> Evaluation:
         loads = zip(self._observation.names.closures, finite_result(closures, t), strict=True)
         return replace(found, loads=found.loads | dict(loads))
 
+    def _evaluate(self, t: float, y: Real, algorithm: Algorithm) -> Evaluation:
+        """With the closures' loads too; NaN what the motion does not determine."""
+        motion = self._motion(t, y, algorithm)
+        self._outputs(t, y, motion)
+        found = self._with_closures(self._observation.evaluation(t), motion.closures, t)
+        spread = motion.spread
+        if spread is not None:
+            unknown = self._by_load(spread.leaves_open(spread.hinges), spread.leaves_open(spread.closures))
+            for name, load in found.loads.items():
+                load[unknown[name]] = np.nan
+            driven = spread.leaves_open(spread.drives)
+            for name, places in self._observation.names.driven.items():
+                found.drives[name][driven[places]] = np.nan
+        return found
+
     def _observe_row(self, t: float, y: Real, algorithm: Algorithm, row: Real) -> None:
-        """As of a tree, with the loads of closures."""
+        """As of a tree, with the loads of closures; NaN what the motion does not determine."""
+        motion = self._motion_or_across(t, y, algorithm)
+        self._outputs(t, y, motion)
+        self._observation.fill(row, t, motion.closures)
+        if motion.spread is not None:
+            parts = self._observation.columns_of(row[None])
+            parts["loads"][0][motion.spread.leaves_open(motion.spread.hinges)] = np.nan
+            parts["closures"][0][motion.spread.leaves_open(motion.spread.closures)] = np.nan
+            parts["drives"][0][motion.spread.leaves_open(motion.spread.drives)] = np.nan
+
+    def _motion_or_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
+        """The motion; in a run through a singular position, where nothing determines it, the mean of those beside."""
         try:
-            motion = self._motion(t, y, algorithm)
+            return self._motion(t, y, algorithm)
         except DynamicsError:
             if not self.closures.is_singular:
                 raise
-            motion = self._motion_across(t, y, algorithm)
-        self._observation.fill(row, t, self._outputs(t, y, motion))
-
-    def _motion_across(self, t: float, y: Real, algorithm: Algorithm) -> ClosedMotion:
-        """In a run through a singular position, where nothing determines the loads: the mean of those beside it."""
         slope = np.empty_like(y)
         articulated.rhs(t, y, slope, self.constants, self.workspace())
         sides = [self.closures.beside(t, y, slope[: self.nq], side) for side in (-1, 1)]
         before, after = (self._motion(*each, algorithm) for each in sides)
-        return ClosedMotion(*(0.5 * (one + other) for one, other in zip(before, after, strict=True)))
+        return ClosedMotion(
+            0.5 * (before.accelerations + after.accelerations),
+            0.5 * (before.drives + after.drives),
+            0.5 * (before.hinges + after.hinges),
+            0.5 * (before.closures + after.closures),
+            _of_both(before.spread, after.spread),
+        )
 
-    def _observe(self, t: float, y: Real, algorithm: Algorithm) -> Real:
-        """Fills the outputs; loads (C,6) of closures."""
-        return self._outputs(t, y, self._motion(t, y, algorithm))
-
-    def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> Real:
+    def _outputs(self, t: float, y: Real, motion: ClosedMotion) -> None:
+        """Fills the outputs, all but the loads of closures."""
         out = self._out
         out.rates[:], out.drives[:], out.loads[:] = motion.accelerations, motion.drives, motion.hinges
         self._observe_motion(t, y)
-        return motion.closures
 
     def determined_loads(self, state: State) -> dict[str, NDArray[np.bool_]]:
         """Which components (6,) of the loads of hinges and closures are determined by the motion; World axes.
 
-        The others, in overconstrained mechanisms of rigid bodies, are those of the least closure loads (`evaluate`).
+        The others, in overconstrained mechanisms of rigid bodies, are NaN wherever loads are given (`evaluate`).
         """
         hinges, closures = self.closures.determined(*self.layout.entering(state))
         names = [link.hinge.name for link in self._links], [closure.name for closure in self.scene.closures]
         return dict(zip(names[0], hinges, strict=True)) | dict(zip(names[1], closures, strict=True))
+
+    def closure_operators(self, state: State) -> ClosureOperators:
+        """J, the inertia of the tree reflected at the closures J M^-1 J' (its inverse), and the loads that follow.
+
+        Jain & Rodriguez, section VIII. Raises DynamicsError where the closures are singular.
+        """
+        return closure_operators(self.closures, *self.layout.entering(state))
+
+    def nested(self, algorithm: Algorithm = "frisch") -> NestedSystem:
+        """Refused: NotImplementedError."""
+        raise self._of_trees("Frisch's partitioned equations")
+
+    def operators(self, state: State) -> Operators:
+        """Refused: NotImplementedError."""
+        raise self._of_trees("the spatial operators")
+
+    def _of_trees(self, what: str) -> NotImplementedError:
+        return NotImplementedError(
+            f'scene "{self.scene.name}" has closures, and {what} are of trees: closure_operators(state) has what '
+            "closures add, and flexmb.System(scene) is the tree alone, whose accelerations are not the scene's"
+        )
 
     def closure_gaps(self, state: State) -> dict[str, tuple[float, float]]:
         """By closure, how far it is open along what it suppresses: distance (m) and angle (rad, its sine)."""
@@ -244,3 +368,15 @@ class ClosedSystem(System):
         if status in (Status.CLOSURE_SINGULAR, Status.CLOSURE_OPEN, Status.BRANCH_UNKNOWN):
             return self.scene.closures[fault].name
         return super().fault_name(status, fault)
+
+
+def _of_both(one: Spread | None, other: Spread | None) -> Spread | None:
+    """What either leaves open."""
+    if one is None or other is None:
+        return one or other
+    return Spread(
+        np.concatenate([one.drives, other.drives]),
+        np.concatenate([one.hinges, other.hinges]),
+        np.concatenate([one.closures, other.closures]),
+        max(one.rounding, other.rounding),
+    )

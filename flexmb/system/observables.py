@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb.entry.observation import Outputs, outputs, parts, places, shapes
 from flexmb.scene.angles import Angles, angles_of
@@ -43,6 +44,7 @@ class Evaluation:
     hinge point, World axes; wheel_loads by wheel (6,) about its centre; drives by hinge, point mass or wheel (k,), one
     for each prescribed coordinate; energy by kind (J); momentum (6,) [angular about the World origin; linear];
     connectors by name (6,) [torque; force] on body_b about B, World axes; hinge_forces (1,) of connectors along hinges.
+    Loads and drives that the motion does not determine, of redundant closures, are NaN: see `undetermined`.
     """
 
     accelerations: Real
@@ -54,6 +56,19 @@ class Evaluation:
     momentum: Real
     connectors: dict[str, Real] = field(default_factory=dict)
     hinge_forces: dict[str, Real] = field(default_factory=dict)
+
+    @property
+    def undetermined(self) -> dict[str, NDArray[np.bool_]]:
+        """Which components are NaN because infinitely many loads go with the same motion: see `undetermined_loads`."""
+        return undetermined_loads(self.loads, self.drives)
+
+
+def undetermined_loads(loads: Mapping[str, Real], drives: Mapping[str, Real]) -> dict[str, NDArray[np.bool_]]:
+    """By name of a hinge or closure, which components (6,) of its load are NaN, at one time or more; by "<name>.drive"
+    which (n,) of its drive loads. Only those of which some are."""
+    found = dict(loads) | {f"{name}.drive": values for name, values in drives.items()}
+    open_ = {name: np.any(np.isnan(np.atleast_2d(values)), axis=0) for name, values in found.items()}
+    return {name: each for name, each in open_.items() if np.any(each)}
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,10 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flexmb.building.assemble import assemble
 from flexmb.building.connector_arrays import between_nodes
@@ -34,7 +35,7 @@ from flexmb.system.load_axes import Axes, referred
 from flexmb.system.mass_properties import MassProperties, mass_properties
 from flexmb.system.mechanics import Mechanics, Precision
 from flexmb.system.observables import Evaluation, Names, Observation
-from flexmb.system.section_loads import SectionBalance, SectionLoads
+from flexmb.system.section_loads import AllLoads, SectionBalance, SectionLoads
 from flexmb.tables import arguments
 from flexmb.tables.arrays import Workspace
 from flexmb.tables.per_thread import per_thread
@@ -46,6 +47,9 @@ if TYPE_CHECKING:
     from flexmb.frisch.nested_system import NestedSystem, Partitions
     from flexmb.jain.operators import Operators, SpatialOperators
     from flexmb.system.batch import Batch, BatchAccelerations
+
+Given = Literal["guess", "scene", "state"] | NDArray[np.bool_]
+"""What of a state is asked for: nothing, what a scene gives, all of it, or the values (nq+nu+1,) that are named."""
 
 _NO_CLOSURES = np.zeros((0, 6))
 
@@ -131,10 +135,11 @@ class System(Mechanics):
         """The scene's state at t = 0; prescribed coordinates have their functions' values."""
         return self.layout.known(0.0, self._at_start.copy())
 
-    def _admissible(self, t: float, y: Real) -> State:
+    def _admissible(self, t: float, y: Real, given: Given = "guess") -> State:
         """The state at time t (s) that y (nq+nu+1,) = [q, u, work] stands for; prescribed motions are as they are then.
 
-        Of closed chains the nearest one that closes all closures; ClosureError where that is far.
+        Of closed chains the nearest one that closes all closures; ClosureError where that is far. It keeps what is
+        given where it can, and warns where not.
         """
         y = np.r_[y[:-1], 0.0]
         self.project(t, y, self.constants)
@@ -321,17 +326,18 @@ class System(Mechanics):
 
         By the momentum balance of the part beyond each section, not by the modes' curvature. A body of level `linear`
         is taken as `full`; at level `stiffened` the balance differs from the dynamics in the fourth order of the
-        deformation. ValueError for anything but a beam, and positions off it.
+        deformation. Warns (`SceneWarning`) where the mass is lumped, which steps at nodes. NaN what redundant closures
+        leave open. ValueError for anything but a beam, and positions off it.
         """
         t, y = self.layout.entering(state)
         balance = SectionBalance(self, body, x)
-        return balance.loads(finite_result(balance.at(t, y), t))
+        return balance.loads(balance.at(t, y))
 
-    def _all_loads(self, t: float, y: Real) -> Evaluation:
-        """With loads of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
+    def _all_loads(self, t: float, y: Real) -> AllLoads:
+        """Of hinges, closures, wheels and connectors; leaves the motion that the equations see in `_w`."""
         found = self._evaluate(t, y, "articulated")
         self._inverse(t, y, found.accelerations)
-        return found
+        return AllLoads(found)
 
     def mass_properties(self, state: State, body: str | None = None) -> MassProperties:
         """Mass, mass centre and inertia of a body with all that it carries, or of the whole scene, at a state.

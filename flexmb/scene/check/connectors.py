@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
+from math import inf, sqrt
+from operator import itemgetter
 
 import numpy as np
 
@@ -19,12 +21,13 @@ from flexmb.scene.connectors import (
     SpringDamper,
     by_stem,
 )
-from flexmb.scene.problems import Defect, Place
+from flexmb.scene.problems import Defect, Doubt, Place
 from flexmb.scene.schema import Scene
 from flexmb.scene.tree import GROUND, coordinate_of
 
 HIGHEST = 4  # coefficients beside the stiffness: a law is a polynomial of degree five at most
 SYMMETRIC = 1e-9  # of the largest entry: matrices printed to ten digits are symmetric, and not negative, this well
+LOST = 0.01  # of static friction, to its smoothing
 NOT_NEGATIVE = ("free_length", "damping", "stop_stiffness", "stop_dissipation", "sliding", "static")
 
 
@@ -131,3 +134,34 @@ def _friction(place: Place, connector: HingeFriction) -> Iterator[Defect]:
             yield Defect(str(place), what, "give at least as much")
         if law["stribeck"] <= 0.0:
             yield Defect(str(place), f"the Stribeck speed is {law['stribeck']:g}", "give a positive one")
+        elif law["static"] > law["sliding"] >= 0.0 and law["smoothing"] > 0.0:
+            yield from _peak(place, law)
+
+
+def _peak(place: Place, law: Mapping[str, float]) -> Iterator[Doubt]:
+    """Smoothing takes away from static friction what the fall to sliding friction does not wait for."""
+    static, sliding, stribeck = law["static"], law["sliding"], law["stribeck"]
+    at, peak = friction_peak(sliding, static, stribeck, law["smoothing"])
+    if peak < (1.0 - LOST) * static:
+        most = LOST * stribeck / sqrt(2.0 * (1.0 - sliding / static))
+        what = (
+            f"smoothed by {law['smoothing']:g} beside a Stribeck speed of {stribeck:g}, friction rises to {peak:.4g} "
+            f"at most (at {at:.3g}), {peak / static:.1%} of the static {static:g}: a load between them, which would be "
+            "held, does not creep but runs away"
+        )
+        remedy = f"take a smoothing of {most:.2g} at most, which comes within {LOST:.0%} of it"
+        yield Doubt(str(place), what, remedy, "friction_peak")
+
+
+def friction_peak(sliding: float, static: float, stribeck: float, smoothing: float) -> tuple[float, float]:
+    """Speed at which smoothed friction is largest, and the load there; (inf, sliding) where it only rises.
+
+    With x = (v/vs)^2 and r = (vr/vs)^2 the derivative of the law vanishes where
+    (r Fc - 2 (Fs - Fc)) x^2 + r (3 Fc - Fs) x + r Fs = 0.
+    """
+    r = (smoothing / stribeck) ** 2
+    roots = np.roots([r * sliding - 2.0 * (static - sliding), r * (3.0 * sliding - static), r * static])
+    found = [(inf, sliding)]
+    for x in roots[np.isreal(roots) & (roots.real > 0.0)].real.tolist():
+        found.append((stribeck * sqrt(x), (sliding + (static - sliding) / (1.0 + x)) * sqrt(x / (x + r))))
+    return max(found, key=itemgetter(1))

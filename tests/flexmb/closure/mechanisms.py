@@ -46,7 +46,7 @@ def bar(scene: SceneBuilder, name: str, length: float, *, modes: int = 0) -> Sce
 
 
 def four_bar(
-    lengths: FourBar = GRASHOF, *, crank: float = 1.0, rate: float = 2.0, closure: str = "revolute",
+    lengths: FourBar = GRASHOF, *, crank: float = 1.0, rate: float = 3.8, closure: str = "revolute",
     gravity: float = -9.81, modes: int = 0, off: float = 0.0, prescribed: s.Function | None = None, **place,
 ) -> s.Scene:  # fmt: skip
     """A four-bar in the x-y plane, cut at the pin between coupler and rocker; `off` spoils its initial angles (rad)."""

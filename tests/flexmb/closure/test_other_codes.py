@@ -140,7 +140,7 @@ def bound(scene: s.Scene, markers: dict[str, MarkerMotion]) -> float:
 
 
 def largest(arrays: Iterable[np.ndarray]) -> float:
-    return max(float(np.max(np.abs(array))) for array in arrays)
+    return max(float(np.nanmax(np.abs(array))) for array in arrays)
 
 
 LOOPS = {
@@ -283,7 +283,7 @@ def test_mujoco_opens_the_loop_and_flexmb_does_not(four_bar):
     assert run.finished
     states = [four_bar.state(q, u, t) for q, u, t in zip(run.q, run.u, run.t, strict=True)]
     ours = max(four_bar.closure_gaps(state)["loop"][0] for state in states)
-    force = max(np.linalg.norm(four_bar.hinge_loads(state)["loop"][3:]) for state in states)
+    force = max(np.linalg.norm(four_bar.hinge_loads(state)["loop"][3:5]) for state in states)
     assert ours < 1e-11
     settings = [DEFAULT, (0.02, 0.99), (0.02, LEAST_OPEN), (0.002, LEAST_OPEN)]
     gaps = []

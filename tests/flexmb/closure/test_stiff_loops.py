@@ -26,7 +26,7 @@ def stiff_four_bar(level: s.Level = "full") -> s.Scene:
     scene = fm.SceneBuilder("stiff four-bar", gravity=(0.0, -9.81, 0.0))
     for name, length in zip(("crank", "coupler", "rocker"), bars[:3], strict=True):
         scene.beam(name, length=length, elements=4, section=STEEL, modes=modes, level=level)
-    scene.revolute("drive", "ground", "crank", angle=1.0, rate=2.0)
+    scene.revolute("drive", "ground", "crank", angle=1.0, rate=3.8)
     scene.revolute("pin", "crank", "coupler", parent_node="tip", angle=coupler - 1.0)
     scene.revolute("pivot", "ground", "rocker", parent_position=(bars.ground, 0.0, 0.0), angle=rocker)
     scene.closure("loop", "revolute", "coupler", "rocker", node_a="tip", node_b="tip")
@@ -34,8 +34,8 @@ def stiff_four_bar(level: s.Level = "full") -> s.Scene:
 
 
 SMOOTH = {
-    "four-bar, overconstrained": lambda: m.four_bar(rate=2.0),
-    "ball joint": lambda: m.four_bar(rate=2.0, closure="spherical", modes=1),
+    "four-bar, overconstrained": lambda: m.four_bar(),
+    "ball joint": lambda: m.four_bar(closure="spherical", modes=1),
     "driven": lambda: m.four_bar(prescribed=s.Sine(amplitude=0.3, angular_frequency_rad_s=3.0, offset=1.0)),
     "connected": connected,
     "Bennett": m.bennett,
@@ -57,7 +57,10 @@ def test_adaptive_methods_agree_with_dop853(name, method):
     assert exact.finished and done.finished, done.message
     assert np.abs(done.q - exact.q).max() < 1e-7 and np.abs(done.u - exact.u).max() < 1e-5
     for key, load in exact.loads.items():
-        assert np.abs(done.loads[key] - load).max() < 1e-5 * max(1.0, np.abs(load).max()), key
+        known = ~np.isnan(load)
+        assert np.array_equal(known, ~np.isnan(done.loads[key])), key
+        size = max(1.0, np.abs(load)[known].max(initial=0.0))
+        assert np.abs(done.loads[key] - load)[known].max(initial=0.0) < 1e-5 * size, key
     assert np.abs(done.work - exact.work).max() < 1e-6 * max(1.0, np.ptp(exact.work))
     assert np.abs(done.energy_drift).max() < 1e-6 * done.energy_scale
     assert largest_gap(system, done) < 1e-12
@@ -66,7 +69,7 @@ def test_adaptive_methods_agree_with_dop853(name, method):
 @pytest.mark.parametrize(("method", "order"), [("radau5", 5), ("exponential", 5)])
 def test_projection_takes_no_order(method, order):
     """Errors against the number of steps that tolerances ask for."""
-    system = fm.compile(m.four_bar(rate=2.0))
+    system = fm.compile(m.four_bar())
     exact = fm.simulate(system, 1.0, rtol=1e-12, atol=1e-12, samples=2)
     runs = [fm.simulate(system, 1.0, method, rtol=rtol, atol=1e-2 * rtol, samples=2) for rtol in (1e-5, 1e-7, 1e-9)]
     steps = [run.statistics.accepted_steps for run in runs]
@@ -111,8 +114,8 @@ def test_a_stiff_loop_takes_a_fraction_of_the_steps(method):
     done = fm.simulate(system, 0.3, method, rtol=1e-3, atol=1e-5, samples=7)
     assert done.finished, done.message
     assert np.abs(done.markers["joint"].position - exact.markers["joint"].position).max() < 1e-4
-    load = exact.loads["loop"][1:]
-    assert np.abs(done.loads["loop"][1:] - load).max() < 0.2 * np.abs(load).max()
+    load = exact.loads["loop"][1:, 3:5]  # in the plane
+    assert np.abs(done.loads["loop"][1:, 3:5] - load).max() < 0.2 * np.abs(load).max()
     assert done.statistics.accepted_steps < explicit.statistics.accepted_steps / 8
     assert done.statistics.evaluations < explicit.statistics.evaluations / 6
     assert done.statistics.jacobians > 0

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 import pytest
 
 import flexmb as fm
 from flexmb.scene import files
+from flexmb.scene.check.connectors import friction_peak
 from tests.flexmb.connectors.connected_scenes import everything, free_flying
 
 
@@ -80,3 +82,53 @@ def test_to_a_file_and_back(scene):
 def test_other_names_are_refused():
     with pytest.raises(TypeError, match='SpringDamper has no "stifness"'):
         builder().spring_damper("s", "a", "b", stifness=1.0)
+
+
+def smoothed(sliding, static, stribeck, smoothing):
+    return builder().angular_friction(
+        "s", "pivot", sliding=sliding, static=static, stribeck=stribeck, smoothing=smoothing
+    ).scene()
+
+
+def law(v, sliding, static, stribeck, smoothing):
+    """Hess and Soom as the page has it, written anew."""
+    return (sliding + (static - sliding) / (1.0 + (v / stribeck) ** 2)) * v / np.hypot(v, smoothing)
+
+
+LAWS = [
+    (1.0, 1.5, 0.05, 0.01), (0.0, 1.0, 0.05, 0.01), (0.9, 1.0, 0.05, 0.2), (0.5, 1.0, 0.05, 0.5),
+    (1.0, 1.5, 0.05, 2e-4), (0.4, 0.6, 0.3, 0.05),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("numbers", LAWS)
+def test_the_peak_of_smoothed_friction_is_that_of_the_law(numbers):
+    """A maximum over a million speeds, which knows nothing of derivatives."""
+    found = friction_peak(*numbers)[1]
+    assert found == pytest.approx(np.max(law(np.geomspace(1e-6, 1e6, 1_000_001), *numbers)), rel=1e-6)
+
+
+def test_friction_that_smoothing_weakens_is_doubtful_with_figures_that_mend_it():
+    (doubt,) = fm.check_scene(smoothed(1.0, 1.5, 0.05, 0.01))
+    assert doubt.waiver == "friction_peak" and "86.7%" in doubt.what and "1.301" in doubt.what
+    most = float(doubt.remedy.split("smoothing of ")[1].split()[0])
+    assert not fm.check_scene(smoothed(1.0, 1.5, 0.05, 0.95 * most))
+    assert fm.check_scene(smoothed(1.0, 1.5, 0.05, 1.1 * most))
+    assert not fm.check_scene(smoothed(1.0, 1.0, 0.05, 0.01))
+    assert not fm.check_scene(msgspec.structs.replace(smoothed(1.0, 1.5, 0.05, 0.01), allow=("friction_peak",)))
+
+
+def test_a_load_above_the_peak_runs_away_and_one_below_it_creeps():
+    """0.948 of the static load: the page's formula says 0.03 m/s, which the smoothed law does not have."""
+
+    def gone(load):
+        made = fm.SceneBuilder("block").rigid_body("block", mass=1.0, inertia=(1.0, 1.0, 1.0))
+        made.prismatic("rail", "ground", "block", axis=(1, 0, 0))
+        made.linear_friction("guide", "rail", sliding=1.0, static=1.5, stribeck=0.05, smoothing=0.01)
+        made.force("push", "block", direction=(1, 0, 0), function=fm.Constant(value=load))
+        with pytest.warns(fm.SceneWarning, match="runs away"):
+            return fm.simulate(made.scene(), 10.0, samples=2).q[-1, 0]
+
+    peak = friction_peak(1.0, 1.5, 0.05, 0.01)[1]
+    assert gone(0.948 * 1.5) > 10.0 and gone(1.01 * peak) > 1.0
+    assert gone(0.99 * peak) < 0.3

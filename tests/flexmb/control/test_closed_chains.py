@@ -115,7 +115,7 @@ def crank_turn(rate: float, times: Any) -> Any:
 @pytest.mark.parametrize("settings", RUNS)
 def test_a_controlled_crank_turns_through_where_its_rod_lies_on_it(settings: str) -> None:
     """Accelerations depend on speeds here; the rod passes the crank back and forth."""
-    scene = controlled(m.slider_crank(0.5, 0.5, angle=1.3, rate=12.0), "drive", LAGGING)
+    scene = controlled(m.slider_crank(0.5, 0.5, angle=1.3, rate=1.9), "drive", LAGGING)
     run = fm.simulate(scene, 1.0, samples=21, **RUNS[settings])
     assert run.finished, run.message
     assert np.sum(np.diff(np.sign(np.cos(run.q[:, 0]))) != 0.0) >= 2
@@ -209,9 +209,10 @@ def test_loads_of_hinges_and_closures_are_measured(period: float | None, algorit
     )  # fmt: skip
     run = fm.simulate(controlled(GRASHOF, "drive", law, *LOADS), 0.2, samples=11, algorithm=algorithm, rtol=1e-8)
     assert run.finished, run.message
-    size = np.abs(run.loads["loop"]).max()
-    assert np.abs(run.signals["pin load"] - run.loads["pin"]).max() < 1e-9 * size
-    assert np.abs(run.signals["loop load"] - run.loads["loop"]).max() < 1e-9 * size
+    size = np.nanmax(np.abs(run.loads["loop"]))
+    for name in ("pin", "loop"):  # out of the plane nothing determines them
+        np.testing.assert_allclose(run.signals[f"{name} load"], run.loads[name], rtol=0.0, atol=1e-9 * size)
+        assert np.array_equal(np.isnan(run.loads[name]).any(axis=0), [True, True, False, False, False, True])
     if period:  # samples of the output are instants of the law
         expected = 0.02 * run.loads["pin"][1:, 3] - 0.01 * run.loads["loop"][1:, 4]
         before = fm.simulate(controlled(GRASHOF, "drive", law, *LOADS), 0.2, samples=11, rtol=1e-8).signals["law"]

@@ -304,3 +304,22 @@ def test_a_run_with_controllers_is_refused() -> None:
     run = fm.simulate(strip.scene(), 0.01, samples=2, rtol=1e-6, atol=1e-8)
     with pytest.raises(NotImplementedError, match="controllers"):
         run.section_loads("beam", 0.0)
+
+
+@pytest.mark.parametrize("elements", [5, 10])
+def test_lumped_masses_step_at_nodes_by_what_the_warning_says(elements: int) -> None:
+    """A level beam under its weight: half an element's weight just beside a node, nothing half-way between two."""
+    made = fm.SceneBuilder("shelf", gravity=(0.0, -9.81, 0.0)).beam(
+        "rod", length=1.0, elements=elements, section=SECTION, mass="lumped", level="rigid", modes=1
+    )
+    system = fm.compile(made.weld("wall", "ground", "rod").scene())
+    half = 0.5 / elements
+    x = np.sort(np.r_[half + np.arange(elements) / elements, 2 * half + 1e-9])
+    with pytest.warns(fm.SceneWarning, match=f"{50.0 / elements:.2g} % of that at the root"):
+        loads = system.section_loads(system.initial_state, "rod", x)
+    weight = system.hinge_loads(system.initial_state)["wall"][4]
+    off = np.abs(np.abs(loads.shear[:, 0]) - abs(weight) * (1.0 - x)) / abs(weight)
+    beside = np.isclose(x, 2 * half + 1e-9, rtol=0.0, atol=1e-12)
+    assert off[beside] == pytest.approx(half, rel=1e-6) and np.max(off[~beside]) < 1e-12
+    moment = np.abs(np.abs(loads.bending[:, 1]) - 0.5 * abs(weight) * (1.0 - x) ** 2) / (0.5 * abs(weight))
+    assert np.max(moment) == pytest.approx(0.25 / elements**2, rel=1e-6)

@@ -1,0 +1,49 @@
+"""What closures add to the operators of a tree: the inertia that they feel, Jain & Rodriguez, section VIII."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from flexmb.closure.closures import Closures
+from flexmb.closure.impulses import RowMotion
+from flexmb.closure.tables import ROTATION
+from flexmb.typing import Real
+
+
+@dataclass(frozen=True, eq=False)
+class ClosureOperators:
+    """Closures at one state, of G rows (the motions that they suppress) on a tree of nu speeds; SI.
+
+        Lambda_inverse f = -opening,    udot = udot_0 + M^-1 J'f,    f = `loads`
+
+    rows (G,)               "<closure>.rotation.x" and so on, axes of frame A turned so that the closure's axis is z
+    J (G,nu)                rates of the rows are J u, of all speeds
+    Lambda_inverse (G,G)    J M^-1 J' of the free speeds, the inverse of the tree's effective inertia reflected at the
+                            closures: what unit loads of the rows do to the rows. As B'B, found by the recursion
+    opening (G,)            J udot_0 + gamma, at which closures would open under the accelerations udot_0 of the tree
+    loads (G,)              what closures exert along the rows on body_b, N and N m, the least where rows are redundant
+
+    M is the mass matrix and udot_0 the accelerations of the tree: those of `flexmb.System(scene)`.
+    """
+
+    rows: tuple[str, ...]
+    J: Real
+    Lambda_inverse: Real
+    opening: Real
+    loads: Real
+
+
+def closure_operators(closures: Closures, t: float, y: Real) -> ClosureOperators:
+    """At y = [q, u, work], which closes all closures; DynamicsError where they are singular."""
+    closures.motion(t, y)
+    loads = closures.row_loads
+    opening, B = closures.opening(t, y)
+    return ClosureOperators(_names(closures), RowMotion(closures, t, y).jacobian, B @ B.T, opening, loads)
+
+
+def _names(closures: Closures) -> tuple[str, ...]:
+    _, own = closures.constants
+    kinds = ["rotation" if kind == ROTATION else "translation" for kind in own.row["type"]]
+    owners = [closures.scene[i].name for i in own.row["closure"]]
+    axes = ["xyz"[axis] for axis in own.row["axis"]]
+    return tuple(".".join(each) for each in zip(owners, kinds, axes, strict=True))

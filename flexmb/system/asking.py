@@ -1,0 +1,97 @@
+"""What is asked of the initial state of a closed chain: by its scene, or by names where a run begins."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flexmb.closure.asked import Asked, Value, Wishes
+from flexmb.scene.bodies import IDENTITY
+from flexmb.scene.hinges import Free, Spherical
+from flexmb.typing import Real
+
+if TYPE_CHECKING:
+    from flexmb.building.links import BodyLink
+    from flexmb.system.tree_system import System
+
+
+class _Item(NamedTuple):
+    """A value and that of its rates, by places in q and in u; what it is where nothing is given."""
+
+    q: tuple[int, ...]
+    u: tuple[int, ...]
+    marked: bool = False
+    rest: tuple[float, ...] | None = None
+
+
+def asked(system: System, y: Real, named: NDArray[np.bool_] | None = None) -> Asked:
+    """Of values y = [q, u, work] of a scene, or of those of them that a run has named (nq+nu+1,)."""
+    items = list(_items(system))
+    known = named if named is not None else np.zeros(len(y), bool)
+    coordinates = [((item.q, item.u), item) for item in items]
+    speeds = [((tuple(system.nq + j for j in item.u), item.u), item) for item in items]
+    prescribed = frozenset(np.flatnonzero(system.constants.speed["prescribed"] >= 0).tolist())
+
+    def wishes(values: list[tuple[Value, _Item]]) -> Wishes:
+        free = [(value, item) for value, item in values if value[0] and not prescribed.issuperset(value[1])]
+        insisted = [value for value, item in free if (item.marked if named is None else np.any(known[list(value[0])]))]
+        given = [
+            value for value, item in free if value in insisted or item.marked or _is_given(y, value, item, system.nq)
+        ]
+        return Wishes(tuple(given), tuple(insisted))
+
+    names = tuple(name for names in system.state_names for name, _ in names)
+    return Asked(
+        wishes(coordinates), wishes(speeds), system.nq, tuple(_modes(system)), prescribed, names,
+        is_marked=named is None,
+    )  # fmt: skip
+
+
+def everything(system: System) -> Asked:
+    """Of a state that was given as a whole."""
+    return Asked(
+        Wishes(tuple(((i,), ()) for i in range(system.nq))),
+        Wishes(tuple(((system.nq + j,), (j,)) for j in range(system.nu))),
+        system.nq, (), frozenset(), tuple(name for names in system.state_names for name, _ in names), is_marked=False,
+    )  # fmt: skip
+
+
+def _is_given(y: Real, value: Value, item: _Item, nq: int) -> bool:
+    rest = item.rest if item.rest is not None and value[0][0] < nq else (0.0,) * len(value[0])
+    return any(y[place] != default for place, default in zip(value[0], rest, strict=True))
+
+
+def _items(system: System) -> Iterator[_Item]:
+    for link in system._links:
+        name = link.hinge.name
+        yield from _of_hinge(link, system.coordinate(name).start, system.speed(name).start)
+        modes = f"{link.name}.modes"
+        yield _Item(_all(system.coordinate(modes)), _all(system.speed(modes)))
+    for wheel in system.scene.wheels:
+        yield _Item(_all(system.coordinate(wheel.name)), _all(system.speed(wheel.name)))
+
+
+def _modes(system: System) -> Iterator[Value]:
+    for link in system._links:
+        q, u = (_all(place(f"{link.name}.modes")) for place in (system.coordinate, system.speed))
+        yield (*q, *(system.nq + j for j in u)), u
+
+
+def _of_hinge(link: BodyLink, q: int, u: int) -> Iterator[_Item]:
+    hinge, kind = link.hinge, link.kind
+    if not isinstance(hinge, Spherical | Free):
+        for i, (_, coordinate) in enumerate(link.scalar):
+            yield _Item((q + i,), (u + i,), coordinate.given)
+        return
+    turning = tuple(u + j for j in range(kind.speeds) if j not in kind.displacements)
+    yield _Item(tuple(range(q + kind.quaternion, q + kind.quaternion + 4)), turning, hinge.given, IDENTITY)
+    if kind.displacements:
+        place = tuple(range(q, q + kind.quaternion))
+        yield _Item(place, tuple(u + j for j in kind.displacements), hinge.given)
+
+
+def _all(place: slice) -> tuple[int, ...]:
+    return tuple(range(place.start, place.stop))

@@ -1,0 +1,87 @@
+"""What the motion leaves open is compared with nothing, whoever gives numbers for it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import msgspec
+import numpy as np
+import pytest
+
+from crosscheck.engines.answers import BrokenContract, checked_run
+from crosscheck.engines.contract import Effort, Run
+from crosscheck.engines.native import NativeEngine
+from crosscheck.report.ci import write_summary
+from tests.crosscheck.made_records import TIP, judged, ladder, way
+from tests.flexmb.closure import mechanisms
+
+TORQUE, FORCE = "load:pin.torque", "load:pin.force"
+THREE = """
+[[variant]]
+name = "rigid"
+engines = ["one", "two", "three"]
+
+[[comparison]]
+name = "all"
+variant = "rigid"
+engines = ["one", "two", "three"]
+goals = { "marker:tip.position" = 1e-3, load = 1e-3 }
+"""
+
+
+def without_torque(runs):
+    return [msgspec.structs.replace(run, undetermined=(TORQUE,)) for run in runs]
+
+
+def records(*, said: bool):
+    """Two engines that agree on everything and one that has no torque, and says why or does not."""
+    one = ladder("one", {TIP: way(), FORCE: way()})
+    both = {TIP: way(), FORCE: way(), TORQUE: way()}
+    return (without_torque(one) if said else one) + ladder("two", both) + ladder("three", both)
+
+
+def test_nobody_is_compared_in_what_one_says_is_open(tmp_path):
+    outcome = judged(THREE, records(said=True))
+    assert outcome.ok and {verdict.channel for verdict in outcome.all} == {TIP, FORCE}
+    assert {(each.engine, each.channel) for each in outcome.inapplicable} == {
+        (engine, TORQUE) for engine in ("one", "two", "three")
+    }
+    assert all("not determined, as one says" in each.reason for each in outcome.inapplicable)
+    write_summary(outcome, tmp_path / "summary.md")
+    assert "not determined" in (tmp_path / "summary.md").read_text(encoding="utf-8")
+
+
+def test_an_engine_that_leaves_it_out_without_a_word_refuses_it():
+    outcome = judged(THREE, records(said=False))
+    assert not outcome.ok and {verdict.channel for verdict in outcome.all} == {TIP, FORCE, TORQUE}
+
+
+def test_a_goal_of_open_loads_alone_is_no_misspelt_one():
+    runs = [run for name in ("one", "two", "three") for run in without_torque(ladder(name, {TIP: way()}))]
+    outcome = judged(THREE, runs)
+    assert outcome.ok and {verdict.channel for verdict in outcome.all} == {TIP}
+
+
+@pytest.fixture(scope="module")
+def run():
+    """A planar four-bar closed in space: nothing determines its loads out of the plane."""
+    scene = mechanisms.four_bar()
+    times = np.array([0.0, 0.01])
+    found = NativeEngine().compile(scene).simulate(Run(times), Effort("tolerance", 1e-8, "dop853"))
+    return scene, times, found
+
+
+def test_our_own_engine_names_open_loads_and_the_contract_takes_them(run):
+    scene, times, found = run
+    checked = checked_run(found, times, scene)
+    names = ("drive", "loop", "pin", "pivot")
+    assert checked.undetermined == tuple(f"load:{name}.{part}" for name in names for part in ("force", "torque"))
+
+
+def test_numbers_that_are_none_must_be_named(run):
+    scene, times, found = run
+    with pytest.raises(BrokenContract, match="not finite"):
+        checked_run(replace(found, undetermined=()), times, scene)
+    with pytest.raises(BrokenContract, match="channels of loads and drives"):
+        checked_run(replace(found, undetermined=("energy.kinetic",)), times, scene)
+
