@@ -167,8 +167,6 @@ def in_one_line() -> Iterator[None]:
         except KeyboardInterrupt:
             console.print(words("interrupted: what was done is recorded, and the same command goes on from there"))
             raise typer.Exit(EXIT_INTERRUPTED) from None
-        except BrokenPipeError:  # the reader of the output has closed it
-            raise
         except OSError as error:
             refuse(in_words(error))
         except (ValueError, FolderInUseError) as error:

@@ -37,7 +37,7 @@ from crosscheck.library import find
 from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
-from crosscheck.report import write_all
+from crosscheck.report import mark_unfinished, write_all
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.running.sweep import sweep
@@ -107,6 +107,7 @@ def run(
         refuse(idle)
     with sole_writer(out, strict):
         runs_on = scheduler_at(scheduler)
+        mark_unfinished(out / "records.jsonl", out)
         with LiveProgress(console, shown) as live:
             sweep(
                 chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=Limits(jobs, time_limit),

@@ -34,7 +34,8 @@ class SessionOutcome:
 
     `strict`: figures that are worse than recorded, or not recorded, and references that were never made, are not as
     expected. `inapplicable` is what engines that have joined a case cannot represent of it. `asked` are the engines
-    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference.
+    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference. `unfinished`:
+    the session has begun and not come to its end, so that nothing is judged.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -44,6 +45,7 @@ class SessionOutcome:
     inapplicable: tuple[Inapplicable, ...] = ()
     asked: tuple[str, ...] = ()
     unreferenced: tuple[str, ...] = ()
+    unfinished: bool = False
 
     @property
     def all(self) -> list[Verdict]:
@@ -104,12 +106,15 @@ class SessionOutcome:
     @property
     def ok(self) -> bool:
         """Every verdict is the expected one, everything asked for ran and was judged in something, nothing is lost."""
-        sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken and not self.uncompared
+        complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
+        sound = complete and not self.unexpected and not self.uncompared
         return sound and not (self.strict and (self.worse or self.unrecorded or self.unreferenced))
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
+        if self.unfinished:
+            return "Unfinished: the session has not come to its end"
         if not self.all:
             why = self._broken if self.broken else self._uncompared if self.inapplicable else ""
             return "Nothing was compared" + (f": {why}" if why else "")

@@ -14,7 +14,9 @@ from crosscheck.judging.figures import recordable
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from flexmb.output.printable import printable
+from flexmb.output.whole import whole_file, write_whole
 
+VERDICTS = "verdicts.json"
 SHOWN = 40
 # Characters with a meaning in Markdown: within a line (an underscore only beside a gap), and list signs at its start.
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
@@ -23,7 +25,7 @@ MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\
 def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
     """verdicts.json: a list with one record a verdict."""
     records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
-    file.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+    write_whole(file, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
 def write_summary(outcome: SessionOutcome, file: Path) -> None:
@@ -58,7 +60,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += [f"- {_flat(f'{case} {NO_REFERENCE.format(case)}')}" for case in outcome.unreferenced]
     if outcome.broken:
         lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(file, "\n".join(lines) + "\n")
 
 
 def write_junit(outcome: SessionOutcome, file: Path) -> None:
@@ -96,11 +98,14 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
         ElementTree.SubElement(test, "failure", type="nothing", message="it was asked for and compared in nothing")
     if not outcome.all:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
-        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
-        ElementTree.SubElement(test, "failure", type="nothing", message=outcome.headline)
+        unfinished, nothing = ("unfinished", "the session came to its end"), ("nothing", "something was compared")
+        kind, name = unfinished if outcome.unfinished else nothing
+        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name=name)
+        ElementTree.SubElement(test, "failure", type=kind, message=outcome.headline)
     for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
         element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
-    ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
+    with whole_file(file) as beside:
+        ElementTree.ElementTree(suites).write(beside, encoding="utf-8", xml_declaration=True)
 
 
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:

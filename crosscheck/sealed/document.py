@@ -4,9 +4,11 @@ The file is one JSON object. Every key:
 
 - ``format`` "crosscheck results" and ``version`` 1; a reader refuses others;
 - ``sha256``: hex digest of the file as it stands without this key and its line end (`crosscheck.sealed.seal`);
+- ``unfinished`` (left out: false): the session has begun and not come to its end, and no verdict is in the file;
 - ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
 - ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
-- ``records``: SHA-256 of the records.jsonl that was judged; ``broken``: how many of its lines are none;
+- ``records``: SHA-256 of the records.jsonl that was judged, "" where there was none yet; ``broken``: how many of its
+  lines are none;
 - ``cases``, by name, each with
 
   - ``files``: SHA-256 of the case's files (run.toml, scenes, provenance, reference.csv ...) when it was run;
@@ -93,6 +95,7 @@ class SealedResults(_SealedPart, frozen=True, kw_only=True):
 
     format: str = ""
     version: int = 0
+    unfinished: bool = False
     exit_code: int
     headline: str
     strict: bool = False
@@ -119,12 +122,13 @@ def results_of(session: Session, outcome: SessionOutcome, records: Path) -> Seal
     return SealedResults(
         format=FORMAT,
         version=VERSION,
+        unfinished=outcome.unfinished,
         exit_code=0 if outcome.ok else 1,
         headline=outcome.headline,
         strict=outcome.strict,
         engines=() if latest is None else latest.engines,
         made=made,
-        records=file_digest(records),
+        records=file_digest(records) if records.exists() else "",
         broken=len(outcome.broken),
         cases={case.case.case: _case(case, outcome) for case in session.cases},
     )

@@ -13,6 +13,7 @@ from flexmb.control.memory import LoopMemory
 from flexmb.integrate.catalogue import integrator
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import NUMBERS, TAKEN_UP, TIME, Memory
+from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
 
 
@@ -41,7 +42,7 @@ class Restart:
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a file of NumPy (`.npz`) that is read back exactly."""
-        with Path(path).open("wb") as file:
+        with whole_file(Path(path)) as beside, beside.open("wb") as file:
             np.savez(
                 file, method=self.method, t=self.t, scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),
                 numbers=self.memory.numbers, y=self.memory.y, rows=self.memory.rows,
