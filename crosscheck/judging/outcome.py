@@ -81,8 +81,18 @@ class SessionOutcome:
 
     @property
     def worse(self) -> list[Verdict]:
-        """Verdicts as expected, whose E or U has grown beyond what was accepted."""
-        return [verdict for verdict in self.all if verdict.ok and verdict.worse]
+        """Verdicts as expected, whose E or U has grown beyond what was accepted on the same basis."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.worse and not verdict.stale]
+
+    @property
+    def stale(self) -> list[Verdict]:
+        """Verdicts as expected, whose figures were accepted on another basis."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.stale]
+
+    @property
+    def outgrown(self) -> list[Verdict]:
+        """Those of them whose E or U is beyond the accepted one: what that says nobody knows."""
+        return [verdict for verdict in self.stale if verdict.worse]
 
     @property
     def unrecorded(self) -> list[Verdict]:
@@ -108,7 +118,8 @@ class SessionOutcome:
         """Every verdict is the expected one, everything asked for ran and was judged in something, nothing is lost."""
         complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
         sound = complete and not self.unexpected and not self.uncompared
-        return sound and not (self.strict and (self.worse or self.unrecorded or self.unreferenced))
+        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced
+        return sound and not (self.strict and lacking)
 
     @property
     def headline(self) -> str:
@@ -129,6 +140,8 @@ class SessionOutcome:
             parts.append(f"{len(self.lost)} {runs} asked for gave no result")
         if self.worse:
             parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
+        if self.strict and self.outgrown:
+            parts.append(f"{len(self.outgrown)} of {len(self.all)} verdicts are beyond stale figures: accept them anew")
         if self.strict and self.unrecorded:
             parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
         if self.strict and self.unreferenced:

@@ -44,6 +44,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         if len(outcome.unexpected) > SHOWN:
             lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
     lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
+    lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)
     if outcome.strict:
         lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
     if outcome.absences:
@@ -129,7 +130,7 @@ def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:
     if not outcome.strict or not verdict.ok:
         return ""
     if verdict.worse:
-        return f"worse than recorded: {verdict.worse}"
+        return verdict.grown
     return "no accepted figures" if verdict.accepted is None and recordable(verdict, BUILT_IN) else ""
 
 
@@ -138,7 +139,7 @@ def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bo
     name = f"{verdict.comparison}: {verdict.channel}, {verdict.pair}"
     test = ElementTree.SubElement(suite, "testcase", classname=f"{verdict.case}.{verdict.kind}", name=name)
     if verdict.ok and verdict.worse:
-        ElementTree.SubElement(test, "system-out").text = f"worse than recorded: {verdict.worse}"
+        ElementTree.SubElement(test, "system-out").text = verdict.grown
     if complaint:
         ElementTree.SubElement(test, "failure", type="figures", message=complaint)
         return "failure"

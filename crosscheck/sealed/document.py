@@ -15,7 +15,8 @@ The file is one JSON object. Every key:
   - ``scenes``: digest of the scene and the sample times of each variant;
   - ``verdicts``: by comparison and "channel | engine (variant) | engine (variant)": ``kind`` (left out: "comparison"),
     ``status``, ``expected`` (left out: "agree"), ``ok`` (left out: true), ``E``, ``U`` (relative; left out where there
-    is none), ``goal``, ``worse`` and, where it is not as expected, ``reason``;
+    is none), ``goal``, ``worse`` (E or U is beyond the accepted figure), ``stale`` (what is another than it was when
+    that was accepted) and, where it is not as expected, ``reason``;
   - ``not_applicable`` (left out if empty): the engine's reason by "variant | engine", or "variant | engine | channel"
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
@@ -56,6 +57,7 @@ class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
     U: float | None = None
     goal: float = 0.0
     worse: str = ""
+    stale: str = ""
     reason: str = ""
 
 
@@ -164,6 +166,7 @@ def _verdict(verdict: Verdict) -> SealedVerdict:
         U=_short(verdict.U, 4),
         goal=verdict.goal,
         worse=verdict.worse,
+        stale=verdict.stale,
         reason="" if verdict.ok else verdict.reason,
     )
 
