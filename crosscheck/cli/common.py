@@ -118,7 +118,9 @@ SchedulerAddress = Annotated[
 Strict = Annotated[
     bool,
     typer.Option(
-        "--strict", help="Figures worse than recorded or not recorded, references never made, doubtful scenes: errors."
+        "--strict",
+        help="Figures worse than recorded, beyond stale ones or not recorded, references never made, doubtful scenes: "
+        "errors.",
     ),
 ]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]

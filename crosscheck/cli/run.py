@@ -86,7 +86,10 @@ def run(
     `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
     reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than
     recorded*: a warning, and with `--strict` an error, as is a comparison of the library's own engines without
-    accepted figures. Nothing is accepted while anything is not as expected.
+    accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are told as *stale*:
+    accept them anew. Nothing is accepted while anything is not as expected.
+
+    Until the session has come to its end, all that it writes says that it is unfinished.
 
     **Exit code**: 0 every verdict is the one the case expects and everything asked for gave its result;
     1 something is not as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept`

@@ -176,6 +176,14 @@ def test_a_figure_of_another_basis_is_stale_and_not_worse(
     assert held.ok and len(held.stale) == 1, "a stale figure that is not exceeded is told, and no error"
 
 
+def test_a_figure_is_of_its_two_sides_whichever_other_engines_run(own: None) -> None:
+    text = ONE_PAIR.replace('["one", "two"]', '["one", "two", "fine"]')
+    runs = [run for name in ("one", "two", "fine") for run in ladder(name, {TIP: way()}, spread=1e-7)]
+    some = figures(judged(text, runs, asked=("one", "two"), basis="as written").all, ("one", "two", "fine"))
+    every = figures(judged(text, runs, basis="as written").all, ("one", "two", "fine"))
+    assert len(every["both"]) == 3 and some["both"] == {PLACE: every["both"][PLACE]}
+
+
 def test_a_figure_without_a_basis_is_held_against_as_it_always_was(own: None) -> None:
     then = {"both": {PLACE: Figure(1e-9, 1e-8)}}
     assert session(then).worse and not session(then).stale
