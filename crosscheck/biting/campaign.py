@@ -31,6 +31,7 @@ from crosscheck.records.session import last_session
 from crosscheck.running.plan import MAIN, Job, plan, variant_scene
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from flexmb.output.whole import take_away, write_whole
 from flexmb.run.channels import channels_of, distance, family, magnitude
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
@@ -67,12 +68,13 @@ def run_campaign(
     subjects = [subject(case, engine) for case in cases]
     litters = [litter(each, all_targets) for each in subjects]
     plans = [_plan(each.case, provider, limits) for each in litters]
+    take_away(out / SCORES)  # of an earlier campaign, should this one be killed
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
     bites = tuple(scored(one, mutants, found[one.case.name]) for one, mutants in zip(subjects, litters, strict=True))
     ordered = tuple(sorted(bites, key=lambda each: each.case))
     text = msgspec.json.format(msgspec.json.encode(MutationFile(cases=ordered)), indent=1)
-    (out / SCORES).write_bytes(text + b"\n")
+    write_whole(out / SCORES, text + b"\n")
     return bites
 
 

@@ -28,6 +28,7 @@ from crosscheck.records.session import last_session
 from crosscheck.running.plan import MAIN, Job, plan, scene_identity
 from crosscheck.running.scheduler import BY_DEFAULT, Limits
 from crosscheck.running.sweep import PROVIDER, Listener, run_planned
+from flexmb.output.whole import take_away, write_whole
 from flexmb.run.channels import magnitude
 from flexmb.scene.check import check_scene
 
@@ -96,11 +97,12 @@ def run_invariances(
     """
     sets = [_planned(subject(case, engine), provider, limits) for case in cases]
     plans = [(each.record, each.jobs) for each in sets]
+    take_away(out / VERDICTS)  # of an earlier session, should this one be killed
     run_planned(plans, (engine,), out / RECORDS, fresh=fresh, limits=limits, listener=listener)
     found = {each.case.case: each for each in collect(last_session(read(out / RECORDS))).cases}
     verdicts = tuple(verdict for each in sets for verdict in _judged(each, found[each.what.case.name]))
     text = msgspec.json.format(msgspec.json.encode(InvarianceFile(verdicts=verdicts)), indent=1)
-    (out / VERDICTS).write_bytes(text + b"\n")
+    write_whole(out / VERDICTS, text + b"\n")
     return verdicts
 
 

@@ -4,8 +4,10 @@ from crosscheck.cli import (  # noqa: F401, I001 - each adds its commands, in th
     run, bench, chart, compare, listing, verify, regenerate, contract, mutate, invariance, stability, sweep,
 )  # fmt: skip
 from crosscheck.cli.common import app
+from flexmb.output.readers import outlive_readers
 
 
 def main() -> None:
     """Entry point of the console script."""
+    outlive_readers()
     app()

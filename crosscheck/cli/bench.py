@@ -25,7 +25,8 @@ from crosscheck.cli.common import (
 from crosscheck.running.scheduler import Limits
 from crosscheck.terminal.live import LiveProgress
 from crosscheck.terminal.text import words
-from flexmb.output.writing import check_folder, folder, writing
+from flexmb.output.whole import take_away, write_whole
+from flexmb.output.writing import check_folder, folder
 
 Variants = Annotated[
     list[str] | None,
@@ -75,6 +76,7 @@ def bench(
     with in_one_line():
         if json_file is not None:
             check_folder(json_file.parent)
+            take_away(json_file)
         for case in found(tuple(cases)):
             with LiveProgress(console, shown) as live:
                 done = bench_case(
@@ -95,5 +97,4 @@ def bench(
 
 def _write(file: Path, document: dict[str, Any]) -> None:
     folder(file.parent)
-    with writing(file):
-        file.write_text(json.dumps(document, indent=1, allow_nan=False), encoding="utf-8")
+    write_whole(file, json.dumps(document, indent=1, allow_nan=False))

@@ -49,12 +49,13 @@ def chart(
     **Examples**: `crosscheck chart tops/gyrostat --out charts` · `crosscheck chart canonical -e native -e mujoco`
     """
     from crosscheck.timing.chart import chart as chart_case
-    from crosscheck.timing.page import write_case, write_index  # it loads matplotlib
+    from crosscheck.timing.page import INDEX, write_case, write_index  # it loads matplotlib
 
     check_limit(time_limit)
     shown = verbosity(quiet, False)
     done = []
     with sole_writer(out):
+        (out / INDEX).unlink(missing_ok=True)  # of earlier charts, should this command be killed
         for case in found(tuple(cases)):
             with LiveProgress(console, shown) as live:
                 charts = chart_case(

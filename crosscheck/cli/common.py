@@ -124,7 +124,9 @@ SchedulerAddress = Annotated[
 Strict = Annotated[
     bool,
     typer.Option(
-        "--strict", help="Figures worse than recorded or not recorded, references never made, doubtful scenes: errors."
+        "--strict",
+        help="Figures worse than recorded, beyond stale ones or not recorded, references never made, doubtful scenes: "
+        "errors.",
     ),
 ]
 SingleFile = Annotated[bool, typer.Option("--single-file", help="The report as one file, report.html, to send around.")]
@@ -173,8 +175,6 @@ def in_one_line() -> Iterator[None]:
         except KeyboardInterrupt:
             console.print(words("interrupted: what was done is recorded, and the same command goes on from there"))
             raise typer.Exit(EXIT_INTERRUPTED) from None
-        except BrokenPipeError:  # the reader of the output has closed it
-            raise
         except OSError as error:
             refuse(in_words(error))
         except (ValueError, FolderInUseError) as error:

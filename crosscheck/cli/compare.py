@@ -10,6 +10,7 @@ import typer
 
 from crosscheck.cli.common import Json, Quiet, Verbose, app, console, print_json, refuse, verbosity
 from crosscheck.sealed.compare import compare_results
+from crosscheck.sealed.document import SealedResults
 from crosscheck.sealed.seal import ResultsError, read_results
 from crosscheck.terminal.differences import print_differences
 
@@ -29,17 +30,26 @@ def compare(
     accepted figures (10, above rounding), a run does not finish any more. **Gone**: what was judged is not judged any
     more. Times are shown where they changed by half, and judge nothing: machines differ.
 
-    **Exit code**: 0 nothing is worse or gone; 1 something is; 2 a file cannot be read, is of another version, or was
-    changed after it was written (every results.json is sealed by its SHA-256).
+    **Exit code**: 0 nothing is worse or gone; 1 something is; 2 a file cannot be read, is of another version, is of a
+    session that was killed, or was changed after it was written (every results.json is sealed by its SHA-256).
 
     **Example**: `crosscheck compare main/results.json out/results.json`
     """
     shown = verbosity(quiet, verbose)
     try:
-        differences = compare_results(read_results(old), read_results(new))
+        differences = compare_results(_finished(old), _finished(new))
     except ResultsError as error:
         refuse(str(error))
     print_differences(console, differences, shown)
     if as_json:
         print_json(asdict(differences) | {"regressed": differences.regressed})
     raise typer.Exit(int(differences.regressed))
+
+
+def _finished(file: Path) -> SealedResults:
+    """The results of a session that has come to its end; ResultsError for any other."""
+    found = read_results(file)
+    if found.unfinished:
+        began = f", begun at {found.made.at}" if found.made.at else ""
+        raise ResultsError(f"{file} is unfinished{began}: the session runs, or it was killed. Run it to its end")
+    return found

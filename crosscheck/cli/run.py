@@ -37,7 +37,7 @@ from crosscheck.library import find
 from crosscheck.library.reference import has_reference
 from crosscheck.library.selection import without_part
 from crosscheck.records.session import last_session, standing
-from crosscheck.report import write_all
+from crosscheck.report import mark_unfinished, write_all
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
 from crosscheck.running.sweep import sweep
@@ -86,7 +86,10 @@ def run(
     `--accept` writes the E and U that this run has reached into `accepted.toml` beside each case's run.toml, to be
     reviewed and kept like code. Later runs say where E or U has grown to more than 10 times that, *worse than
     recorded*: a warning, and with `--strict` an error, as is a comparison of the library's own engines without
-    accepted figures. Nothing is accepted while anything is not as expected.
+    accepted figures. Figures accepted with other efforts, scenes, rules or versions of engines are told as *stale*:
+    accept them anew. Nothing is accepted while anything is not as expected.
+
+    Until the session has come to its end, all that it writes says that it is unfinished.
 
     **Exit code**: 0 every verdict is the one the case expects and everything asked for gave its result;
     1 something is not as expected, failed or did not run, an engine asked for was compared in nothing, or `--accept`
@@ -107,6 +110,7 @@ def run(
         refuse(idle)
     with sole_writer(out, strict):
         runs_on = scheduler_at(scheduler)
+        mark_unfinished(out / "records.jsonl", out)
         with LiveProgress(console, shown) as live:
             sweep(
                 chosen, tuple(engine or ()), out / "records.jsonl", fresh=fresh, limits=Limits(jobs, time_limit),

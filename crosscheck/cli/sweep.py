@@ -11,11 +11,11 @@ import typer
 from crosscheck.cli.common import Jobs, Out, SchedulerAddress, TimeLimit, app, check_limit, console, sole_writer
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.schedulers import LOCAL, scheduler_at
-from crosscheck.sampling.run import run_sweep
+from crosscheck.sampling.run import SUMMARY, run_sweep
 from crosscheck.sampling.statistics import summarise
 from crosscheck.terminal.sampling import print_summary, sampling_bar
 from crosscheck.terminal.text import words
-from flexmb.output.writing import writing
+from flexmb.output.whole import write_whole
 
 
 @app.command("sweep")
@@ -30,9 +30,9 @@ def sweep_parameters(
     """
     Run a scene many times with other parameters: Monte Carlo, a Latin hypercube or a grid.
 
-    `docs/sweeps.md` shows a file and explains it. **Writes** into `--out`: `samples.csv`, a line for each sample, as
-    they come; `summary.json`, statistics with their standard errors; `samples.jsonl`, from which a run that was stopped
-    resumes. The samples depend on the seed alone, not on the number of workers.
+    `docs/sweeps.md` shows a file and explains it. **Writes** into `--out`: `samples.csv`, a line for each sample, until
+    the end as `samples.unfinished.csv`; `summary.json`, statistics with their standard errors; `samples.jsonl`, from
+    which a run that was stopped resumes. The samples depend on the seed alone, not on the number of workers.
 
     **Exit code**: 0 every sample gave its quantities; 1 some did not; 2 the file makes no sense.
 
@@ -46,9 +46,8 @@ def sweep_parameters(
                 file, out, fresh=fresh, limits=Limits(jobs, time_limit), scheduler=runs_on, listener=listener
             )
         summary = summarise(done)
-        target = out / "summary.json"
-        with writing(target):
-            target.write_bytes(msgspec.json.format(msgspec.json.encode(summary)) + b"\n")
+        target = out / SUMMARY
+        write_whole(target, msgspec.json.format(msgspec.json.encode(summary)) + b"\n")
         print_summary(console, summary)
         console.print(words("Samples: ") + words(str(out / "samples.csv"), "bold"), soft_wrap=True)
     raise typer.Exit(0 if summary.ok else 1)

@@ -13,6 +13,7 @@ from crosscheck.terminal.csv_channels import channels_table
 from crosscheck.terminal.text import words
 from crosscheck.terminal.verdicts import print_outcome
 from crosscheck.verify.against_case import outcome_json, sample_times_csv, verify_csv
+from flexmb.output.whole import write_whole
 
 
 @app.command()
@@ -62,7 +63,7 @@ def verify(
         if template:
             if csv.exists():
                 refuse(f"{csv} is there already: a template would take its place; name another file")
-            csv.write_text(sample_times_csv(chosen, variant), encoding="utf-8")
+            write_whole(csv, sample_times_csv(chosen, variant))
             console.print(words(f"Fill in {csv}, then run the command again without --template."), soft_wrap=True)
             return
         runs_on = scheduler_at(scheduler)

@@ -28,6 +28,7 @@ BUILT_IN = {
     "dart": "crosscheck.engines.dart:DartEngine",
     "basilisk": "crosscheck.engines.basilisk:BasiliskEngine",
 }
+OWN_CODE = tuple(name for name, place in BUILT_IN.items() if place.startswith("crosscheck.engines.native:"))
 # Engines whose compiled code is another's: what that one leaves in caches on disk serves them too.
 COMPILED_LIKE = {"native-frisch-as-printed": "native-frisch"}
 

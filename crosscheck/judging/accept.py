@@ -16,6 +16,7 @@ from crosscheck.library.find import Case
 from crosscheck.records.archive import Archive, read
 from crosscheck.records.kinds import CaseRecord
 from crosscheck.records.session import last_session
+from flexmb.output.whole import write_whole
 
 
 class NotAccepted(ValueError):
@@ -43,7 +44,7 @@ def accept_figures(cases: Iterable[Case], records: Path, partial: bool) -> list[
             now = figures(outcome.verdicts[case.name], BUILT_IN)
             accepted = merged(case.accepted, now) if partial else now
             file = case.folder / FILE
-            file.write_text(dumps(accepted), encoding="utf-8")
+            write_whole(file, dumps(accepted))
             archive.write(msgspec.structs.replace(latest[case.name], accepted=accepted))
             written.append((file, sum(len(table) for table in accepted.values())))
     finally:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from crosscheck.judging.against_reference import judge_reference
+from crosscheck.judging.basis import basis
 from crosscheck.judging.expectation import outside
 from crosscheck.judging.question import Question
 from crosscheck.judging.results import CaseResults, Result
@@ -36,8 +37,9 @@ def judge(case: CaseResults) -> list[Verdict]:
 
 
 def _comparison(case: CaseResults, item: Comparison) -> Iterator[Verdict]:
-    question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason)
     a, b = (case.get(side.variant, side.engine) for side in item.sides)
+    stands_on = basis(case.case.variants, (a, b), item.scales)
+    question = Question(case.case, item.name, "comparison", *item.sides, item.expect, item.reason, stands_on)
     across = question.a.variant != question.b.variant
     for channel, goal, finding in _channels(item.goals, a, b, case):
         if finding is None:
@@ -100,8 +102,9 @@ def _conservation(case: CaseResults, item: Conservation, engine: str) -> Verdict
     name = f"{item.quantity.replace('_', ' ')} conserved"
     side = ComparisonSide(variant=item.variant, engine=engine)
     law = ComparisonSide(variant=item.variant, engine=TRUE_MODEL)
-    question = Question(case.case, name, "conservation", side, law, item.expect, item.reason)
     result = case.get(item.variant, engine)
+    stands_on = basis(case.case.variants, (result,), item.scale)
+    question = Question(case.case, name, "conservation", side, law, item.expect, item.reason, stands_on)
     channel = CONSERVED[item.quantity]
     finding = _absent(result, channel) or _drift(result, channel, item)
     beyond = outside(item, channel, finding) if finding.status == item.expect else ""

@@ -7,7 +7,8 @@ A figure has grown, and its verdict is *worse than recorded*, if
 E below U is noise, which may be anything from 0 to U on another machine; therefore E is held against U too. The floor
 is the rounding eps sqrt(N) of a million evaluations: growth below it is growth of rounding. The factor is 10 because an
 estimate of U is no better than a factor of a few: an order is observed or not, and the difference of two runs is large
-or small by chance.
+or small by chance. A figure that was accepted on another basis (`crosscheck.judging.basis`) is *stale*: that it has
+grown says nothing against what is judged.
 """
 
 from __future__ import annotations
@@ -42,7 +43,7 @@ def figures(verdicts: Iterable[Verdict], engines: Iterable[str]) -> Accepted:
     found: Accepted = {}
     for verdict in verdicts:
         if recordable(verdict, own) and verdict.E is not None:
-            figure = Figure(_rounded(verdict.E), _rounded(verdict.U or 0.0))
+            figure = Figure(_rounded(verdict.E), _rounded(verdict.U or 0.0), verdict.basis)
             found.setdefault(verdict.comparison, {})[key_of(verdict)] = figure
     return found
 

@@ -34,7 +34,8 @@ class SessionOutcome:
 
     `strict`: figures that are worse than recorded, or not recorded, and references that were never made, are not as
     expected. `inapplicable` is what engines that have joined a case cannot represent of it. `asked` are the engines
-    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference.
+    that were asked for by name, `unreferenced` the cases with a recipe of a reference and no reference. `unfinished`:
+    the session has begun and not come to its end, so that nothing is judged.
     """
 
     verdicts: dict[str, list[Verdict]]
@@ -44,6 +45,7 @@ class SessionOutcome:
     inapplicable: tuple[Inapplicable, ...] = ()
     asked: tuple[str, ...] = ()
     unreferenced: tuple[str, ...] = ()
+    unfinished: bool = False
 
     @property
     def all(self) -> list[Verdict]:
@@ -79,8 +81,18 @@ class SessionOutcome:
 
     @property
     def worse(self) -> list[Verdict]:
-        """Verdicts as expected, whose E or U has grown beyond what was accepted."""
-        return [verdict for verdict in self.all if verdict.ok and verdict.worse]
+        """Verdicts as expected, whose E or U has grown beyond what was accepted on the same basis."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.worse and not verdict.stale]
+
+    @property
+    def stale(self) -> list[Verdict]:
+        """Verdicts as expected, whose figures were accepted on another basis."""
+        return [verdict for verdict in self.all if verdict.ok and verdict.stale]
+
+    @property
+    def outgrown(self) -> list[Verdict]:
+        """Those of them whose E or U is beyond the accepted one: what that says nobody knows."""
+        return [verdict for verdict in self.stale if verdict.worse]
 
     @property
     def unrecorded(self) -> list[Verdict]:
@@ -104,12 +116,16 @@ class SessionOutcome:
     @property
     def ok(self) -> bool:
         """Every verdict is the expected one, everything asked for ran and was judged in something, nothing is lost."""
-        sound = bool(self.all) and not self.unexpected and not self.lost and not self.broken and not self.uncompared
-        return sound and not (self.strict and (self.worse or self.unrecorded or self.unreferenced))
+        complete = not self.unfinished and bool(self.all) and not self.lost and not self.broken
+        sound = complete and not self.unexpected and not self.uncompared
+        lacking = self.worse or self.outgrown or self.unrecorded or self.unreferenced
+        return sound and not (self.strict and lacking)
 
     @property
     def headline(self) -> str:
         """The session in one sentence."""
+        if self.unfinished:
+            return "Unfinished: the session has not come to its end"
         if not self.all:
             why = self._broken if self.broken else self._uncompared if self.inapplicable else ""
             return "Nothing was compared" + (f": {why}" if why else "")
@@ -124,6 +140,8 @@ class SessionOutcome:
             parts.append(f"{len(self.lost)} {runs} asked for gave no result")
         if self.worse:
             parts.append(f"{len(self.worse)} of {len(self.all)} verdicts are worse than recorded")
+        if self.strict and self.outgrown:
+            parts.append(f"{len(self.outgrown)} of {len(self.all)} verdicts are beyond stale figures: accept them anew")
         if self.strict and self.unrecorded:
             parts.append(f"{len(self.unrecorded)} of {len(self.all)} verdicts have no accepted figures")
         if self.strict and self.unreferenced:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from crosscheck.judging.basis import changed
 from crosscheck.judging.figures import worse
 from crosscheck.judging.verdict import Finding, Status, Verdict, VerdictKind
 from crosscheck.library.accepted import key
@@ -13,7 +14,10 @@ from crosscheck.records.kinds import CaseRecord
 
 @dataclass(frozen=True)
 class Question:
-    """What a case asks of two sides: which status it expects of every channel, and why if that is not agreement."""
+    """What a case asks of two sides: which status it expects of every channel, and why if that is not agreement.
+
+    `basis` is what the numbers of the answer will have been found with.
+    """
 
     case: CaseRecord
     name: str
@@ -22,6 +26,7 @@ class Question:
     b: ComparisonSide
     expected: Status
     why: str
+    basis: str = ""
 
     def verdict(self, channel: str, goal: float, finding: Finding, beyond: str = "") -> Verdict:
         """The verdict on one channel; `beyond` says how a finding with the expected status is outside its bounds."""
@@ -50,4 +55,6 @@ class Question:
             outside=beyond,
             accepted=accepted,
             worse=worse(accepted, finding.E, finding.U),
+            stale="" if accepted is None else changed(accepted.of, self.basis),
+            basis=self.basis,
         )

@@ -93,7 +93,7 @@ class Result:
         if _without_effect(ladder):
             ladder = ladder[-1:]
         rungs = [RungSignal(run.effort_value, self.values(channel, run), run.evaluations) for run in ladder]
-        return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel))
+        return estimate(channel, finest.effort_kind, rungs, self._sizes.magnitude(channel, finest.evaluations))
 
     def _ladder(self) -> list[RunRecord]:
         """The last efforts of the finest run's method."""

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from crosscheck.judging.uncertainty import roundoff_floor
 from flexmb.run.channels import family, magnitude, signal_range
 from flexmb.typing import Real
 
@@ -45,11 +46,13 @@ class Sizes:
         """The largest range (SI) in the channel's family, and what the rest of the scene says where that is nothing."""
         return self._largest(signal_range, family(channel)), self._of_scene(channel)
 
-    def magnitude(self, channel: str) -> float:
+    def magnitude(self, channel: str, evaluations: int = 0) -> float:
         """What the rounding of a channel is relative to (SI): the largest magnitude in its family, or what the rest of
-        the scene says where the family is nothing beside that. Exact zeros have no rounding."""
+        the scene says where the family is nothing beside that, or beside what so many `evaluations` leave of it by
+        rounding: a momentum that vanishes is a sum of those of the bodies. Exact zeros have no rounding."""
         kin, of_scene = self._largest(magnitude, family(channel)), self._of_scene(channel)
-        return of_scene if 0.0 < kin < NOTHING * of_scene else kin
+        nothing = max(NOTHING * of_scene, roundoff_floor(of_scene, max(evaluations, 0)))
+        return of_scene if 0.0 < kin < nothing else kin
 
     def _of_scene(self, channel: str) -> float:
         """The size (SI) of such a signal by dimensions, from the scene's other signals; 0 where they say nothing."""

@@ -48,6 +48,8 @@ GRAVITY: tuple[Status, ...] = (
     "did not run", "crashed", "did not finish", "failed", "diverged", "refused", "differ", "unresolved", "agree",
 )  # fmt: skip
 NEVER_EXPECTED = ("did not finish", "crashed", "did not run")
+WORSE = "worse than recorded"
+STALE = "stale figure ({}; accept anew by crosscheck run {} --accept)"
 WHOLE_RANGE = 1.0  # a goal beyond it resolves nothing
 
 
@@ -55,7 +57,8 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     """One judged channel of one comparison; the records of verdicts.json. `scale` is in the channel's SI unit.
 
     `outside` says how a result with the expected status is beyond the bounds that the case sets to it. `accepted` are
-    the figures reached when the case's figures were last accepted, `worse` says how E or U has grown since.
+    the figures reached when the case's figures were last accepted, `worse` says how E or U has grown since, and `stale`
+    what is another than it was then. `basis` is what E and U were found with.
     """
 
     case: str
@@ -78,6 +81,15 @@ class Verdict(msgspec.Struct, frozen=True, kw_only=True):
     outside: str = ""
     accepted: Figure | None = None
     worse: str = ""
+    stale: str = ""
+    basis: str = ""
+
+    @property
+    def grown(self) -> str:
+        """That E or U is beyond the accepted figure, in words, and whether that is the result's fault; "" if not."""
+        if not self.worse:
+            return ""
+        return f"{STALE.format(self.stale, self.case)}: {self.worse}" if self.stale else f"{WORSE}: {self.worse}"
 
     @property
     def sides(self) -> tuple[tuple[str, str], tuple[str, str]]:

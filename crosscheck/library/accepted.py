@@ -6,7 +6,9 @@ reviewed like code. `crosscheck.judging.figures` says when a later figure counts
 The file::
 
     ["rigid, all engines"]            # the comparison, or for conserved quantities e.g. "energy conserved"
-    "energy.total | native (rigid) | mujoco (rigid)" = { E = 1.2e-13, U = 4.5e-12 }
+    "energy.total | native (rigid) | mujoco (rigid)" = { E = 1.2e-13, U = 4.5e-12, of = "0a17c5.c9d3e0.11bb40.9e8f12" }
+
+`of` is what the figure was reached with, see `crosscheck.judging.basis`; a file of an older version has none.
 
 Only the library's own engines have accepted figures: a user's engine is no part of a shipped case.
 """
@@ -23,10 +25,11 @@ HEADER = "# The figures this case has reached. Written by `crosscheck run --acce
 
 
 class Figure(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
-    """What a comparison reached on one channel, relative to its range; a conserved quantity's drift has no U."""
+    """What a comparison reached on one channel, relative to its range, and with what; a drift has no U."""
 
     E: float
     U: float = 0.0
+    of: str = ""
 
 
 Accepted = dict[str, dict[str, Figure]]  # comparison -> channel and sides -> figure
@@ -49,7 +52,8 @@ def dumps(accepted: Mapping[str, Mapping[str, Figure]]) -> str:
         lines.append(f"[{_quoted(name)}]")
         for place, figure in sorted(table.items()):
             doubt = f", U = {figure.U:.1e}" if figure.U else ""
-            lines.append(f"{_quoted(place)} = {{ E = {figure.E:.1e}{doubt} }}")
+            basis = f", of = {_quoted(figure.of)}" if figure.of else ""
+            lines.append(f"{_quoted(place)} = {{ E = {figure.E:.1e}{doubt}{basis} }}")
         lines.append("")
     return "\n".join(lines)
 

@@ -164,7 +164,7 @@ class ChannelItem(_CaseItem):
                 pytest.skip(f"{self.engine} refuses: {verdict.reason}")
             raise NotAsExpected(told(verdict))
         if verdict.worse and self.request.strict:
-            raise NotAsExpected(f"{told(verdict)}\nworse than recorded: {verdict.worse}")
+            raise NotAsExpected(f"{told(verdict)}\n{verdict.grown}")
         if verdict.status != "agree":
             pytest.xfail(f"{verdict.status}, as the case expects: {verdict.expected_reason}")
 

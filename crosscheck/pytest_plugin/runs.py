@@ -20,6 +20,7 @@ from crosscheck.records.session import last_session
 from crosscheck.running.plan import plan
 from crosscheck.running.scheduler import Limits
 from crosscheck.running.sweep import PROVIDER, run_planned
+from flexmb.output.whole import write_whole
 
 DONE, LOCK = "session", ".crosscheck.lock"
 
@@ -54,7 +55,8 @@ class SessionRuns:
             file = place / "clauses.json"
             with self._once(place) as first:
                 if first:
-                    file.write_bytes(msgspec.json.encode(list(try_engine(engine, provider=self.provider))))
+                    outcomes = list(try_engine(engine, provider=self.provider))
+                    write_whole(file, msgspec.json.encode(outcomes))
             outcomes = msgspec.json.decode(file.read_bytes(), type=list[ClauseOutcome])
             self._clauses[engine] = {outcome.clause: outcome for outcome in outcomes}
         return self._clauses[engine][name]
@@ -67,4 +69,4 @@ class SessionRuns:
             done = place / DONE
             first = not done.exists() or done.read_text(encoding="utf-8") != self.session
             yield first
-            done.write_text(self.session, encoding="utf-8")
+            write_whole(done, self.session)

@@ -22,6 +22,7 @@ from crosscheck.library.channels import part_of
 from crosscheck.library.check import check_recorded
 from crosscheck.records.kinds import BrokenLine, CaseRecord, Record, RunRecord, Written
 from crosscheck.records.packing import Packed, packed_bytes, unpack
+from flexmb.output.whole import whole_file
 from flexmb.output.writing import folder, writing
 from flexmb.scene.reading import MIB, allowance, regular_size
 
@@ -142,15 +143,14 @@ def _set_broken_lines_aside(file: Path, kind: Any) -> None:
     broken = {record.number: record for record in decoded_lines(file, kind) if isinstance(record, BrokenLine)}
     if not broken and _ended(file):
         return
-    aside, kept = file.with_name(file.name + ".broken"), file.with_name(file.name + ".kept")
-    with file.open("rb") as stream, kept.open("wb") as whole:
+    aside = file.with_name(file.name + ".broken")
+    with whole_file(file) as kept, file.open("rb") as stream, kept.open("wb") as whole:
         for number, line in enumerate(stream, start=1):
             if number in broken:
                 with aside.open("ab") as lost:
                     lost.write(line)
             elif line.endswith(b"\n"):
                 whole.write(line)
-    os.replace(kept, file)
     for each in broken.values():
         warnings.warn(f"{each}; moved to {aside.name}, and what it held is run again", BrokenRecords, stacklevel=3)
 

@@ -41,12 +41,14 @@ class VariantInfo(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     """What the report needs of a variant's scene: levels of its bodies, how to draw it, or why it could not be made.
 
     `drawing` is by the markers that every run records, `film` by those of a run made to be drawn, where there is one.
+    `basis` identifies scene, transformation and sample times as the case's files state them ("" in older records).
     """
 
     level: str
     drawing: Drawing | None
     error: str = ""
     film: Drawing | None = None
+    basis: str = ""
 
 
 class CaseRecord(_OneRecord, frozen=True, kw_only=True, tag="case"):

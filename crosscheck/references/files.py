@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import os
+from contextlib import ExitStack
 from pathlib import Path
 
 import msgspec
 import tomlkit
 
 from crosscheck.library.reference import KNOWLEDGE, VALUES, Knowledge
-from flexmb.output.writing import writing
+from flexmb.output.whole import whole_file, write_whole
 
 HEADER = "Written by `crosscheck regenerate`, with reference.csv; nobody edits it. docs/references.md explains it."
 
@@ -29,22 +29,21 @@ def knowledge_text(knowledge: Knowledge) -> str:
 
 
 def write_both(folder: Path, values: str, knowledge: str) -> None:
-    """Put both files in place; where that fails, neither is there that was not there before. OSError names the file."""
+    """Put both files in place; where that fails, neither is there that was not there before. OSError names the file.
+
+    They take their places one right after the other. Should the process be killed just between, reading says so:
+    reference.toml holds the digest of the values that it belongs to.
+    """
     texts = {folder / VALUES: values, folder / KNOWLEDGE: knowledge}
-    fresh = {file: file.with_name(f".{file.name}.new") for file in texts}
     before = {file: file.read_bytes() if file.exists() else None for file in texts}
     try:
-        for file, text in texts.items():
-            with writing(file):
-                fresh[file].write_text(text, encoding="utf-8", newline="")
-        for file, made in fresh.items():
-            with writing(file):
-                os.replace(made, file)
+        with ExitStack() as together:
+            for file, text in texts.items():
+                together.enter_context(whole_file(file)).write_bytes(text.encode("utf-8"))
     except BaseException:
         for file, content in before.items():
-            fresh[file].unlink(missing_ok=True)
             if content is None:
                 file.unlink(missing_ok=True)
             elif file.read_bytes() != content:
-                file.write_bytes(content)
+                write_whole(file, content)
         raise

@@ -11,15 +11,15 @@ from crosscheck.judging.results import collect
 from crosscheck.records.archive import read
 from crosscheck.records.kinds import Record
 from crosscheck.records.session import standing
-from crosscheck.report.ci import write_junit, write_summary, write_verdicts
+from crosscheck.report.ci import VERDICTS, write_junit, write_summary, write_verdicts
 from crosscheck.report.mutations import read_scores
 from crosscheck.report.site import Material, write_single, write_site
-from crosscheck.sealed.badge import badge_json, badge_svg
+from crosscheck.report.unfinished import mark_unfinished
+from crosscheck.sealed.badge import write_badges
 from crosscheck.sealed.document import results_of
-from crosscheck.sealed.seal import FILE, sealed_text
-from flexmb.output.writing import folder, writing
+from crosscheck.sealed.seal import write_results
 
-__all__ = ["Choice", "SessionOutcome", "write_all"]
+__all__ = ["Choice", "SessionOutcome", "mark_unfinished", "write_all"]
 
 Choice = Callable[[Sequence[Record]], Sequence[Record]]
 
@@ -32,16 +32,14 @@ def write_all(
     `strict`: figures that are worse than recorded, or not recorded, are not as expected. `single_file`: the report is
     one file, `report.html`, instead of a folder of pages.
     """
+    mark_unfinished(records, out)  # until each is written: should this process be killed, none is of an earlier session
     session = collect(chosen(read(records)))
     outcome = conclude(session, strict)
-    folder(out)
-    with writing(out):
-        write_verdicts(outcome, out / "verdicts.json")
-        write_summary(outcome, out / "summary.md")
-        write_junit(outcome, out / "junit.xml")
-        (out / FILE).write_text(sealed_text(results_of(session, outcome, records)), encoding="ascii")
-        (out / "badge.json").write_text(badge_json(outcome), encoding="ascii")
-        (out / "badge.svg").write_text(badge_svg(outcome), encoding="utf-8")
-        material = Material(session, outcome, read_scores(out))
-        page = write_single(material, out) if single_file else write_site(material, out)
+    write_verdicts(outcome, out / VERDICTS)
+    write_summary(outcome, out / "summary.md")
+    write_junit(outcome, out / "junit.xml")
+    write_results(results_of(session, outcome, records), out)
+    write_badges(outcome, out)
+    material = Material(session, outcome, read_scores(out))
+    page = write_single(material, out) if single_file else write_site(material, out)
     return outcome, page

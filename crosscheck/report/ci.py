@@ -14,7 +14,9 @@ from crosscheck.judging.figures import recordable
 from crosscheck.judging.outcome import NO_REFERENCE, SessionOutcome
 from crosscheck.judging.verdict import STATUSES, Verdict
 from flexmb.output.printable import printable
+from flexmb.output.whole import whole_file, write_whole
 
+VERDICTS = "verdicts.json"
 SHOWN = 40
 # Characters with a meaning in Markdown: within a line (an underscore only beside a gap), and list signs at its start.
 MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\d)[.)]")
@@ -23,7 +25,7 @@ MARKDOWN = re.compile(r"[\\`*\[\]<>|~&$!]|(?<![^\W_])_|_(?![^\W_])|^[#+-]|(?<=^\
 def write_verdicts(outcome: SessionOutcome, file: Path) -> None:
     """verdicts.json: a list with one record a verdict."""
     records = [{**msgspec.to_builtins(verdict), "ok": verdict.ok} for verdict in outcome.all]
-    file.write_bytes(msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
+    write_whole(file, msgspec.json.format(msgspec.json.encode(records), indent=1) + b"\n")
 
 
 def write_summary(outcome: SessionOutcome, file: Path) -> None:
@@ -42,6 +44,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         if len(outcome.unexpected) > SHOWN:
             lines += ["", f"... and {len(outcome.unexpected) - SHOWN} more, in verdicts.json."]
     lines += _table("Worse than recorded", outcome.worse, lambda verdict: verdict.worse)
+    lines += _table("Beyond stale figures", outcome.outgrown, lambda verdict: verdict.grown)
     if outcome.strict:
         lines += _table("No accepted figures", outcome.unrecorded, lambda verdict: "`crosscheck run --accept` records")
     if outcome.absences:
@@ -58,7 +61,7 @@ def write_summary(outcome: SessionOutcome, file: Path) -> None:
         lines += [f"- {_flat(f'{case} {NO_REFERENCE.format(case)}')}" for case in outcome.unreferenced]
     if outcome.broken:
         lines += ["", "## Lines that are no records", "", *(f"- {_flat(line)}" for line in outcome.broken)]
-    file.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_whole(file, "\n".join(lines) + "\n")
 
 
 def write_junit(outcome: SessionOutcome, file: Path) -> None:
@@ -96,11 +99,14 @@ def write_junit(outcome: SessionOutcome, file: Path) -> None:
         ElementTree.SubElement(test, "failure", type="nothing", message="it was asked for and compared in nothing")
     if not outcome.all:
         suite = ElementTree.SubElement(suites, "testsuite", name="crosscheck", tests="1", failures="1")
-        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name="something was compared")
-        ElementTree.SubElement(test, "failure", type="nothing", message=outcome.headline)
+        unfinished, nothing = ("unfinished", "the session came to its end"), ("nothing", "something was compared")
+        kind, name = unfinished if outcome.unfinished else nothing
+        test = ElementTree.SubElement(suite, "testcase", classname="crosscheck", name=name)
+        ElementTree.SubElement(test, "failure", type=kind, message=outcome.headline)
     for element in suites.iter():  # XML cannot contain most control characters: they are spelled out
         element.attrib.update({key: printable(value) for key, value in element.attrib.items()})
-    ElementTree.ElementTree(suites).write(file, encoding="utf-8", xml_declaration=True)
+    with whole_file(file) as beside:
+        ElementTree.ElementTree(suites).write(beside, encoding="utf-8", xml_declaration=True)
 
 
 def _not_judged(suite: ElementTree.Element, case: str, outcome: SessionOutcome) -> list[str]:
@@ -124,7 +130,7 @@ def _complaint(outcome: SessionOutcome, verdict: Verdict) -> str:
     if not outcome.strict or not verdict.ok:
         return ""
     if verdict.worse:
-        return f"worse than recorded: {verdict.worse}"
+        return verdict.grown
     return "no accepted figures" if verdict.accepted is None and recordable(verdict, BUILT_IN) else ""
 
 
@@ -133,7 +139,7 @@ def _test(suite: ElementTree.Element, verdict: Verdict, complaint: str, lost: bo
     name = f"{verdict.comparison}: {verdict.channel}, {verdict.pair}"
     test = ElementTree.SubElement(suite, "testcase", classname=f"{verdict.case}.{verdict.kind}", name=name)
     if verdict.ok and verdict.worse:
-        ElementTree.SubElement(test, "system-out").text = f"worse than recorded: {verdict.worse}"
+        ElementTree.SubElement(test, "system-out").text = verdict.grown
     if complaint:
         ElementTree.SubElement(test, "failure", type="figures", message=complaint)
         return "failure"

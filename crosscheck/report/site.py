@@ -23,6 +23,7 @@ from crosscheck.report.html import embedded, source, templates
 from crosscheck.report.mutations import Scores
 from crosscheck.report.overview import findings, matrix
 from crosscheck.report.places import INDEX, CasePlace, places
+from flexmb.output.whole import write_whole
 from flexmb.output.writing import folder
 
 FOLDER = "report"
@@ -47,23 +48,20 @@ def write_site(material: Material, out: Path) -> Path:
     site = out / FOLDER
     _clear(site)
     where = places((case.case.case for case in material.session.cases), single=False)
+    index = _page("index.html.j2", material, root="", **_overview(material, where))
     written: dict[str, str] = {}
     for name in ("style.css", *SCRIPTS):
         written[f"{ASSETS}/{name}"] = str(source(name))
     for name in LIBRARIES:
         written[f"{ASSETS}/{Path(name).name}"] = _library(name)
-    written[INDEX] = _page("index.html.j2", material, root="", **_overview(material, where))
     for case in material.session.cases:
         place = where[case.case.case]
         view = _view(case, material, place)
         written[place.page] = _page("case_page.html.j2", material, root=place.root, case=view)
         written[place.data] = _registration(case, material, place)
-    written[LISTING] = msgspec.json.encode(sorted([*written, LISTING])).decode()
-    for name, text in written.items():
-        folder((site / name).parent)
-        (site / name).write_text(text, encoding="utf-8", errors="backslashreplace")
+    _write_pages(site, written | {INDEX: index})
     leading = templates().get_template("leading.html.j2").render(outcome=material.outcome, index=f"{FOLDER}/{INDEX}")
-    (out / SINGLE).write_text(leading, encoding="utf-8", errors="backslashreplace")
+    write_whole(out / SINGLE, _encoded(leading))
     return site / INDEX
 
 
@@ -82,8 +80,28 @@ def write_single(material: Material, out: Path) -> Path:
         scripts=[*(Markup(_library(name)) for name in LIBRARIES), *map(source, SCRIPTS)],
         data=[Markup(_registration(case, material, where[case.case.case])) for case in cases],
     )
-    (out / SINGLE).write_text(text, encoding="utf-8", errors="backslashreplace")
+    write_whole(out / SINGLE, _encoded(text))
     return out / SINGLE
+
+
+def write_unfinished(outcome: SessionOutcome, out: Path) -> None:
+    """Have the report say that its session has not come to its end, in the place of the pages of an earlier one."""
+    text = templates().get_template("unfinished.html.j2").render(outcome=outcome)
+    write_whole(out / SINGLE, _encoded(text))
+    if _clear(out / FOLDER):
+        _write_pages(out / FOLDER, {INDEX: text})
+
+
+def _write_pages(site: Path, pages: dict[str, str]) -> None:
+    """Write pages by name, the list of them first, so that they can be cleared away however this ends."""
+    listing = msgspec.json.encode(sorted([*pages, LISTING])).decode()
+    for name, text in {LISTING: listing, **pages}.items():
+        folder((site / name).parent)
+        write_whole(site / name, _encoded(text))
+
+
+def _encoded(text: str) -> bytes:
+    return text.encode("utf-8", errors="backslashreplace")
 
 
 def _page(name: str, material: Material, **more: Any) -> str:
@@ -121,16 +139,17 @@ def _library(name: str) -> str:
     return files("crosscheck.report").joinpath("vendor", name).read_text(encoding="utf-8")
 
 
-def _clear(site: Path) -> None:
-    """Remove what an earlier report wrote, and nothing else."""
+def _clear(site: Path) -> bool:
+    """Remove what an earlier report wrote, and nothing else; whether there was one."""
     try:
         listed = msgspec.json.decode((site / LISTING).read_bytes(), type=list[str])
     except (OSError, ValueError):
-        return
+        return False
     for name in listed:
         file = site / name
         if file.resolve().is_relative_to(site.resolve()):
             file.unlink(missing_ok=True)
+    return True
 
 
 def _engines(session: Session) -> list[tuple[str, str]]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
-from crosscheck.judging.verdict import GRAVITY, Verdict
+from crosscheck.judging.verdict import GRAVITY, WORSE, Verdict
 from crosscheck.library.channels import part_of
 
 SYMBOLS: dict[str, str] = {
@@ -197,14 +197,15 @@ def summary_cell(group: list[Verdict]) -> VerdictCell:
         text += " (expected)" if worst.ok else f" (expected {worst.expected})"
     grown = [verdict for verdict in group if verdict.ok and verdict.worse]
     if grown:
-        text += ", worse than recorded" if len(grown) == len(group) else f", {len(grown)} worse than recorded"
+        what = "beyond stale figures" if all(verdict.stale for verdict in grown) else WORSE
+        text += f", {what}" if len(grown) == len(group) else f", {len(grown)} {what}"
     return VerdictCell(worst.status, look, text, _numbers(worst))
 
 
 def _reason(verdict: Verdict) -> str:
     """The reason of a verdict, and the accepted figures."""
     if verdict.worse:
-        return f"{verdict.reason}; worse than recorded: {verdict.worse}"
+        return f"{verdict.reason}; {verdict.grown}"
     if verdict.accepted is None:
         return verdict.reason
     doubt = f", U {verdict.accepted.U:.1e}" if verdict.accepted.U else ""

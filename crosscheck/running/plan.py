@@ -15,7 +15,7 @@ from crosscheck.library.case import TAKES_APART, Comparison, Control, Refined, R
 from crosscheck.library.digests import case_digests
 from crosscheck.library.find import Case
 from crosscheck.library.mutations import mutate
-from crosscheck.library.reference import has_reference
+from crosscheck.library.reference import has_reference, scene_digest
 from crosscheck.library.selection import alone, joining, select
 from crosscheck.records.drawing import FILM, Drawing
 from crosscheck.records.kinds import CaseRecord, VariantInfo
@@ -209,7 +209,7 @@ def _job(
         scene_id="" if scene is None else scene_identity(scene, times),
         times=times,
         provider=provider,
-        efforts=_ladder(variant, engine),
+        efforts=prescribed(variant, engine),
         finest_only=role != MAIN,
         kept=tuple(chart.observable for chart in run.charts),
         error=error,
@@ -237,14 +237,14 @@ def _film(case: Case, run: RunFile, variant: Variant, provider: str) -> tuple[Jo
         scene_id=scene_identity(filmed, times),
         times=times,
         provider=provider,
-        efforts=_ladder(variant, ENGINE),
+        efforts=prescribed(variant, ENGINE),
         finest_only=True,
         kept=film_channels(drawing),
         lean=True,
     ), drawing
 
 
-def _ladder(variant: Variant, engine: str) -> tuple[Effort, ...]:
+def prescribed(variant: Variant, engine: str) -> tuple[Effort, ...]:
     """The efforts that the case prescribes for an engine, none where it leaves them to the engine."""
     return tuple(
         Effort(kind=ladder.kind, value=value, method=ladder.method)
@@ -260,7 +260,15 @@ def _info(case: Case, variant: Variant, scene: Scene | None, error: str) -> Vari
         return VariantInfo(level="", drawing=None, error=error)
     drawn = case.scene(variant) if variant.transform in TAKES_APART else scene
     drawable = all(not isinstance(body, SidBody) for body in drawn.bodies)  # a SID body's nodes are in its file
-    return VariantInfo(level=_levels(scene), drawing=draw(drawn) if drawable else None)
+    drawing = draw(drawn) if drawable else None
+    return VariantInfo(level=_levels(scene), drawing=drawing, basis=scene_basis(case, variant))
+
+
+def scene_basis(case: Case, variant: Variant) -> str:
+    """What accepted figures of a variant stand on: scene, transformation, refinement and times as they are written."""
+    times = (variant.duration_s or case.run.duration_s, variant.samples or case.run.samples)
+    text = f"{scene_digest(case, variant)} {times} {variant.refined}"
+    return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
 def _levels(scene: Scene) -> str:

@@ -29,12 +29,13 @@ from crosscheck.sampling.points import sample_values
 from crosscheck.sampling.sample import SampleJob, SampleRecord, Written, run_sample
 from crosscheck.sampling.scenes import with_values
 from crosscheck.sampling.table import SamplesTable
+from flexmb.output.whole import take_away
 from flexmb.scene.files import load_scene
 from flexmb.scene.problems import closest
 from flexmb.scene.schema import Scene
 from flexmb.typing import Real
 
-RECORDS, TABLE = "samples.jsonl", "samples.csv"
+RECORDS, TABLE, SUMMARY = "samples.jsonl", "samples.csv", "summary.json"
 REDUCING = ("crosscheck.sampling.quantities",)
 Listener = Callable[[int, int, int], None]  # how many samples are done, of how many, and how many have no result
 
@@ -76,6 +77,8 @@ def run_sweep(
     values = sample_values(sweep)
     _require_sense(sweep, subject, values)
     records = out / RECORDS
+    for name in (TABLE, SUMMARY):  # of an earlier sweep, should this one be killed
+        take_away(out / name)
     if fresh:
         records.unlink(missing_ok=True)
     known = _known(records)
@@ -83,7 +86,7 @@ def run_sweep(
     used: dict[int, SampleRecord] = {}
     with (
         closing(Archive(records, Written)) as archive,
-        closing(SamplesTable(out / TABLE, sweep)) as table,
+        SamplesTable(out / TABLE, sweep) as table,
         closing(
             scheduler(
                 run_sample, jobs, limits.workers, str(out / "samples.log"), _kind, _time_limit, limits.memory_bytes

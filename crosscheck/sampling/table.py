@@ -1,48 +1,60 @@
-"""The table of samples: a line for each in each engine, added as they come, in order when the table is closed."""
+"""The table of samples: a line for each in each engine, added as they come, in order when the table is complete."""
 
 from __future__ import annotations
 
 import csv
-import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TextIO
+from types import TracebackType
+from typing import Self, TextIO
 
 from crosscheck.sampling.file import SweepFile
 from crosscheck.sampling.sample import SampleRecord
+from flexmb.output.whole import whole_file
 from flexmb.output.writing import writing
 
 
 class SamplesTable:
-    """A CSV file: sample, engine, status, parameters, quantities (empty where there is no result), message."""
+    """A CSV file: sample, engine, status, parameters, quantities (empty where there is no result), message.
+
+    Until its context ends without an error the lines stand in `<name>.unfinished.csv`, in the order in which they came.
+    """
 
     def __init__(self, file: Path, sweep: SweepFile) -> None:
         self._file = file
+        self._growing = file.with_suffix(f".unfinished{file.suffix}")
         self._parameters = [parameter.title for parameter in sweep.parameters]
         self._quantities = [quantity.name for quantity in sweep.quantities]
         self._records: list[SampleRecord] = []
-        header = ["sample", "engine", "status", *self._parameters, *self._quantities, "message"]
-        with writing(file):
-            self._stream = file.open("w", encoding="utf-8", newline="")
-            self._write(self._stream, header)
+        self._header = ["sample", "engine", "status", *self._parameters, *self._quantities, "message"]
+
+    def __enter__(self) -> Self:
+        with writing(self._growing):
+            self._stream = self._growing.open("w", encoding="utf-8", newline="")
+            self._write(self._stream, self._header)
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, traceback: TracebackType | None
+    ) -> None:
+        with writing(self._growing):
+            self._stream.close()
+        if error is None:
+            self._complete()
 
     def add(self, record: SampleRecord) -> None:
         """Append a line; it is on disk when this returns."""
         self._records.append(record)
-        with writing(self._file):
+        with writing(self._growing):
             self._write(self._stream, self._line(record))
 
-    def close(self) -> None:
+    def _complete(self) -> None:
         """Leave the lines in the order of samples and engines."""
-        with writing(self._file):
-            self._stream.close()
-            header, *_ = self._file.read_text(encoding="utf-8").splitlines(keepends=True)
-            ordered = self._file.with_name(self._file.name + ".ordered")
-            with ordered.open("w", encoding="utf-8", newline="") as stream:
-                stream.write(header)
-                for record in sorted(self._records, key=lambda each: (each.sample, each.engine)):
-                    self._write(stream, self._line(record))
-            os.replace(ordered, self._file)
+        with whole_file(self._file) as beside, beside.open("w", encoding="utf-8", newline="") as stream:
+            self._write(stream, self._header)
+            for record in sorted(self._records, key=lambda each: (each.sample, each.engine)):
+                self._write(stream, self._line(record))
+        self._growing.unlink()
 
     def _line(self, record: SampleRecord) -> list[object]:
         parameters = [record.parameters[name] for name in self._parameters]

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+from pathlib import Path
 from xml.sax.saxutils import escape
 
 from crosscheck.judging.outcome import SessionOutcome
+from flexmb.output.whole import write_whole
 
 LABEL = "crosscheck"
 COLOURS = {"brightgreen": "#2f7d32", "red": "#b3261e", "lightgrey": "#5f6368"}  # white on them has a contrast above 5
@@ -16,12 +18,20 @@ PADDING = 6.0
 def badge_words(outcome: SessionOutcome) -> tuple[str, str]:
     """What the badge says, and its colour by the name that shields.io knows."""
     good, count = sum(verdict.ok for verdict in outcome.all), len(outcome.all)
+    if outcome.unfinished:
+        return "unfinished", "lightgrey"
     if not count:
         return "nothing compared", "lightgrey"
     if outcome.ok:
         return f"{count} verdicts as expected", "brightgreen"
     text = f"{good} of {count} as expected" if good < count else "incomplete"
     return text, "red"
+
+
+def write_badges(outcome: SessionOutcome, folder: Path) -> None:
+    """Write badge.json and badge.svg into a folder."""
+    write_whole(folder / "badge.json", badge_json(outcome))
+    write_whole(folder / "badge.svg", badge_svg(outcome))
 
 
 def badge_json(outcome: SessionOutcome) -> str:

@@ -4,16 +4,19 @@ The file is one JSON object. Every key:
 
 - ``format`` "crosscheck results" and ``version`` 1; a reader refuses others;
 - ``sha256``: hex digest of the file as it stands without this key and its line end (`crosscheck.sealed.seal`);
+- ``unfinished`` (left out: false): the session has begun and not come to its end, and no verdict is in the file;
 - ``exit_code`` of the session (0 or 1), ``headline`` in words, ``strict``, the ``engines`` asked for (none: all);
 - ``made``: ``at`` (UTC), ``python``, ``system``, ``processor``, ``packages`` and ``engines`` with their versions;
-- ``records``: SHA-256 of the records.jsonl that was judged; ``broken``: how many of its lines are none;
+- ``records``: SHA-256 of the records.jsonl that was judged, "" where there was none yet; ``broken``: how many of its
+  lines are none;
 - ``cases``, by name, each with
 
   - ``files``: SHA-256 of the case's files (run.toml, scenes, provenance, reference.csv ...) when it was run;
   - ``scenes``: digest of the scene and the sample times of each variant;
   - ``verdicts``: by comparison and "channel | engine (variant) | engine (variant)": ``kind`` (left out: "comparison"),
     ``status``, ``expected`` (left out: "agree"), ``ok`` (left out: true), ``E``, ``U`` (relative; left out where there
-    is none), ``goal``, ``worse`` and, where it is not as expected, ``reason``;
+    is none), ``goal``, ``worse`` (E or U is beyond the accepted figure), ``stale`` (what is another than it was when
+    that was accepted) and, where it is not as expected, ``reason``;
   - ``not_applicable`` (left out if empty): the engine's reason by "variant | engine", or "variant | engine | channel"
     where it is one channel, of engines that the case names nowhere; ``unreferenced`` (left out: false): it has a recipe
     of a reference and no reference;
@@ -54,6 +57,7 @@ class SealedVerdict(_SealedPart, frozen=True, kw_only=True):
     U: float | None = None
     goal: float = 0.0
     worse: str = ""
+    stale: str = ""
     reason: str = ""
 
 
@@ -93,6 +97,7 @@ class SealedResults(_SealedPart, frozen=True, kw_only=True):
 
     format: str = ""
     version: int = 0
+    unfinished: bool = False
     exit_code: int
     headline: str
     strict: bool = False
@@ -119,12 +124,13 @@ def results_of(session: Session, outcome: SessionOutcome, records: Path) -> Seal
     return SealedResults(
         format=FORMAT,
         version=VERSION,
+        unfinished=outcome.unfinished,
         exit_code=0 if outcome.ok else 1,
         headline=outcome.headline,
         strict=outcome.strict,
         engines=() if latest is None else latest.engines,
         made=made,
-        records=file_digest(records),
+        records=file_digest(records) if records.exists() else "",
         broken=len(outcome.broken),
         cases={case.case.case: _case(case, outcome) for case in session.cases},
     )
@@ -160,6 +166,7 @@ def _verdict(verdict: Verdict) -> SealedVerdict:
         U=_short(verdict.U, 4),
         goal=verdict.goal,
         worse=verdict.worse,
+        stale=verdict.stale,
         reason="" if verdict.ok else verdict.reason,
     )
 

@@ -17,6 +17,7 @@ from typing import Any
 import msgspec
 
 from crosscheck.sealed.document import FORMAT, VERSION, SealedResults
+from flexmb.output.whole import write_whole
 from flexmb.scene.reading import MIB, Unreadable, read_text
 
 FILE = "results.json"
@@ -32,6 +33,11 @@ def sealed_text(results: SealedResults) -> str:
     """The text of results.json."""
     content = msgspec.to_builtins(results)
     return _canonical(content | {SEAL: _seal(content)}) + "\n"
+
+
+def write_results(results: SealedResults, folder: Path) -> None:
+    """Write results.json into a folder."""
+    write_whole(folder / FILE, sealed_text(results))
 
 
 def read_results(file: Path) -> SealedResults:

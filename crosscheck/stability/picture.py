@@ -15,6 +15,7 @@ from matplotlib.patches import Patch
 from crosscheck.stability.boundary import label
 from crosscheck.stability.map import Axis, StabilityMap
 from crosscheck.stability.run import Finished
+from flexmb.output.whole import save_figure
 
 STATUSES = {"failed": "#756bb1", "did not finish": "#fdd835", "did not run": "#969696"}
 LINE_POINTS = 400
@@ -32,9 +33,7 @@ def draw(done: Finished, path: Path) -> Path:
         _overlay(axes, what)
         _frame(axes, what)
         _legend(figure, done)
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
-    return path
+        return save_figure(figure, path, dpi=150, metadata={"Date": None} if path.suffix == ".svg" else None)
 
 
 def _cells(axes: Axes, done: Finished) -> None:

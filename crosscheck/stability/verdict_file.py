@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import msgspec
 
 from crosscheck.records.archive import BrokenRecords
 from crosscheck.stability.boundary import MapVerdict
+from flexmb.output.whole import take_away, write_whole
 from flexmb.scene.reading import regular_size
 
 VERDICTS = "maps.json"
@@ -27,9 +28,29 @@ def write_verdicts(verdicts: Sequence[MapVerdict], file: Path) -> None:
         aside = file.replace(file.with_name(file.name + ".broken"))
         warnings.warn(f"{error}; moved to {aside.name}", BrokenRecords, stacklevel=2)
         known = {}
-    known |= {verdict.map: verdict for verdict in verdicts}
-    text = msgspec.json.format(msgspec.json.encode([known[name] for name in sorted(known)]), indent=1)
-    file.write_bytes(text + b"\n")
+    _write(known | {verdict.map: verdict for verdict in verdicts}, file)
+
+
+def take_away_verdicts(maps: Sequence[str], file: Path) -> None:
+    """Take the verdicts on maps that are about to run out of the file: of a run that is killed none may be left.
+
+    A file with other content stays until there are new ones. With no verdict left the file goes, as an empty list has
+    nothing against it.
+    """
+    try:
+        known = {verdict.map: verdict for verdict in read_verdicts(file)} if file.exists() else {}
+    except ValueError:
+        return
+    left = {name: verdict for name, verdict in known.items() if name not in maps}
+    if left:
+        _write(left, file)
+    else:
+        take_away(file)
+
+
+def _write(verdicts: Mapping[str, MapVerdict], file: Path) -> None:
+    text = msgspec.json.format(msgspec.json.encode([verdicts[name] for name in sorted(verdicts)]), indent=1)
+    write_whole(file, text + b"\n")
 
 
 def read_verdicts(file: Path) -> list[MapVerdict]:

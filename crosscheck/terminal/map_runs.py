@@ -21,9 +21,10 @@ from crosscheck.running.scheduler import Limits, Scheduler
 from crosscheck.stability.map import StabilityMap
 from crosscheck.stability.picture import draw
 from crosscheck.stability.run import Finished, run_map
-from crosscheck.stability.verdict_file import VERDICTS, write_verdicts
+from crosscheck.stability.verdict_file import VERDICTS, take_away_verdicts, write_verdicts
 from crosscheck.terminal.text import marked, words
-from flexmb.output.writing import folder, writing
+from flexmb.output.whole import take_away
+from flexmb.output.writing import folder
 
 
 def run_and_draw(
@@ -33,12 +34,14 @@ def run_and_draw(
     """Run maps, draw them, write their verdicts; returns the exit code: 0 where all agree, else 1."""
     verdicts = []
     folder(pictures)
+    take_away_verdicts(names, pictures / VERDICTS)
+    for name in names:
+        take_away(pictures / f"{name}.svg")
     for name in names:
         done = _run(console, name, out / f"{name}.jsonl", depth, fresh, limits, scheduler)
-        with writing(pictures):
-            picture = draw(done, pictures / f"{name}.svg")
-            verdicts.append(done.verdict)
-            write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
+        picture = draw(done, pictures / f"{name}.svg")
+        verdicts.append(done.verdict)
+        write_verdicts([done.verdict], pictures / VERDICTS)  # one by one: another process may write its own
         console.print(_line(done, picture), soft_wrap=True)
     good = sum(verdict.ok for verdict in verdicts)
     colour = "green" if good == len(verdicts) else "red"

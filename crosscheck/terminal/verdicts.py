@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 
 from rich.console import Console
@@ -72,7 +73,12 @@ def _not_in_order(outcome: SessionOutcome) -> Iterator[Text]:
         sign, colour = ("✕", "red") if outcome.strict else ("!", "yellow")
         yield marked(sign, colour, f"{case} {NO_REFERENCE.format(case)}")
     for verdict in outcome.worse:
-        yield marked("!", "yellow", f"{_place(verdict)} worse than recorded: {verdict.worse}")
+        yield marked("!", "yellow", f"{_place(verdict)} {verdict.grown}")
+    for verdict in outcome.outgrown:
+        yield marked("!", "yellow", f"{_place(verdict)}: {verdict.grown}")
+    for (case, why), count in Counter((verdict.case, verdict.stale) for verdict in outcome.stale).items():
+        figures = "1 accepted figure is" if count == 1 else f"{count} accepted figures are"
+        yield marked("!", "yellow", f"{case}: {figures} stale ({why}): accept anew by crosscheck run {case} --accept")
     for verdict in outcome.unrecorded if outcome.strict else ():
         yield marked("!", "yellow", f"{_place(verdict)} has no accepted figures")
 

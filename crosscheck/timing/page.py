@@ -15,7 +15,8 @@ from crosscheck.records.machine import environment
 from crosscheck.timing.chart import CaseCharts
 from crosscheck.timing.picture import draw_chart
 from flexmb.output.printable import printable
-from flexmb.output.writing import folder, writing
+from flexmb.output.whole import write_whole
+from flexmb.output.writing import folder
 
 INDEX, DATA = "index.html", "charts.json"
 
@@ -23,21 +24,21 @@ INDEX, DATA = "index.html", "charts.json"
 def write_case(charts: CaseCharts, out: Path) -> Path:
     """Write the pictures, the data and the page of a case below `out`; returns the page."""
     place = folder(out / folder_name(charts.case))
+    (place / INDEX).unlink(missing_ok=True)  # the page of earlier pictures
     pictures = [f"{folder_name(chart.observable)}.svg" for chart in charts.charts]
     for chart, name in zip(charts.charts, pictures, strict=True):
-        with writing(place / name):
-            draw_chart(charts, chart, place / name)
+        draw_chart(charts, chart, place / name)
     machine = environment((charts.case,))
-    _write(place / DATA, msgspec.json.format(msgspec.json.encode({"machine": machine, "charts": charts})))
+    write_whole(place / DATA, msgspec.json.format(msgspec.json.encode({"machine": machine, "charts": charts})))
     drawn = list(zip(charts.charts, pictures, strict=True))
-    _write(place / INDEX, _page("case.html.j2", charts=charts, drawn=drawn, machine=machine))
+    write_whole(place / INDEX, _page("case.html.j2", charts=charts, drawn=drawn, machine=machine))
     return place / INDEX
 
 
 def write_index(cases: Sequence[CaseCharts], out: Path) -> Path:
     """Write the page that leads to all cases; returns it."""
     entries = [(each, folder_name(each.case)) for each in cases]
-    _write(folder(out) / INDEX, _page("cases.html.j2", entries=entries, machine=environment()))
+    write_whole(folder(out) / INDEX, _page("cases.html.j2", entries=entries, machine=environment()))
     return out / INDEX
 
 
@@ -60,8 +61,3 @@ def _templates() -> Environment:
         lstrip_blocks=True,
         finalize=lambda value: printable(value) if type(value) is str else value,
     )
-
-
-def _write(file: Path, content: bytes) -> None:
-    with writing(file):
-        file.write_bytes(content)

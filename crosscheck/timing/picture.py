@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from crosscheck.timing.chart import CaseCharts, ChartData, ChartPoint
+from flexmb.output.whole import save_figure
 
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#7a5c00", "#3f3f8f", "#8c2d04", "#00695c")  # told apart by all
 MARKERS = "osD^vPX*"
@@ -41,7 +42,7 @@ def draw_chart(charts: CaseCharts, chart: ChartData, path: Path) -> None:
         axes.grid(True, which="major", color="#dddddd", linewidth=0.6)
         axes.set_axisbelow(True)
         figure.legend(loc="outside lower center", ncols=2, fontsize="small")
-        figure.savefig(path, metadata={"Date": None})
+        save_figure(figure, path, metadata={"Date": None})
 
 
 def _series(axes: Axes, chart: ChartData, drawn: list[ChartPoint], several_variants: bool) -> None:

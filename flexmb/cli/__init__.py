@@ -13,6 +13,7 @@ from flexmb.cli.linearising import campbell, linearize
 from flexmb.cli.properties import mass
 from flexmb.cli.running import simulate
 from flexmb.cli.scenes import check, schema
+from flexmb.output.readers import outlive_readers
 
 app = typer.Typer(
     no_args_is_help=True,
@@ -53,4 +54,5 @@ app.command("import")(import_)  # as a function it cannot have this name
 
 def main() -> None:
     """Entry point of the command `flexmb`."""
+    outlive_readers()
     app()

@@ -9,7 +9,7 @@ import typer
 from rich.text import Text
 
 from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, no_traceback
-from flexmb.output.writing import check_folder, folder, writing
+from flexmb.output.writing import check_folder, folder
 from flexmb.scene.files import load_scene, save_scene
 
 
@@ -55,7 +55,6 @@ def advise(
         if advice.scene is None or advice.method is None:
             raise typer.Exit(EXIT_STOPPED)
         folder(out.parent)
-        with writing(out):
-            save_scene(advice.scene, out)
+        save_scene(advice.scene, out)
     console.print("wrote", str(out), soft_wrap=True)
     console.print(f"flexmb simulate {out} --t-end {t_end:g} {advice.method.words()}", soft_wrap=True)

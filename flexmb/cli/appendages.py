@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from flexmb.cli.terminal import SceneFile, console, no_traceback, vector
-from flexmb.output.writing import check_folder, writing
+from flexmb.output.writing import check_folder
 from flexmb.scene.check import check_and_warn
 from flexmb.scene.files import load_scene
 
@@ -64,6 +64,5 @@ def equivalence(
             point=None if point is None else vector("point", point),
         )
         console.print(equivalence_tables(result, angle))
-        with writing(picture):
-            written = write_equivalence_plot(result, picture)
+        written = write_equivalence_plot(result, picture)
     console.print("wrote", str(written), soft_wrap=True)

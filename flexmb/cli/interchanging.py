@@ -11,7 +11,7 @@ from rich.text import Text
 
 from flexmb.cli.terminal import SceneFile, console, errors, no_traceback
 from flexmb.output.printable import printable
-from flexmb.output.writing import check_folder, folder, writing
+from flexmb.output.writing import check_folder, folder
 from flexmb.scene.bodies import BeamBody, ModalBody, SidBody
 from flexmb.scene.build import SceneBuilder
 from flexmb.scene.files import load_scene, save_scene
@@ -75,8 +75,7 @@ def export(
         if body not in flexible:
             raise ValueError(f'"{body}" is no flexible body of the scene; these are: {", ".join(flexible) or "none"}')
         folder(out.parent)
-        with writing(out):
-            write_sid(sid_of(flexible[body]), out)
+        write_sid(sid_of(flexible[body]), out)
     console.print("wrote", str(out), soft_wrap=True)
 
 
@@ -129,8 +128,7 @@ def reduce(
             return
         _tell(made.notes)
         folder(out.parent)
-        with writing(out):
-            write_sid(sid_of(made.body), out)
+        write_sid(sid_of(made.body), out)
     console.print("wrote", str(out), soft_wrap=True)
 
 
@@ -166,8 +164,7 @@ def _held(body: ModalBody | SidBody) -> Scene:
 def _write(scene: Scene, out: Path, notes: tuple[str, ...]) -> None:
     _tell(notes)
     folder(out.parent)
-    with writing(out):
-        save_scene(scene, out)
+    save_scene(scene, out)
     console.print("wrote", str(out), soft_wrap=True)
 
 

@@ -10,7 +10,7 @@ from rich.text import Text
 
 from flexmb.cli.terminal import EXIT_STOPPED, SceneFile, console, errors, no_traceback, range_of
 from flexmb.output.printable import printable
-from flexmb.output.writing import check_folder, writing
+from flexmb.output.writing import check_folder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 
@@ -91,8 +91,7 @@ def linearize(
         if note:
             console.print(Text(printable(note), style="yellow"))
         if export is not None:
-            with writing(export):
-                console.print("wrote", str(model.save(export)), soft_wrap=True)
+            console.print("wrote", str(model.save(export)), soft_wrap=True)
 
 
 def campbell(
@@ -134,9 +133,7 @@ def campbell(
             errors.print(Text("error: ", style="bold red") + Text(printable(str(error))), soft_wrap=True)
             raise typer.Exit(EXIT_STOPPED) from None
         console.print(campbell_table(result))
-        with writing(picture):
-            written = [write_campbell_plot(result, picture, modes)]
+        written = [write_campbell_plot(result, picture, modes)]
         if csv is not None:
-            with writing(csv):
-                written.append(result.to_csv(csv))
+            written.append(result.to_csv(csv))
     console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,7 +12,8 @@ from rich.text import Text
 
 from flexmb.cli import run_options as o
 from flexmb.cli.terminal import EXIT_INTERRUPTED, EXIT_STOPPED, SceneFile, Strict, console, no_traceback
-from flexmb.output.writing import check_folder, folder, writing
+from flexmb.output.whole import whole_file
+from flexmb.output.writing import check_folder, folder
 from flexmb.scene.bodies import BeamBody
 from flexmb.scene.files import load_scene
 from flexmb.scene.schema import Scene
@@ -97,8 +99,7 @@ def simulate(
         console.print("wrote", ", ".join(str(path) for path in written), soft_wrap=True)
         for name, x in wanted.items():  # from here on the run itself is safe
             loads, path = trajectory.section_loads(name, x), out / f"sections-{name}.csv"
-            with writing(path):
-                write_sections(path, trajectory.t, loads)
+            write_sections(path, trajectory.t, loads)
             console.print("wrote", str(path), soft_wrap=True)
         if error and not interrupted:
             with console.status(Text("running again, tighter")):
@@ -111,19 +112,19 @@ def simulate(
 
 
 def _written(trajectory: Trajectory, out: Path, also: Sequence[str], plots: bool) -> list[Path]:
-    """The files of a run, in a folder that is made for them."""
+    """The files of a run, in a folder that is made for them: a trajectory with its own restart, or neither."""
     folder(out)
-    with writing(out / "trajectory.csv"):
-        trajectory.to_csv(out / "trajectory.csv")
-    with writing(out):
-        others = [out / f"trajectory.{word}" for word in dict.fromkeys(also)]
-        for path in others:
-            getattr(trajectory, FORMATS[path.suffix[1:]])(path)
-        written = [out / "trajectory.csv", *others, *(trajectory.plot(out) if plots else ())]
-        if trajectory.restart is not None:
-            written.append(out / "restart.npz")
-            trajectory.restart.save(written[-1])
-    return written
+    restart = out / "restart.npz"
+    writers: dict[Path, Callable[[Path], None]] = {out / "trajectory.csv": trajectory.to_csv}
+    writers |= {out / f"trajectory.{word}": getattr(trajectory, FORMATS[word]) for word in dict.fromkeys(also)}
+    if trajectory.restart is not None:
+        writers[restart] = trajectory.restart.save
+    with ExitStack() as together:
+        for path, write in writers.items():
+            write(together.enter_context(whole_file(path)))
+    if trajectory.restart is None:
+        restart.unlink(missing_ok=True)  # of an earlier run
+    return [*writers, *(trajectory.plot(out) if plots else ())]
 
 
 def _sections(scene: Scene, word: str) -> tuple[str, list[float]]:

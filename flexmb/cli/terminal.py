@@ -74,8 +74,6 @@ def _show(message: Warning | str, *_: object) -> None:
 def _messages() -> Iterator[None]:
     try:
         yield
-    except BrokenPipeError:  # whoever read the output has read enough
-        raise
     except (SceneError, SceneWarning, NotImplementedError, ValueError, ImportError, OSError) as error:
         text = in_words(error) if isinstance(error, OSError) else str(error)
         errors.print(Text("error: ", style="bold red") + Text(printable(text)), soft_wrap=True)

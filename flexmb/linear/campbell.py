@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from flexmb.linear.linear_model import Complex, LinearModel, Stability
 from flexmb.linear.spin import steady_spin
+from flexmb.output.whole import whole_file
 from flexmb.scene.schema import Scene
 from flexmb.system.compile import compile
 from flexmb.system.tree_system import System
@@ -74,7 +75,8 @@ class Campbell:
         path = Path(path)
         path.parent.mkdir(parents=True, exist_ok=True)
         table = np.column_stack([self.rates, pairs])
-        np.savetxt(path, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
+        with whole_file(path) as beside:
+            np.savetxt(beside, table, fmt="%.17g", delimiter=",", header=",".join(columns), comments="")
         return path
 
 

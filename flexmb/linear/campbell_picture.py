@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from flexmb.output.printable import chart_text
+from flexmb.output.whole import save_figure
 
 if TYPE_CHECKING:
     from flexmb.linear.campbell import Campbell
@@ -45,6 +46,4 @@ def write_campbell_plot(result: Campbell, path: Path, modes: int | None = None) 
     for axes in (above, below):
         axes.grid(alpha=0.3)
     figure.suptitle(chart_text(f"Modes of {result.scene}"))
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=_RESOLUTION)
-    return path
+    return save_figure(figure, path, dpi=_RESOLUTION)

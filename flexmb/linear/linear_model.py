@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import eig, matrix_balance
 
+from flexmb.output.whole import whole_file
 from flexmb.tables import arguments
 from flexmb.tables.state import State
 from flexmb.typing import Real
@@ -253,13 +254,14 @@ class LinearModel:
         if path.suffix not in (".npz", ".mat"):
             raise ValueError(f"{path}: linear models are written as .npz or .mat")
         path.parent.mkdir(parents=True, exist_ok=True)
-        if path.suffix == ".npz":
-            np.savez(path, **data)
-        else:
-            from scipy.io import savemat
+        with whole_file(path) as beside:
+            if path.suffix == ".npz":
+                np.savez(beside, **data)
+            else:
+                from scipy.io import savemat
 
-            cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
-            savemat(path, data | cells)
+                cells = {key: value.astype(object) for key, value in data.items() if value.dtype.kind == "U"}
+                savemat(beside, data | cells)
         return path
 
     def _shape(self, mode: Mode) -> Complex:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, NoReturn
 
 import numpy as np
 
+from flexmb.output.whole import whole_file
 from flexmb.run.channels import channels_of, unit
 from flexmb.typing import Real
 
@@ -28,7 +29,11 @@ AXES = {3: ("axis", ("x", "y", "z")), 4: ("component", ("w", "x", "y", "z"))}
 def write_npz(trajectory: Trajectory, path: Path) -> None:
     """`names` (n,), `units` (n,), `values` (T,n), `scene`: text and numbers only, nothing that has to be unpickled."""
     names, units, values = zip(*trajectory.columns(), strict=True)
-    np.savez(path, names=np.array(names), units=np.array(units), values=np.column_stack(values), scene=trajectory.scene)
+    path = path if path.suffix == ".npz" else path.with_name(f"{path.name}.npz")  # as NumPy names it
+    with whole_file(path) as beside, beside.open("wb") as file:
+        np.savez(
+            file, names=np.array(names), units=np.array(units), values=np.column_stack(values), scene=trajectory.scene
+        )
 
 
 def data_frame(trajectory: Trajectory) -> pandas.DataFrame:
@@ -56,7 +61,8 @@ def write_parquet(trajectory: Trajectory, path: Path) -> None:
     fields = [pyarrow.field(name, pyarrow.float64(), metadata={"unit": unit}) for name, unit, _ in columns]
     about = {"scene": trajectory.scene, "status": json.dumps(trajectory.message)}
     table = pyarrow.table([values for _, _, values in columns], schema=pyarrow.schema(fields, metadata=about))
-    parquet.write_table(table, path)
+    with whole_file(path) as beside:
+        parquet.write_table(table, beside)
 
 
 def dataset(trajectory: Trajectory) -> xarray.Dataset:
@@ -85,8 +91,16 @@ def write_recording(trajectory: Trajectory, path: Path) -> None:
         import rerun
     except ImportError:
         _missing("rerun-sdk", "viewer")
-    recording = rerun.RecordingStream("flexmb", recording_id=None)
-    recording.save(str(path), default_blueprint=_blueprint(rerun.blueprint))
+    with whole_file(path) as beside:
+        recording = rerun.RecordingStream("flexmb", recording_id=None)
+        recording.save(str(beside), default_blueprint=_blueprint(rerun.blueprint))
+        _record(rerun, recording, trajectory)
+        recording.flush()
+        recording.disconnect()
+
+
+def _record(rerun: Any, recording: Any, trajectory: Trajectory) -> None:
+    """Log markers, their paths and all other channels."""
     time = [rerun.TimeColumn("t", duration=trajectory.t)]
     recording.log("markers", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     for name, marker in trajectory.markers.items():
@@ -110,8 +124,6 @@ def write_recording(trajectory: Trajectory, path: Path) -> None:
             )
             columns = rerun.Scalars.columns(scalars=values)
             recording.send_columns(entity, indexes=time, columns=columns)
-    recording.flush()
-    recording.disconnect()
 
 
 def _blueprint(blueprint: Any) -> Any:

@@ -11,6 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from flexmb.output.printable import chart_text
+from flexmb.output.whole import save_figure
 from flexmb.typing import Real
 
 if TYPE_CHECKING:
@@ -22,7 +23,6 @@ _RESOLUTION = 120  # dots per inch
 
 def write_plots(trajectory: Trajectory, folder: Path) -> list[Path]:
     """Write markers, energy, momentum, loads and drives, as far as the run has them; returns the paths."""
-    folder.mkdir(parents=True, exist_ok=True)
     wanted: dict[str, tuple[Callable[[Trajectory, Figure], None], bool]] = {
         "markers": (_markers, bool(trajectory.markers)),
         "energy": (_energy, True),
@@ -43,8 +43,7 @@ def _write(trajectory: Trajectory, path: Path, draw: Callable[[Trajectory, Figur
         if axes.get_legend_handles_labels()[0]:
             axes.legend(fontsize="small", loc="best")
     figure.axes[-1].set_xlabel("t (s)")
-    figure.savefig(path, dpi=_RESOLUTION)
-    return path
+    return save_figure(figure, path, dpi=_RESOLUTION)
 
 
 def _rows(figure: Figure, *labels: str) -> list[Axes]:

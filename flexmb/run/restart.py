@@ -12,6 +12,7 @@ import numpy as np
 from flexmb.control.memory import LoopMemory
 from flexmb.integrate.integrator import Method
 from flexmb.integrate.memory import TAKEN_UP, TIME, Memory
+from flexmb.output.whole import whole_file
 from flexmb.run import event_memory, restart_form
 from flexmb.run.event_memory import EventMemory
 from flexmb.scene.npz import REAL, TEXT, unpacked
@@ -53,7 +54,7 @@ class Restart:
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write to a file of NumPy (`.npz`) that is read back exactly."""
         self._refuse_other_parts()
-        with Path(path).open("wb") as file:
+        with whole_file(Path(path)) as beside, beside.open("wb") as file:
             np.savez(
                 file, version=VERSION, method=self.method, t=self.t,
                 scene=np.frombuffer(msgspec.json.encode(self.scene), np.uint8),

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from flexmb.output.whole import whole_file
 from flexmb.system.section_loads import SectionLoads
 from flexmb.typing import Real
 
@@ -17,7 +18,7 @@ HEADER = (
 
 def write_sections(path: Path, t: Real, loads: SectionLoads) -> None:
     """One row a time (T,) and section, 17 digits: they read back exactly."""
-    with path.open("w", newline="", encoding="utf-8") as file:
+    with whole_file(path) as beside, beside.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(HEADER)
         for i, time in enumerate(t):

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from flexmb.output.whole import whole_file
 from flexmb.run import exports
 from flexmb.run.joining import joined
 from flexmb.run.making import Making, error_estimate
@@ -284,7 +285,7 @@ class Trajectory:
     def to_csv(self, path: str | os.PathLike[str]) -> None:
         """Write all channels, one row a time, under a header "name [unit]"; 17 digits: they read back exactly."""
         columns = list(self.columns())
-        with Path(path).open("w", newline="", encoding="utf-8") as file:
+        with whole_file(Path(path)) as beside, beside.open("w", newline="", encoding="utf-8") as file:
             writer = csv.writer(file)
             writer.writerow([f"{name} [{unit}]" for name, unit, _ in columns])
             for row in zip(*(values.tolist() for _, _, values in columns), strict=True):

@@ -17,6 +17,7 @@ from typing import Any
 
 import msgspec
 
+from flexmb.output.whole import write_whole
 from flexmb.scene.bodies import ModalBody, SidBody
 from flexmb.scene.convert import plain, to_struct
 from flexmb.scene.problems import Defect, SceneError
@@ -42,7 +43,7 @@ def load_scene(path: str | os.PathLike[str]) -> Scene:
 def save_scene(scene: Scene, path: str | os.PathLike[str]) -> None:
     """Write a scene file; file references become relative to its folder (which must exist)."""
     path = Path(path)
-    path.write_text(dumps(scene, path.parent), encoding="utf-8")
+    write_whole(path, dumps(scene, path.parent))
 
 
 def loads(text: str, folder: str | os.PathLike[str] | None = None, *, name: str = "<text>") -> Scene:

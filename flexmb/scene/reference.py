@@ -15,6 +15,7 @@ from pathlib import Path
 import msgspec
 from msgspec import inspect
 
+from flexmb.output.whole import write_whole
 from flexmb.scene.files import inline
 from flexmb.scene.schema import Scene
 from flexmb.scene.units import split_unit
@@ -57,8 +58,8 @@ def reference() -> str:
 
 def write(folder: Path) -> None:
     """Write both documents to `folder`."""
-    (folder / "scene.schema.json").write_text(json_schema(), encoding="utf-8")
-    (folder / "scene-reference.md").write_text(reference(), encoding="utf-8")
+    write_whole(folder / "scene.schema.json", json_schema())
+    write_whole(folder / "scene-reference.md", reference())
 
 
 def _structs(node: inspect.Type, seen: set[type]) -> Iterator[inspect.StructType]:

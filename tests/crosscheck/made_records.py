@@ -83,12 +83,13 @@ def judged(
     accepted: Accepted | None = None,
     strict: bool = False,
     asked: tuple[str, ...] = (),
+    basis: str = "",
     **others: object,
 ) -> SessionOutcome:
-    """The outcome of a session that left these runs; `others` are more of its case's record."""
+    """The outcome of a session that left these runs; `others` are more of its case's record, `basis` its scenes'."""
     whole = run_file(text)
     run = select(whole, asked)
-    infos = {variant.name: VariantInfo(level="rigid", drawing=None) for variant in run.variants}
+    infos = {variant.name: VariantInfo(level="rigid", drawing=None, basis=basis) for variant in run.variants}
     case = CaseRecord(
         case="made/made", run=run, provenance=None, readme="", variants=infos, accepted=accepted or {}, asked=asked,
         joined=joining(whole, asked), **others,

@@ -58,3 +58,12 @@ def test_a_sound_engine_is_green_and_a_wrong_one_red(project: Path, tmp_path: Pa
     code, summary, _ = act(project, second, cases=case, engines="biased", baseline=str(baseline))
     assert code == 1
     assert "Not as expected" in summary and "worse: the session" in summary
+
+
+def test_a_session_that_did_not_begin_shows_nothing_of_an_earlier_one(project: Path, tmp_path: Path) -> None:
+    (tmp_path / "out").mkdir()
+    for name in ("summary.md", "results.json"):
+        (tmp_path / "out" / name).write_text("all was green", encoding="utf-8")
+    code, told, outputs = act(project, tmp_path, cases="no/such", baseline="out/results.json")
+    assert (code, outputs["exit-code"]) == (2, "2")
+    assert "all was green" not in told and not (tmp_path / "summary").exists()

@@ -11,6 +11,7 @@ from matplotlib.ticker import MaxNLocator
 
 from flexmb.frisch.equivalence.comparison import Equivalence
 from flexmb.output.printable import chart_text
+from flexmb.output.whole import save_figure
 from flexmb.typing import Real
 
 _SIZE = (12.0, 7.0)  # inches
@@ -30,9 +31,7 @@ def write_equivalence_plot(result: Equivalence, path: Path) -> Path:
     for axes in figure.axes:
         axes.grid(alpha=0.3)
         axes.set_axisbelow(True)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    figure.savefig(path, dpi=_RESOLUTION)
-    return path
+    return save_figure(figure, path, dpi=_RESOLUTION)
 
 
 def _shape(result: Equivalence, axes: Axes) -> None:

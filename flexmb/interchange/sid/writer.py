@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 
 from flexmb.interchange.sid.blocks import Sid, SidNode, Taylor, node_shapes, shapes
+from flexmb.output.whole import write_whole
 
 GENERAL = 3  # "structure": every element may be there
 
 
 def write_sid(sid: Sid, path: str | os.PathLike[str]) -> None:
     """Write a SID file."""
-    Path(path).write_text("\n".join(_lines(sid)) + "\n", encoding="utf-8")
+    write_whole(Path(path), "\n".join(_lines(sid)) + "\n")
 
 
 def _lines(sid: Sid) -> Iterator[str]:

@@ -58,8 +58,9 @@ def everything() -> SessionOutcome:
 
 
 def plain(verdict: Verdict) -> dict:
-    """A verdict without its figures, which have tests of their own."""
-    return {k: v for k, v in msgspec.to_builtins(verdict).items() if k not in ("E", "U", "scale", "reason")}
+    """A verdict without its figures and what they stand on, which have tests of their own."""
+    apart = ("E", "U", "scale", "reason", "basis")
+    return {k: v for k, v in msgspec.to_builtins(verdict).items() if k not in apart}
 
 
 def test_a_control_says_all_of_itself() -> None:
@@ -68,6 +69,7 @@ def test_a_control_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "fault", "kind": "control", "channel": TIP, "variant_a": "rigid",
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "differ",
         "expected": "differ", "goal": 1e-3, "outside": "", "accepted": None, "worse": "",
+        "stale": "",
         "expected_reason": "negative control (mass of rod): the fault must be noticed",
     }  # fmt: skip
     assert (control.ok, control.scale) == (True, 4.0)
@@ -90,7 +92,7 @@ def test_a_conserved_quantity_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "linear momentum conserved", "kind": "conservation",
         "channel": "momentum.linear", "variant_a": "rigid", "engine_a": "two", "variant_b": "rigid",
         "engine_b": "conservation law", "level": "rigid", "status": "differ", "expected": "differ", "goal": 1e-3,
-        "outside": "", "accepted": None, "worse": "", "expected_reason": "a thruster",
+        "outside": "", "accepted": None, "worse": "", "stale": "", "expected_reason": "a thruster",
     }  # fmt: skip
     assert (conserved.U, conserved.ok) == (None, True)
     assert np.isclose(conserved.E, 0.5) and np.isclose(conserved.scale, np.sqrt(3.0))
@@ -104,7 +106,8 @@ def test_a_comparison_says_all_of_itself() -> None:
     assert plain(verdict) == {
         "case": "made/made", "comparison": "both", "kind": "comparison", "channel": TIP, "variant_a": "rigid",
         "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid", "status": "agree",
-        "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5}, "worse": "",
+        "expected": "agree", "goal": 1e-3, "outside": "", "accepted": {"E": 0.0, "U": 1.8e-5, "of": ""}, "worse": "",
+        "stale": "",
         "expected_reason": "",
     }  # fmt: skip
     assert verdict.reason == "0 of the range apart, within the uncertainty 5.4e-05"
@@ -365,6 +368,7 @@ def test_an_unused_pattern_says_all_of_itself() -> None:
         "case": "made/made", "comparison": "both", "kind": "comparison", "channel": "marker:top.position",
         "variant_a": "rigid", "engine_a": "one", "variant_b": "rigid", "engine_b": "two", "level": "rigid",
         "status": "unresolved", "expected": "agree", "goal": 0.0, "outside": said, "accepted": None, "worse": "",
+        "stale": "",
         "expected_reason": "why",
     }  # fmt: skip
     assert unused.reason == said
@@ -508,7 +512,17 @@ goals = { "marker:tip.position" = 1e-3 }
     assert verdict.level == "full"
 
 
-@pytest.mark.parametrize(("torque", "size"), [(1e-13, 1e-13), (1e-15, 20.0), (0.0, 0.0)])
-def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(torque: float, size: float) -> None:
+@pytest.mark.parametrize(
+    ("torque", "evaluations", "size"),
+    [
+        (1e-13, 0, 1e-13), (1e-15, 0, 20.0), (0.0, 10**6, 0.0), (1e-13, 400, 1e-13), (1e-13, 600, 20.0),
+        (1e-13, -1, 1e-13),
+    ],
+)  # fmt: skip
+def test_rounding_of_a_family_that_is_nothing_is_that_of_the_scene(
+    torque: float, evaluations: int, size: float
+) -> None:
+    """It is nothing below 2^-50 of the scene, or below eps sqrt(N), which is 8.9e-14 and 1.09e-13 of 20 Nm here."""
     signals = {"load:pivot.force": way(10.0), TIP: way(2.0), "load:pivot.torque": way(torque)}
-    assert np.isclose(Sizes(signals, signals.__getitem__).magnitude("load:pivot.torque"), size, rtol=1e-5, atol=0.0)
+    found = Sizes(signals, signals.__getitem__).magnitude("load:pivot.torque", evaluations)
+    assert np.isclose(found, size, rtol=1e-5, atol=0.0)

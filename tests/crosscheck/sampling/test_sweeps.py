@@ -70,8 +70,8 @@ def run(file: Path, out: Path, **options: object) -> Sampled:
     return run_sweep(file, out, **{"provider": PROVIDER, "scheduler": here_and_backwards, **options})
 
 
-def table(out: Path) -> list[dict[str, str]]:
-    with (out / "samples.csv").open(encoding="utf-8", newline="") as stream:
+def table(out: Path, name: str = "samples.csv") -> list[dict[str, str]]:
+    with (out / name).open(encoding="utf-8", newline="") as stream:
         return list(csv.DictReader(stream))
 
 
@@ -138,17 +138,23 @@ def test_samples_without_a_result_are_counted_and_listed_and_no_part_of_the_stat
     assert not summary.ok
 
 
-def test_an_interrupted_sweep_leaves_a_table_of_what_was_done(tmp_path: Path) -> None:
+def test_an_interrupted_sweep_leaves_a_table_of_what_was_done_by_a_name_that_says_so(tmp_path: Path) -> None:
+    """And no table and no summary of the whole sweep that was there before."""
     file = write(tmp_path, "fine")
+    run(file, tmp_path / "out")
+    (tmp_path / "out" / "summary.json").write_text("{}", encoding="utf-8")
 
     def interrupted(function, jobs, *_: object):
         yield from (event for event in here_and_backwards(function, jobs[:2]))
         raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
-        run(file, tmp_path / "out", scheduler=interrupted)
-    assert [line["sample"] for line in table(tmp_path / "out")] == ["0", "1"]
+        run(file, tmp_path / "out", scheduler=interrupted, fresh=True)
+    left = {each.name for each in (tmp_path / "out").iterdir()}
+    assert "samples.unfinished.csv" in left and not {"samples.csv", "summary.json"} & left
+    assert sorted(line["sample"] for line in table(tmp_path / "out", "samples.unfinished.csv")) == ["0", "1"]
     run(file, tmp_path / "out")
+    assert not (tmp_path / "out" / "samples.unfinished.csv").exists()
     assert len(table(tmp_path / "out")) == 6
 
 
