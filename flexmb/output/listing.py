@@ -69,8 +69,8 @@ class Listing:
             yield from self._below_each_other(options.max_width)
         else:
             yield from self._beside_each_other(widths, "-" if options.ascii_only else "─")
-        if self._caption:
-            yield Text(self._caption, ABOUT)
+        for line in _folded(Text(self._caption), options.max_width) if self._caption else ():
+            yield _unbroken(line, ABOUT)
 
     def _widths(self, room: int) -> list[int] | None:
         """Of each column, in a table that is at most `room` wide; None where it cannot be."""

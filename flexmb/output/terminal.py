@@ -10,10 +10,10 @@ ENDLESS = 1_000_000  # columns: no line of ours is as long
 
 
 class Terminal(Console):
-    """A console that folds lines to the width of a terminal, and neither folds nor cuts where nobody watches.
+    """A console that cuts nothing, and where nobody watches folds nothing either.
 
     What goes into a pipe or a file is read by programs: a line stays a line there, whatever COLUMNS says. On a terminal
-    too nothing is cut: a word that is longer than the screen goes on in its next line.
+    tables fold sentences to its width; a line that is longer goes on in the terminal's next.
     """
 
     def __init__(self, *, stderr: bool = False) -> None:
@@ -29,6 +29,6 @@ class Terminal(Console):
     def size(self, new: tuple[int, int]) -> None:
         self._width, self._height = new
 
-    def print(self, *objects: Any, crop: bool = False, **others: Any) -> None:
-        """As of rich, which would crop by default."""
-        super().print(*objects, crop=crop, **others)
+    def print(self, *objects: Any, soft_wrap: bool | None = True, **others: Any) -> None:
+        """As of rich, which by default would break words that are longer than the terminal is wide."""
+        super().print(*objects, soft_wrap=soft_wrap, **others)
