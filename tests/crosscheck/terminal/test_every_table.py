@@ -32,7 +32,7 @@ def spinner(folder: Path) -> Path:
         SceneBuilder("spinner")
         .rigid_body("hub", mass=5.0, inertia=(1.0, 1.2, 1.5))
         .beam(PANEL, length=1.0, elements=4, section=section, modes=3)
-        .revolute("shaft", "ground", "hub")
+        .revolute("shaft", "ground", "hub", rate=1.0)
         .weld("root", "hub", PANEL)
         .marker("tip", PANEL, node="tip")
         .scene()
