@@ -20,9 +20,9 @@ def to_offer(engine: Engine, scene: Scene) -> str:
 
 
 def _parts(scene: Scene) -> Iterator[str]:
-    """Kinds of what the scene is made of, in the order in which it declares them."""
-    for body in scene.bodies:
-        yield "rigid bodies" if isinstance(body, RigidBody) else "flexible bodies"
+    """Kinds of what the scene is made of, in the order in which it declares them; that it has rigid bodies is plain."""
+    if not all(isinstance(body, RigidBody) for body in scene.bodies):
+        yield "flexible bodies"
     for hinge in scene.hinges:
         yield f"{_words(hinge)} hinges"
         for part in _coordinates(hinge):

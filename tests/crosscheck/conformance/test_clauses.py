@@ -55,10 +55,10 @@ def test_an_engine_that_refuses_everything_has_shown_nothing() -> None:
     outcomes = list(outcomes_of(Refuser("refuser")).values())
     verdict = verdict_on(outcomes)
     assert (verdict.kept, verdict.whole, "too little was shown" in verdict.text) == (False, False, True), verdict
-    assert "Offer first: represent rigid bodies, revolute hinges, or any other simple scene" in verdict.text
+    assert "Offer first: represent revolute hinges, or any other simple scene" in verdict.text
     lines = to_offer(outcomes)
-    assert "represent rigid bodies, prismatic hinges, motors" in lines
-    assert 'represent rigid bodies, free hinges, connectors: bushing and name "connectors" in `takes`' in lines
+    assert "represent prismatic hinges, motors" in lines
+    assert 'represent free hinges, connectors: bushing and name "connectors" in `takes`' in lines
     assert sum(map(len, lines.values())) == sum(each.status == "not offered" for each in outcomes)
 
 
