@@ -21,9 +21,9 @@ from crosscheck.engines.contract import Engine, EngineMissing
 from crosscheck.running.execute import describe, find_engine
 from crosscheck.running.pool import run_jobs
 from crosscheck.running.sweep import PROVIDER
-from crosscheck.running.worker import SPAWN
+from crosscheck.running.worker import SPAWN, Method
 
-FORKED = "forkserver"
+FORKED: Method = "forkserver"
 IMPORTED = ("crosscheck.conformance.trial", "crosscheck.engines.native")  # before the processes of clauses are forked
 CLAUSE_LIMIT_S = 180.0  # an engine may have to compile at its first clause
 
@@ -146,7 +146,7 @@ def _clause(trial: ClauseTrial) -> str:
     return trial.clause
 
 
-def _start_method() -> str:
+def _start_method() -> Method:
     if FORKED not in get_all_start_methods():
         return SPAWN
     get_context(FORKED).set_forkserver_preload(list(IMPORTED))

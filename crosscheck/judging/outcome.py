@@ -78,7 +78,7 @@ class SessionOutcome:
         return {engine: list(cases) for engine, cases in found.items()}
 
     @property
-    def left_out(self) -> dict[str, int]:
+    def not_offered(self) -> dict[str, int]:
         """By engine how many channels it does not offer, of those it would have been judged in."""
         return dict(Counter(each.engine for each in self.inapplicable if each.channel))
 
@@ -120,7 +120,7 @@ class SessionOutcome:
             return "Nothing was compared" + (f": {why}" if why else "")
         if self.ok:
             grown = f", {len(self.worse)} of them worse than recorded" if self.worse else ""
-            return f"All {len(self.all)} verdicts are as expected{grown}{self._left_out}"
+            return f"All {len(self.all)} verdicts are as expected{grown}{self._unoffered}"
         parts = []
         if self.unexpected:
             parts.append(f"{len(self.unexpected)} of {len(self.all)} verdicts are not as expected")
@@ -146,8 +146,8 @@ class SessionOutcome:
         return f"{', '.join(self.uncompared)} {were} asked for and compared in nothing"
 
     @property
-    def _left_out(self) -> str:
-        told = [f"{engine} {count} channel{'s' if count > 1 else ''}" for engine, count in self.left_out.items()]
+    def _unoffered(self) -> str:
+        told = [f"{engine} {count} channel{'s' if count > 1 else ''}" for engine, count in self.not_offered.items()]
         return f"; not offered and not judged: {', '.join(told)}" if told else ""
 
     @property

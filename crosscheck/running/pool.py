@@ -20,7 +20,7 @@ from typing import Any
 from crosscheck.running.processes import memory_limit, memory_of
 from crosscheck.running.scheduler import Event, Events, Function, one_kind, usual_limit
 from crosscheck.running.waiting import Waiting
-from crosscheck.running.worker import SPAWN, TICK_S, Worker, keep_short
+from crosscheck.running.worker import SPAWN, TICK_S, Method, Worker, keep_short
 
 
 def run_jobs(
@@ -31,7 +31,7 @@ def run_jobs(
     kind: Callable[[Any], str] = one_kind,
     time_limit_s: Callable[[Any], float] = usual_limit,
     memory_limit_bytes: float | None = None,
-    method: str = SPAWN,
+    method: Method = SPAWN,
 ) -> Events:
     """Run jobs in `workers` processes of this machine (by default one per core); see `Scheduler`.
 

@@ -16,12 +16,13 @@ from math import inf
 from multiprocessing import get_context
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Literal
 
 from crosscheck.running.processes import end
 from crosscheck.running.scheduler import Event, Function
 
-SPAWN = "spawn"  # a new interpreter for each process, which takes nothing from this one
+Method = Literal["spawn", "forkserver"]  # of multiprocessing
+SPAWN: Method = "spawn"  # a new interpreter for each process, which takes nothing from this one
 START_LIMIT_S = 120.0  # for a worker to start and to read its job
 TICK_S = 0.25
 LOG_LIMIT_BYTES = 64 * 2**20
@@ -38,7 +39,7 @@ class Worker:
     kind that the process serves.
     """
 
-    def __init__(self, method: str = SPAWN) -> None:
+    def __init__(self, method: Method = SPAWN) -> None:
         self._method = method
         self.job: int | None = None
         self.kind = ""
@@ -90,7 +91,7 @@ class Worker:
 
     def _start(self, function: Function, log: str) -> None:
         """Get a process; the thread limits are set in the environment it inherits, before it imports anything."""
-        context = get_context(self._method)
+        context: Any = get_context(self._method)  # the type that all contexts share lacks what they have
         here, there = context.Pipe()
         process = context.Process(target=_serve, args=(there, function, log), daemon=True)
         with _environment:

@@ -50,7 +50,7 @@ def _inventory(outcome: SessionOutcome) -> str:
         parts.append(f"{noticed} of {controls} deliberate faults noticed")
     for engine, cases in outcome.never_applicable.items():
         parts.append(f"{engine} not applicable in {len(cases)}")
-    for engine, channels in outcome.left_out.items():
+    for engine, channels in outcome.not_offered.items():
         parts.append(f"{channels} not offered by {engine}")
     return f"{count} case{'s' if count > 1 else ''}: {', '.join(parts)}"
 

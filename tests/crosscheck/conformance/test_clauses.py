@@ -136,7 +136,7 @@ def swapped(values: np.ndarray) -> np.ndarray:
 def at_few_samples(output: str) -> Change:
     """The sign of an output changed at three samples of a run, those of one quadrant, say."""
     few = np.ones(41)
-    few[[17, 18, 30]] = -1.0
+    few[[12, 17, 18]] = -1.0
     sign = lambda values: values * few[: len(values)].reshape(-1, *[1] * (values.ndim - 1))  # noqa: E731
     return lambda run: replace(run, **{output: made_of(getattr(run, output), sign)})
 

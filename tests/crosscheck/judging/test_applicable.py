@@ -130,9 +130,9 @@ def test_an_energy_that_a_guest_does_not_know_is_counted_too() -> None:
     known = {TIP: way(), "energy.kinetic": way()}
     pair = [*ladder("one", known), *ladder("two", known)]
     outcome = judged(text, [*pair, *ladder("guest", {TIP: way()})], asked=THREE)
-    assert (outcome.ok, outcome.left_out) == (True, {"guest": 1})
+    assert (outcome.ok, outcome.not_offered) == (True, {"guest": 1})
     assert [each.where for each in outcome.inapplicable] == ["rigid, energy.kinetic"]
-    assert judged(text, [*pair, *ladder("guest", known)], asked=THREE).left_out == {}
+    assert judged(text, [*pair, *ladder("guest", known)], asked=THREE).not_offered == {}
     unasked = judged(ONE_PAIR, [*pair, *ladder("guest", {TIP: way()})], asked=THREE)
     assert (unasked.ok, unasked.inapplicable) == (True, ())
 
